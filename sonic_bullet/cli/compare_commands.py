@@ -16,7 +16,7 @@ from typing import Any
 
 import click
 
-from sonic_bullet.cli.output import clean_stdout, places, quiet_stderr, status, write_json
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
 from sonic_bullet.records.errors import CompareError, FileError
 
@@ -197,14 +197,11 @@ def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> No
     for scene in scenes:
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
-    to = (
-        places(*(str(Path(folder) / f"{Path(scene).stem}.json") for scene in scenes)) if Path(folder).is_dir() else None
-    )
+    root = Path(folder_place(folder))
+    root.mkdir(parents=True, exist_ok=True)
+    to = places(*(str(root / f"{Path(scene).stem}.json") for scene in scenes))
     with quiet_stderr():
         from sonic_bullet.comparing.baselines import make_baseline, write_baseline
-    if to is None:
-        Path(folder).mkdir(parents=True)
-        to = places(*(str(Path(folder) / f"{Path(scene).stem}.json") for scene in scenes))
     for scene, place in zip(scenes, to, strict=True):
         with status(scene) as tell:
             made = make_baseline(scene, reason, tell, runs)

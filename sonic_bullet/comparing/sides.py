@@ -212,6 +212,8 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
     if place.suffix.lower() == ".npz":
         return of_log(read_log(name), name)
     samples, sr = read_audio(name)
+    if not np.size(samples):
+        raise CompareError(f"{shown(name)} holds no sample", "give a recording that has some")
     return Side(name, KeptSound.of(np.atleast_2d(np.asarray(samples, float))), sr)
 
 

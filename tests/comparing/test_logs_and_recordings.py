@@ -120,3 +120,14 @@ def test_recordings_name_no_cause_and_rates_are_compared_at_the_lower(tmp_path: 
     assert found.differences == ()
     assert "compared at 44100 Hz" in found.effects[0].words
     assert compare(tmp_path / "a.wav", tmp_path / "a.wav").same
+
+
+@pytest.mark.parametrize("decay_per_s", [0.0, 40.0])
+def test_recordings_that_have_nothing_in_common_are_said_to_have_nothing(decay_per_s: float) -> None:
+    rng, n, sr = np.random.default_rng(35), 12_000, 48_000
+    fade = np.exp(-decay_per_s * np.arange(n) / sr)
+    alone = [recording_effects(*(fade * rng.normal(size=(2, 1, n))), sr)[0].kind for _ in range(40)]
+    assert alone.count("unrelated") >= 37  # chance passes 1 in 100: more than 3 of 40 has a probability of 8e-4
+    x = fade * rng.normal(size=(1, n))
+    noise = rng.normal(size=(1, n)) * np.sqrt(np.square(x).mean() * 10)
+    assert recording_effects(x, x + noise, sr)[0].kind == "noise"  # 10 dB above what is in common

@@ -141,7 +141,7 @@ def test_another_order_of_making_is_one_input(folder: Path) -> None:
     text = scene(folder, "x.py").read_text()
     start, middle, end = (text.index(x) for x in ("    bar = ", "    ball = ", "    for body in"))
     (folder / "turned.py").write_text(text[:start] + text[middle:end] + text[start:middle] + text[end:])
-    found = compare(folder / "a.py", folder / "turned.py")
+    found = compare(scene(folder, "a.py"), folder / "turned.py")
     assert [one.what for one in found.differences] == ["turn"]
     assert found.same or found.exact
 
@@ -150,7 +150,8 @@ def test_a_script_that_makes_one_more_is_put_back(folder: Path) -> None:
     text = scene(folder, "x.py").read_text()
     script = text.replace("def build(client):", "import pybullet as client\n\nclient.connect(client.DIRECT)\nif True:")
     more = "    more = client.createMultiBody(\n        0.004, "
-    more += "client.createCollisionShape(client.GEOM_SPHERE, radius=0.005), basePosition=[0.03, 0, 0.02]\n    )\n    client.resetBaseVelocity(more, [0, 0, -1.0])\n"
+    more += "client.createCollisionShape(client.GEOM_SPHERE, radius=0.005), basePosition=[0.03, 0, 0.02]\n    )\n"
+    more += "    client.resetBaseVelocity(more, [0, 0, -1.0])\n"
     for name, one in (("one.py", ""), ("two.py", more)):
         end = '    ears = sb.attach(client, microphone=MICROPHONE)\n    ears.add(bar, material="steel")\n'
         end += '    ears.add(ball, material="steel")\n' + ('    ears.add(more, material="steel")\n' if one else "")

@@ -1,8 +1,10 @@
 """What became of a recording, told from the samples alone: no cause is named, for a recording has no inputs.
 
     channels in which order -> delay, polarity, gain by cross-correlation -> transfer function H = S_ab/S_aa -> what is
-    left: noise, tones, clipping, gaps
+    left: noise, tones, clipping, gaps; two that correlate no more than chance have nothing in common
 
+Chance: c(k) = Σ a(t) b(t + k) of two unrelated sounds has the variance Σ a²b² · Σ ρ_a ρ_b [Bartlett, J. R. Stat. Soc.
+Suppl. 8 (1946) 27], a² and b² their envelopes; of M lags the largest is below √(2 ln(2M/α)) of its root but for α.
 H and its coherence: Bendat and Piersol, Random Data (2010), eq. 6.37 and 6.39. Coherence near 1 says one linear filter
 did it; what it does not explain is left over.
 """
@@ -26,6 +28,11 @@ LEFT_DB = -90.0
 CLIPPED_RUN = 4
 """Samples in a row at one extreme value: a sine at 1 kHz has two at 48 kHz."""
 GAP_S = 0.002
+CHANCE, COMMON_SHARE = 0.01, 0.25
+"""α; and what of B's power A must explain so as not to be asked whether by chance: a tone correlates with any other."""
+ENVELOPE_S = 0.02
+OFFSET_ERRORS = 4
+"""Standard errors of a mean that noise does not reach, but for 6 in 100 000."""
 GAIN_DB = 0.005
 
 
@@ -40,7 +47,10 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     if order != tuple(range(len(a))):
         found.append(Consequence("channels", f"channels in another order: {' '.join(str(i + 1) for i in order)} of A"))
         a = a[list(order)]
-    delay, sign = _delay(a, b, sr)
+    delay, sign, share, chance = _delay(a, b, sr)
+    if share < min(chance, COMMON_SHARE):
+        words = f"nothing in common: of B's power A explains {share:.1e}, chance would up to {chance:.1e}"
+        return [Consequence("unrelated", words, None, {"share": share, "chance": chance})]
     if 0 < abs(delay) <= GROUP_DELAY and not _only_delayed(a, b, delay):
         delay = 0
     found += _offset(a * sign, b)
@@ -81,20 +91,36 @@ def _order(a: Array, b: Array) -> tuple[int, ...]:
 def _offset(a: Array, b: Array) -> list[Consequence]:
     change = float(b.mean() - a.mean())
     rms = float(np.sqrt(np.square(b).mean()))
-    if abs(change) < 0.01 * rms:
+    if abs(change) < max(0.01, OFFSET_ERRORS / b.size**0.5) * rms:
         return []
     return [Consequence("offset", f"a constant of {change:.3g} is added", None, {"offset": change})]
 
 
-def _delay(a: Array, b: Array, sr: int) -> tuple[int, int]:
-    """(samples by which B is later, sign) of the largest cross-correlation of all channels together."""
+def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
+    """(samples by which B is later, sign) of the largest cross-correlation of all channels together; the share of B's
+    power that it explains, and what chance would.
+    """
     n = 1 << int(np.ceil(np.log2(a.shape[1] + b.shape[1])))
-    cross = sum(np.fft.irfft(np.conj(np.fft.rfft(x, n)) * np.fft.rfft(y, n)) for x, y in zip(a, b, strict=True))
+    one, other = np.fft.rfft(a, n, axis=1), np.fft.rfft(b, n, axis=1)
     most = min(round(DELAY_MOST_S * sr), a.shape[1] - 1, b.shape[1] - 1)
     lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
-    near = np.asarray(cross)[lags]
+    near = np.fft.irfft((np.conj(one) * other).sum(axis=0), n)[lags]
     k = int(np.argmax(np.abs(near)))
-    return int(lags[k]), 1 if near[k] >= 0 else -1
+    whole = float(np.square(a).sum() * np.square(b).sum())
+    spread = sum(
+        np.sqrt(_meeting(x, y, n, round(ENVELOPE_S * sr))[lags].max() * np.fft.irfft(p * q, n)[0] / (p_0 * q_0))
+        for x, y, p, q in zip(a, b, np.abs(one) ** 2, np.abs(other) ** 2, strict=True)
+        if (p_0 := np.square(x).sum()) and (q_0 := np.square(y).sum())
+    )
+    chance = float(spread) ** 2 * 2 * np.log(2 * len(lags) / CHANCE) / whole
+    return int(lags[k]), 1 if near[k] >= 0 else -1, float(near[k] ** 2) / whole, chance
+
+
+def _meeting(x: Array, y: Array, n: int, window: int) -> Array:
+    """Σ x²(t) y²(t + k) of envelopes, by k: how much of two sounds is there at once."""
+    box = np.fft.rfft(np.full(window, 1 / window), n)
+    one, other = np.fft.rfft(np.square(x), n), np.fft.rfft(np.square(y), n)
+    return np.fft.irfft(np.conj(one) * other * np.abs(box) ** 2, n)
 
 
 def _overlap(a: Array, b: Array, delay: int) -> tuple[Array, Array]:
