@@ -2,6 +2,7 @@
 
     Comparison -> page_entry (words, Ogg, PNG) -> write_page: template, autoescaped -> one HTML file
 
+Both sounds are started by one clock at one time, and switching changes which of them is heard: the same sample goes on.
 Nothing is fetched: sounds and pictures stand in the page. Its Content-Security-Policy allows the one style and the one
 script below by their hashes, so that what a body or a file is called never runs. Sounds are lossy (Ogg Vorbis) and
 scaled by one factor for both, and stand only where something differs.
@@ -46,34 +47,61 @@ figure{margin:.8rem 0}img{width:100%;height:auto;background:#fff}.cursor-of{posi
 
 SCRIPT = """
 for (const box of document.querySelectorAll('.players')) {
-  const sounds = [...box.querySelectorAll('audio')], play = box.querySelector('[data-do=play]');
+  const audios = [...box.querySelectorAll('audio')], play = box.querySelector('[data-do=play]');
   const change = box.querySelector('[data-do=switch]'), slide = box.querySelector('input');
   const shown = box.querySelector('output'), cursor = box.parentElement.querySelector('.cursor');
-  let now = 0;
-  const mute = () => sounds.forEach((x, i) => { x.muted = i !== now; });
+  let now = 0, from = 0, began = null, busy = false, context, gains, sounds, sources;
+  const at = () => began === null ? from : Math.min(from + Math.max(0, context.currentTime - began), +slide.max);
   const draw = () => {
-    const at = sounds[0].currentTime;
-    slide.value = at; shown.textContent = at.toFixed(2) + ' s';
+    slide.value = at(); shown.textContent = at().toFixed(2) + ' s';
     if (cursor) {
       const left = +cursor.dataset.left, right = +cursor.dataset.right;
       cursor.hidden = false;
-      cursor.style.left = 100 * (left + (right - left) * at / slide.max) + '%';
+      cursor.style.left = 100 * (left + (right - left) * at() / slide.max) + '%';
     }
   };
-  const tick = () => { draw(); if (!sounds[0].paused) requestAnimationFrame(tick); };
-  const toggle = () => {
-    if (sounds[0].paused) {
-      sounds[1].currentTime = sounds[0].currentTime;
-      Promise.all(sounds.map(x => x.play())).then(tick, () => {});
-      play.textContent = 'Stop';
-    } else { sounds.forEach(x => x.pause()); play.textContent = 'Play'; }
+  const bytes = x => Uint8Array.from(atob(x.src.split(',')[1]), c => c.charCodeAt(0)).buffer;
+  const open = async () => {
+    context = new AudioContext();
+    sounds = await Promise.all(audios.map(x => context.decodeAudioData(bytes(x))));
+    gains = sounds.map((_, i) => {
+      const gain = context.createGain();
+      gain.connect(context.destination); gain.gain.value = +(i === now);
+      return gain;
+    });
   };
-  const turn = () => { now = 1 - now; mute(); change.querySelector('b').textContent = sounds[now].dataset.side; };
-  mute();
+  const start = async () => {
+    if (busy) return;
+    busy = true;
+    try { if (!gains) await open(); await context.resume(); } finally { busy = false; }
+    began = context.currentTime + 0.02;
+    sources = sounds.map((sound, i) => {
+      const source = context.createBufferSource();
+      source.buffer = sound; source.connect(gains[i]); source.start(began, from);
+      return source;
+    });
+    play.textContent = 'Stop'; tick();
+  };
+  const stop = () => { from = at(); began = null; sources.forEach(x => x.stop()); play.textContent = 'Play'; draw(); };
+  const tick = () => {
+    if (began === null) return;
+    if (at() >= +slide.max) { stop(); from = 0; }
+    draw(); requestAnimationFrame(tick);
+  };
+  const toggle = () => { if (began === null) start(); else stop(); };
+  const turn = () => {
+    now = 1 - now;
+    change.querySelector('b').textContent = audios[now].dataset.side;
+    if (gains) gains.forEach((x, i) => { x.gain.value = +(i === now); });
+  };
   play.addEventListener('click', toggle);
   change.addEventListener('click', turn);
-  slide.addEventListener('input', () => { sounds.forEach(x => { x.currentTime = +slide.value; }); draw(); });
-  sounds[0].addEventListener('ended', () => { play.textContent = 'Play'; });
+  slide.addEventListener('input', () => {
+    const playing = began !== null, to = +slide.value;
+    if (playing) stop();
+    from = to; draw();
+    if (playing) start();
+  });
   box.addEventListener('keydown', e => {
     if (e.key === 'x' || e.key === 'X') { turn(); e.preventDefault(); }
     if (e.key === ' ' && e.target === box) { toggle(); e.preventDefault(); }
