@@ -1,19 +1,22 @@
 """Does a comparison find what was changed in a scene, and name that and nothing else?
 
-    python benchmarks/planted_changes.py [scenes] [pairs] [decoys] [recordings] [logs] [same] [cost] [piles]
+    python benchmarks/planted_changes.py [NAME] …
 
 scenes: 40 changes of one input; pairs: 20 of two; decoys: 10 inputs that change no sample, five alone and five beside a
-change that matters; logs: the 40 changes, of logs alone; recordings: 12 changes of a WAV; same: unchanged runs; cost:
-of equal inputs; piles: chaotic ones, by sound. Without a word, all but the last three.
+change that matters; logs: the 40 changes, of logs alone; recordings: 12 changes of a WAV; held_out: 24 changes in
+scenes of other kinds; same: unchanged runs; processes: in others; page: its size; cost: of equal inputs; piles: chaotic
+ones, by sound. Without a word, the first five.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +25,11 @@ import numpy as np
 from benchmarks.planted.held_out import held_out
 from benchmarks.planted.recordings import recordings
 from benchmarks.planted.scenes import SCENES, changed, write
+from sonic_bullet.comparing.baselines import samples_digest
 from sonic_bullet.comparing.compared_sides import compared
 from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.sides import SceneSide, Side, of_log, run
+from sonic_bullet.render import render_blocks
 
 Change = tuple[tuple[Any, ...], Any]
 
@@ -234,6 +239,49 @@ def same(bench: Bench, runs: int = 200) -> None:
     line("same", f"{equal} of {runs} unchanged runs have the same bits")
 
 
+def processes(bench: Bench, count: int = 10) -> None:
+    """Unchanged runs in other processes, each with another number of threads; and rendered in blocks of other sizes."""
+    code = "import sys; from sonic_bullet.comparing.baselines import samples_digest as d; from sonic_bullet.comparing "
+    code += "import SceneSide; from sonic_bullet.comparing.sides import run; print(d(run(SceneSide(sys.argv[1]), 'a')"
+    code += ".sound))"
+    place = write(bench.folder / "processes.py", SCENES["drop"])
+    side = run(SceneSide(place), "a")
+    assert side.log is not None
+    known, equal = samples_digest(side.sound), 0
+    for number in range(count):
+        threads = str(1 + number % 4)
+        asked = {
+            **os.environ,
+            "OMP_NUM_THREADS": threads,
+            "OPENBLAS_NUM_THREADS": threads,
+            "NUMBA_NUM_THREADS": threads,
+        }
+        words = [sys.executable, "-c", code, str(place)]
+        done = subprocess.run(words, env=asked, check=True, capture_output=True, text=True)
+        equal += done.stdout.split()[-1] == known
+    again = np.concatenate([*render_blocks(side.log)], axis=1)
+    blocks = np.array_equal(again.view(np.int64), side.sound.samples().view(np.int64))
+    line(
+        "processes", f"{equal} of {count} in other processes, of 1 to 4 threads", f"rendered as a whole: same {blocks}"
+    )
+
+
+def page(bench: Bench, count: int = 20) -> None:
+    """The size of a page of so many scenes that differ, each as long as a player plays."""
+    from sonic_bullet.report.compare_page import PLAYED_S, page_entry, write_page
+
+    place = write(bench.folder / "long.py", changed(SCENES["pile"], (("seconds",), PLAYED_S)))
+    a = run(SceneSide(place), "a")
+    assert a.log is not None
+    b = of_log(replace(a.log, seed=a.log.seed + 1, sensors=tuple(moved(x) for x in a.log.sensors)), "b")
+    write_page(str(bench.folder / "page.html"), [page_entry(compared(of_log(a.log, "a"), b, quiet))] * count)
+    line("page", f"{(bench.folder / 'page.html').stat().st_size / 1e6:.2f} MB of {count} scenes, {PLAYED_S:g} s each")
+
+
+def moved(sensor: Any) -> Any:
+    return replace(sensor, position_m=sensor.position_m + 0.05)
+
+
 def cost(bench: Bench) -> None:
     """Equal inputs against two renders."""
     from sonic_bullet.comparing import compare
@@ -278,6 +326,8 @@ def main() -> None:
             "recordings": lambda: recordings(bench.side("a", "drop", (), {}), bench.folder, line),
             "held_out": lambda: held_out(bench.folder, line),
             "same": lambda: same(bench),
+            "processes": lambda: processes(bench),
+            "page": lambda: page(bench),
             "cost": lambda: cost(bench),
             "piles": lambda: piles(bench),
         }

@@ -24,7 +24,7 @@ from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
 PEAK = 0.9
-PLAYED_S = 12.0
+PLAYED_S = 10.0
 """Of each sound at most, so that twenty scenes stay below 5 MB."""
 LEFT, RIGHT = 0.09, 0.98
 """Where a picture's axes begin and end, as shares of its width: the cursor goes there."""
@@ -210,7 +210,7 @@ def _levels(x: Array, sr: int) -> Array:
     """(frequencies, windows) in dB, all channels together, at most 800 windows."""
     window = 1024
     hop = max(256, x.shape[1] // 800)
-    padded = np.pad(x, ((0, 0), (0, window)))
+    padded = np.pad(x, ((0, 0), (window // 2, window // 2)))  # a window shows at its middle
     frames = np.lib.stride_tricks.sliding_window_view(padded, window, axis=1)[:, ::hop] * np.hanning(window)
     power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0)
     return np.asarray(10 * np.log10(power.T[:: 2 if sr > 24_000 else 1] + 1e-30))
