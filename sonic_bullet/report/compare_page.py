@@ -24,7 +24,7 @@ from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
 PEAK = 0.9
-PLAYED_S = 10.0
+PLAYED_S = 12.0
 """Of each sound at most, so that twenty scenes stay below 5 MB."""
 LEFT, RIGHT = 0.09, 0.98
 """Where a picture's axes begin and end, as shares of its width: the cursor goes there."""
@@ -202,7 +202,7 @@ def _picture(found: Comparison, one: Array, other: Array, sr: int) -> str:
     axes[3].set(yticks=[0, 1], yticklabels=["B", "A"], ylim=(-0.7, 1.7), xlabel="time in s", xlim=extent[:2])
     axes[3].set_ylabel("contacts")
     held = io.BytesIO()
-    figure.savefig(held, format="png", dpi=80, metadata={"Software": None})
+    figure.savefig(held, format="webp", dpi=80, pil_kwargs={"quality": 60})
     return base64.b64encode(held.getvalue()).decode()
 
 
