@@ -62,8 +62,7 @@ def _wanted(world: World, who: Any, how: Any) -> WantedBody:
 
 def _keywords(call: Callable[..., Any]) -> list[str]:
     """Names of the arguments that are given by name alone."""
-    given = inspect.signature(call).parameters.values()
-    return [one.name for one in given if one.kind is one.KEYWORD_ONLY]
+    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
 
 
 class Listener:
