@@ -41,8 +41,9 @@ from sonic_bullet.records.coerce import (
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import as_sensors
+from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, check_names, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, checked, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:
@@ -61,8 +62,7 @@ def _wanted(world: World, who: Any, how: Any) -> WantedBody:
 
 def _keywords(call: Callable[..., Any]) -> list[str]:
     """Names of the arguments that are given by name alone."""
-    given = inspect.signature(call).parameters.values()
-    return [one.name for one in given if one.kind is one.KEYWORD_ONLY]
+    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
 
 
 class Listener:
@@ -162,7 +162,7 @@ class Listener:
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
         }  # fmt: skip
-        return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
+        return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
@@ -174,14 +174,14 @@ class Listener:
         """
         if not isinstance(cast, Mapping):
             raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
-        return self._added([_wanted(self.world, who, how) for who, how in cast.items()], progress)
+        return self._added([_wanted(self.world, *entry) for entry in cast.items() if not absent(entry[0])], progress)
 
     def _added(
         self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None
     ) -> list[tuple[ModalModel, ...]]:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
-        check_names(self.world, wanted)
+        wanted = checked(self.world, wanted)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
             models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))

@@ -30,6 +30,7 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
+from sonic_bullet.session.directed import direction
 
 Say = Callable[[str], None]
 
@@ -37,7 +38,8 @@ Say = Callable[[str], None]
 @dataclass(frozen=True, slots=True, eq=False)
 class WantedBody:
     """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given.
-    names: what they shall be called, none: as the simulator calls them.
+    names: what they shall be called, none: as the simulator calls them. own_shapes: the shapes were given, not asked
+    of the world.
     """
 
     body: int
@@ -47,6 +49,7 @@ class WantedBody:
     options: ModalOptions
     model: ModalModel | None
     names: tuple[str, ...] = ()
+    own_shapes: bool = False
 
 
 def wanted_body(
@@ -79,7 +82,7 @@ def wanted_body(
     for one, label in zip(links, names or [world.name_of(number, one) for one in links], strict=True):
         with _naming(label, len(links)):
             parts.append((label, world.shapes_of(number, one) if given is None else given))
-    return WantedBody(number, links, tuple(parts), made, asked, model, names)
+    return WantedBody(number, links, tuple(parts), made, asked, model, names, given is not None)
 
 
 def _names(world: World, body: int, links: Sequence[int], name: str, every: bool) -> Iterator[str]:
@@ -88,14 +91,20 @@ def _names(world: World, body: int, links: Sequence[int], name: str, every: bool
         yield f"{name}/{world.link_name(body, link)}" if every and link >= 0 else name
 
 
-def check_names(world: World, wanted: Sequence[WantedBody]) -> None:
-    """Raise SceneError where a name that is given is another living link's, or given twice."""
+def checked(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+    """Who is to be added: those, or whoever directs this run says instead. Raises SceneError where a name that is given
+    is another living link's, or given twice.
+    """
+    director = direction()
+    if director is not None:
+        wanted = director.added(world, wanted)
     bearer = {body.name: (body.body_id, body.link) for body in world.living}
     for one in wanted:
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
             body, other = bearer.setdefault(name, (one.body, link))
             if (body, other) != (one.body, link):
                 raise SceneError(f"the name {shown(name)} is that of body {body}{link_words(other)}", "give another")
+    return wanted
 
 
 @contextmanager
