@@ -1,6 +1,6 @@
 """Pictures and sound into one film file, on one clock.
 
-    picture k -> shown from k/fps on, k counted in the stream's own unit 1/fps (a fraction: nothing is summed or rounded)
+    picture k -> shown from k/fps on, counted in the stream's own unit 1/fps, a fraction: nothing is summed or rounded
     sample i  -> heard at i/sr, counted in 1/sr
     the file's clock: both begin at 0, and both end at the end of the last picture
 

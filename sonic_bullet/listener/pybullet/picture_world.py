@@ -1,0 +1,160 @@
+"""Pictures by PyBullet's software renderer (TinyRenderer), in a world of their own that holds nothing but figures.
+
+Figure -> visual shape of its triangles, a normal a corner -> a body of mass 0, set to a pose for each picture
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.geometry.triangles import corner_normals
+from sonic_bullet.listener.pictures import Camera, Figure, Standing
+from sonic_bullet.listener.pybullet import body_facts as facts
+from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_with_shapes
+from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.errors import MeshError, SceneError
+
+FACES_MOST = 40_000
+"""Of a figure: PyBullet takes 131 072 vertices a shape, and here each face has its own three."""
+LIGHT = (0.4, -0.6, 1.2)
+FAR_AWAY = (0.0, 0.0, -1e5)
+SMOOTH = 0.001
+"""Share of its size by which a figure may differ from its surface: less than a pixel of a picture it fills."""
+PLANE_M = 100.0
+"""Side of the square that is drawn of a plane."""
+
+
+class PyBulletPictures:
+    """`Pictures` by TinyRenderer, whose time goes by the pixels that figures cover: those that stand still before a
+    camera that does are drawn once, and what moves is set before or behind them by its depth.
+    """
+
+    def __init__(self, figures: Sequence[Figure], size: tuple[int, int], shadows: bool, still: Array) -> None:
+        self._client, self._size, self._shadow = direct_client(), size, int(shadows)
+        self._bodies = [self._made(figure) for figure in figures]
+        # a shadow falls on who stands still, too
+        self._still = still if not shadows else np.zeros(len(still), bool)
+        self._backdrop: tuple[Array, Array] | None = None
+
+    def _made(self, figure: Figure) -> int:
+        vertex, face = simplified(figure.vertex_m, figure.face)
+        corner, normal = vertex[face].reshape(-1, 3), corner_normals(vertex, face).reshape(-1, 3)
+        shape = self._client.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=corner.tolist(),
+            indices=list(range(len(corner))),
+            normals=normal.tolist(),
+            rgbaColor=[*figure.colour, 1],
+        )
+        if shape < 0:
+            raise SceneError("PyBullet does not draw a figure", "give it a simpler mesh")
+        return int(self._client.createMultiBody(0, -1, shape))
+
+    def picture(self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera) -> Array:
+        """(height, width, 3) uint8 of all figures at poses (k, 3), (k, 4); who is not shown (k,) is left out."""
+        poses = position_m, quaternion_xyzw
+        if not self._still.any():
+            return self._taken(*poses, shown, camera)[0]
+        if self._backdrop is None:
+            self._backdrop = self._taken(*poses, shown & self._still, camera)
+        colours, depth = self._taken(*poses, shown & ~self._still, camera)
+        made, nearer = self._backdrop[0].copy(), depth < self._backdrop[1]
+        made[nearer] = colours[nearer]
+        return made
+
+    def _taken(self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera) -> tuple[Array, Array]:
+        """Colours (height, width, 3) uint8 and depths (height, width)."""
+        width, height = self._size
+        for body, place, turn, there in zip(
+            self._bodies, position_m.tolist(), quaternion_xyzw.tolist(), shown.tolist(), strict=True
+        ):
+            self._client.resetBasePositionAndOrientation(body, place if there else FAR_AWAY, turn)
+        away = float(np.linalg.norm(camera.target_m - camera.eye_m))
+        up = (0, 1, 0) if np.linalg.norm((camera.target_m - camera.eye_m)[:2]) < 1e-6 * away else (0, 0, 1)
+        view = self._client.computeViewMatrix(camera.eye_m.tolist(), camera.target_m.tolist(), up)
+        projection = self._client.computeProjectionMatrixFOV(
+            camera.view_deg, width / height, 0.02 * away, max(100.0 * away, 100.0)
+        )
+        found = self._client.getCameraImage(
+            width,
+            height,
+            view,
+            projection,
+            lightDirection=LIGHT,
+            shadow=self._shadow,
+            renderer=pybullet.ER_TINY_RENDERER,
+            flags=pybullet.ER_NO_SEGMENTATION_MASK,
+        )
+        colours, depth = np.asarray(found[2], np.uint8), np.asarray(found[3], np.float32)
+        return np.ascontiguousarray(colours.reshape(height, width, 4)[:, :, :3]), depth.reshape(height, width)
+
+    def close(self) -> None:
+        """End the client."""
+        disconnect(self._client)
+
+
+def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
+    """The surface with fewer triangles, where it is closed; never more than `FACES_MOST`."""
+    import manifold3d
+
+    size = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
+    made = manifold3d.Manifold(manifold3d.Mesh(vertex_m.astype(np.float32), face.astype(np.uint32)))
+    if made.status() == manifold3d.Error.NoError and not made.is_empty():
+        mesh = made.simplify(SMOOTH * size).to_mesh()
+        if len(mesh.tri_verts):
+            vertex_m, face = np.asarray(mesh.vert_properties, float)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+    return vertex_m, face[:FACES_MOST]
+
+
+def standing(client_id: int) -> tuple[Standing, ...]:
+    """All links that have a shape, as they stand now; shapes that PyBullet does not tell are left out."""
+    ask: Any = pybullet
+    found = []
+    for body, link in links_with_shapes(client_id):
+        try:
+            vertex, face = surface(shapes_of(client_id, body, link))
+        except MeshError:
+            continue
+        if link < 0:
+            position, turn = ask.getBasePositionAndOrientation(body, physicsClientId=client_id)
+        else:
+            position, turn = ask.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=client_id)[:2]
+        seen = [x[7] for x in ask.getVisualShapeData(body, physicsClientId=client_id) if x[1] == link]
+        colour = tuple(seen[0][:3]) if seen else (0.7, 0.7, 0.7)
+        name = facts.link_names(client_id, body)[link + 1]
+        found.append(Standing(body, link, name, Figure(vertex, face, colour), np.array(position), np.array(turn)))
+    return tuple(found)
+
+
+def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
+    """(v, 3) vertices and (f, 3) faces of all shapes, body frame. Raises MeshError where there are none."""
+    import trimesh
+
+    vertices, faces, count = [], [], 0
+    for shape in shapes:
+        x, y, _ = shape.size_m.tolist()
+        if shape.kind == "mesh":
+            vertex, face = shape.vertex_m, shape.face
+        else:
+            made = {
+                "sphere": lambda x=x: trimesh.creation.icosphere(subdivisions=3, radius=x),
+                "box": lambda shape=shape: trimesh.creation.box(extents=shape.size_m),
+                "capsule": lambda x=x, y=y: trimesh.creation.capsule(radius=x, height=y),
+                "cylinder": lambda x=x, y=y: trimesh.creation.cylinder(radius=x, height=y, sections=64),
+                "plane": lambda: trimesh.creation.box(extents=(PLANE_M, PLANE_M, 1e-3)),
+            }[shape.kind]()
+            vertex, face = np.asarray(made.vertices), np.asarray(made.faces)
+            if shape.kind == "capsule":  # which trimesh starts at its lower cap's centre
+                vertex = vertex - [0, 0, vertex[:, 2].mean()]
+        turn = np.array(pybullet.getMatrixFromQuaternion(shape.quaternion_xyzw)).reshape(3, 3)
+        vertices.append(vertex @ turn.T + shape.position_m)
+        faces.append(face + count)
+        count += len(vertex)
+    if not faces:
+        raise MeshError("a link without a shape", "give it one")
+    return np.concatenate(vertices), np.concatenate(faces)
