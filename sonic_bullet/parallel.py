@@ -107,8 +107,8 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
                     begun += 1
                 if alive and asked and ((number in asked and begun - number > AHEAD) or begun == count or ours.poll()):
                     answer = _received(ours)
-                    alive = answer is not None
-                    if answer is not None:
+                    alive = answer is not None and answer[0] is not None
+                    if answer is not None and answer[0] is not None:
                         made[answer[0]] = room[asked.pop(answer[0])].copy()
                 elif number in asked and not alive:
                     made[number] = make(number)

@@ -19,6 +19,10 @@ from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number
 
 
+VIEW_DEG = 40.0
+"""Height of a view, a 35 mm film's through a lens of 33 mm."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Figure:
     """A rigid thing to be drawn: vertex_m (v, 3) in its own frame, face (f, 3), counter-clockwise seen from outside,
@@ -36,7 +40,7 @@ class Camera:
 
     eye_m: Array
     target_m: Array
-    view_deg: float = 40.0
+    view_deg: float = VIEW_DEG
 
     def __post_init__(self) -> None:
         eye, target = (frozen_array(getattr(self, name), float, (3,), f"camera: {name}") for name in self.__slots__[:2])

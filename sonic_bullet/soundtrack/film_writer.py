@@ -66,9 +66,11 @@ def as_fps(text: object) -> Fraction:
         fps = Fraction(str(text))
     except (ValueError, ZeroDivisionError):
         raise FileError(f"fps is {shown(text)}", remedy) from None
-    # what is written as 29.97 is meant so [SMPTE ST 12-1, sec. 4]
-    fps = next((Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120) if fps == round(n / 1.001, 2)), fps)
-    fps = Fraction(24000, 1001) if str(text) == "23.976" else fps
+    # what is written as 29.97 or 23.976 is meant so [SMPTE ST 12-1, sec. 4]
+    for whole in (24, 30, 48, 60, 120):
+        exact = Fraction(whole * 1000, 1001)
+        if fps != exact and any(float(fps) == round(float(exact), digits) for digits in (2, 3)):
+            fps = exact
     if not 1 <= fps <= FPS_MOST or fps.denominator > 100_000:
         raise FileError(f"fps is {shown(text)}", remedy)
     return fps

@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.pictures import Camera, Figure, Standing
+from sonic_bullet.listener.pictures import VIEW_DEG, Camera, Figure, Standing
 from sonic_bullet.records import Array, Body, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
@@ -178,7 +178,7 @@ def chosen_camera(
     side[2] = 0
     length = float(np.linalg.norm(side))
     side = side / length if length > 1e-6 else np.array([0.0, -1.0, 0.0])
-    away = CLOSER * reach / np.sin(np.radians(Camera.__dataclass_fields__["view_deg"].default) / 2)
+    away = CLOSER * reach / np.sin(np.radians(VIEW_DEG) / 2)
     return Camera(target + away * (np.cos(ELEVATION_RAD) * side + np.sin(ELEVATION_RAD) * np.array([0, 0, 1])), target)
 
 

@@ -137,20 +137,7 @@ def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
 
     vertices, faces, count = [], [], 0
     for shape in shapes:
-        x, y, _ = shape.size_m.tolist()
-        if shape.kind == "mesh":
-            vertex, face = shape.vertex_m, shape.face
-        else:
-            made = {
-                "sphere": lambda x=x: trimesh.creation.icosphere(subdivisions=3, radius=x),
-                "box": lambda shape=shape: trimesh.creation.box(extents=shape.size_m),
-                "capsule": lambda x=x, y=y: trimesh.creation.capsule(radius=x, height=y),
-                "cylinder": lambda x=x, y=y: trimesh.creation.cylinder(radius=x, height=y, sections=64),
-                "plane": lambda: trimesh.creation.box(extents=(PLANE_M, PLANE_M, 1e-3)),
-            }[shape.kind]()
-            vertex, face = np.asarray(made.vertices), np.asarray(made.faces)
-            if shape.kind == "capsule":  # which trimesh starts at its lower cap's centre
-                vertex = vertex - [0, 0, vertex[:, 2].mean()]
+        vertex, face = _triangles(shape)
         turn = np.array(pybullet.getMatrixFromQuaternion(shape.quaternion_xyzw)).reshape(3, 3)
         vertices.append(vertex @ turn.T + shape.position_m)
         faces.append(face + count)
@@ -158,3 +145,23 @@ def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
     if not faces:
         raise MeshError("a link without a shape", "give it one")
     return np.concatenate(vertices), np.concatenate(faces)
+
+
+def _triangles(shape: Shape) -> tuple[Array, Array]:
+    """Vertices and faces of a shape in its own frame."""
+    from trimesh import creation
+
+    x, y, _ = shape.size_m.tolist()
+    if shape.kind == "mesh":
+        return shape.vertex_m, shape.face
+    if shape.kind == "sphere":
+        made = creation.icosphere(subdivisions=3, radius=x)
+    elif shape.kind == "cylinder":
+        made = creation.cylinder(radius=x, height=y, sections=64)
+    elif shape.kind == "capsule":
+        made = creation.capsule(radius=x, height=y)
+    else:
+        made = creation.box(extents=shape.size_m if shape.kind == "box" else (PLANE_M, PLANE_M, 1e-3))
+    vertex = np.array(made.vertices, float)
+    # a capsule starts at its lower cap's centre in some releases
+    return vertex - (np.ptp(vertex, axis=0) / 2 + vertex.min(axis=0)), np.asarray(made.faces)
