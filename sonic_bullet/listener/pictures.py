@@ -18,7 +18,6 @@ from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number
 
-
 VIEW_DEG = 40.0
 """Height of a view, a 35 mm film's through a lens of 33 mm."""
 

@@ -7,8 +7,10 @@
 n pictures last n/fps seconds: `samples_of` of them are heard, silence where the sound is shorter. Lossy codecs begin
 with samples that are no sound (aac 1024, opus 312, mp3 1105): the encoder gives them times before 0 and the container
 says that they are left out (an edit list in mp4 and mov, CodecDelay in mkv), so players and decoders begin with ours.
-No picture waits for a later one (no B-frames), so that pictures need no such list. mkv tells times in whole
-milliseconds, each rounded by itself; the number of its pictures and samples is exact.
+Those of aac and mp3 code blocks of 1024 and 1152 samples, and silence fills the last: the container says where the
+sound ends within it; a decoder that does not look gives up to 1.2 kilosamples of silence more. No picture waits for a
+later one (no B-frames), so that pictures need no such list. mkv tells times in whole milliseconds, each rounded by
+itself; the number of its pictures and samples is exact.
 
 Written beside, then named: NAME.EXT is the whole film, or what it was before. Left with an error or Ctrl-C, what is
 finished is a film of its own, NAME.partial.EXT.
@@ -152,7 +154,10 @@ class FilmWriter:
         try:
             self._file = os.fdopen(self.partial.fd, "wb", closefd=False)
             # no random ids, no time of day: equal films, equal bytes
-            self._container = av.open(self._file, "w", format=container, options={"fflags": "+bitexact"})
+            options = {"fflags": "+bitexact"}
+            if container != "matroska":  # whose tracks end at times of this unit, else of milliseconds
+                options["movie_timescale"] = str(self.sr)
+            self._container = av.open(self._file, "w", format=container, options=options)
             self._video = self._container.add_stream("libx264", rate=fps, options=_X264)
             self._video.width, self._video.height = self.size
             self._video.pix_fmt = "yuv420p"
@@ -179,8 +184,8 @@ class FilmWriter:
             if due - self.samples >= SOUND_BLOCK_S * self.sr:
                 self._hear(due)
 
-    def _hear(self, stop: int) -> None:
-        """Sound up to sample ``stop``."""
+    def _hear(self, stop: int, end: int | None = None) -> None:
+        """Sound up to sample ``stop``; end: where it stops for good, once that is known."""
         av = pyav()
         if stop <= self.samples:
             return
@@ -190,8 +195,16 @@ class FilmWriter:
         block[:, : known.shape[1]] = np.clip(known, -1, 1)
         frame = av.AudioFrame.from_ndarray(block, format="fltp", layout=self._audio.layout.name)
         frame.sample_rate, frame.pts, frame.time_base = self.sr, self.samples, Fraction(1, self.sr)
-        self._container.mux(self._audio.encode(frame))
+        self._mux_sound(self._audio.encode(frame), end)
         self.samples = stop
+
+    def _mux_sound(self, packets: Any, end: int | None = None) -> None:
+        """Coded sound into the file. end: the sample where all of it does: what fills the last block is not counted."""
+        for packet in packets:
+            if end is not None and packet.time_base == Fraction(1, self.sr) and packet.pts is not None:
+                left = max(end - packet.pts, 1)
+                packet.duration = min(packet.duration or left, left)
+            self._container.mux(packet)
 
     def _disk(self) -> Any:
         return _Refusal(self.path, self.partial)
@@ -227,9 +240,10 @@ class FilmWriter:
     def _finish(self) -> None:
         """Bring all that encoders hold into the file, and close it. Raises FileError."""
         with self._disk():
-            self._hear(samples_of(self.pictures, self.fps, self.sr))
+            end = samples_of(self.pictures, self.fps, self.sr)
+            self._hear(end, end)
             self._container.mux(self._video.encode(None))
-            self._container.mux(self._audio.encode(None))
+            self._mux_sound(self._audio.encode(None), end)
             self._container.close()
             self._file.flush()
 

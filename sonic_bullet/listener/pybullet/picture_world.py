@@ -133,7 +133,6 @@ def standing(client_id: int) -> tuple[Standing, ...]:
 
 def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
     """(v, 3) vertices and (f, 3) faces of all shapes, body frame. Raises MeshError where there are none."""
-    import trimesh
 
     vertices, faces, count = [], [], 0
     for shape in shapes:
