@@ -64,11 +64,11 @@ def with_contacts(
         at = pixel(np.array(touch.place_m) if touch is not None else event.place_m, camera, size)
         if at is not None and abs(at[0]) < 1e5 and abs(at[1]) < 1e5:
             _mark(draw, event, at, unit, time_s)
-    told = _told(events)
-    lines = [f"{time_s:7.3f} s", *(_words(event, log) for event in told)]
-    if len(events) > len(told):
-        lines.append(f"and {len(events) - len(told)} more")
-    colours = [(30, 30, 30), *(COLOURS[event.kind] for event in told), (30, 30, 30)]
+    worded = _worded(events)
+    lines = [f"{time_s:7.3f} s", *(_words(event, log) for event in worded)]
+    if len(events) > len(worded):
+        lines.append(f"and {len(events) - len(worded)} more")
+    colours = [(30, 30, 30), *(COLOURS[event.kind] for event in worded), (30, 30, 30)]
     for row, (words, colour) in enumerate(zip(lines, colours, strict=False)):
         draw.text((10 * unit, (8 + 17 * row) * unit), words, fill=colour, font_size=14 * unit)
     return np.asarray(image)
@@ -84,7 +84,7 @@ def under_way(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
     ]
 
 
-def _told(events: Sequence[SoundEvent]) -> list[SoundEvent]:
+def _worded(events: Sequence[SoundEvent]) -> list[SoundEvent]:
     """Those that a picture has words for: what lasts, the latest impacts, and then what is silent."""
     sounds = sorted((x for x in events if not x.reason), key=lambda x: (x.kind == IMPACT, -x.start_s))
     silent = sorted((x for x in events if x.reason), key=lambda x: (x.kind == SUPPORT, -x.start_s))

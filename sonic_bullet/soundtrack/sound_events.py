@@ -280,4 +280,5 @@ def name_pair(event: SoundEvent, log: ContactLog) -> str:
 
 
 def _size(event: SoundEvent) -> str:
-    return f"{event.impulse_n_s * 1e3:.3g} mN·s" if event.kind == IMPACT else f"{event.speed_m_s:.3g} m/s"
+    """In letters that every reader of RIFF knows."""
+    return f"{event.impulse_n_s * 1e3:.3g} mN s" if event.kind == IMPACT else f"{event.speed_m_s:.3g} m/s"

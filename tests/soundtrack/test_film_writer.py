@@ -26,7 +26,7 @@ from tests.made.films import SIDE, SR, click_film, click_pictures, click_sound, 
 RATES = (24, 25, Fraction(30000, 1001), 30, 60, 240)
 FORMATS = (("mp4", "aac"), ("mov", "pcm"), ("mkv", "flac"), ("mkv", "opus"), ("mp4", "mp3"))
 FILL = {"aac": 1024, "mp3": 2 * 1152}
-"""Samples with which decoders may go on, silent: both code whole blocks, and mp3 needs one more to end its own delay."""
+"""Silent samples with which decoders may go on: both code whole blocks, and mp3 one more to end its own delay."""
 
 
 @pytest.mark.parametrize(("ending", "codec"), FORMATS)
@@ -135,7 +135,7 @@ def test_a_full_disk_is_one_line_and_leaves_the_old_film(tmp_path: Path) -> None
     rng = np.random.default_rng(0)
     noise = KeptSound.of(rng.uniform(-1, 1, (1, 2 * SR)))
     pictures = (rng.integers(0, 255, (64, 64, 3), dtype=np.uint8) for _ in range(60))
-    with full_disk(100_000), pytest.raises(FileError, match="cannot write .*x.mov"):
+    with full_disk(100_000), pytest.raises(FileError, match=r"cannot write .*x\.mov"):
         write_film(path, pictures, noise, SR, fps=Fraction(30), size=(64, 64))
     assert path.read_bytes() == b"old"
     assert [one.name for one in tmp_path.iterdir()] == ["x.mov"]

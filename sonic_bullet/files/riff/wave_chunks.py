@@ -40,12 +40,12 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
     """Chunks `bext`, `cue ` and `LIST adtl` for a file. time_reference: its first sample, counted from the start of the
     timeline it is cut from. Cues beyond `LAST_SAMPLE` are left out.
     """
-    told = [cue for cue in cues if cue.sample <= LAST_SAMPLE]
+    kept = [cue for cue in cues if cue.sample <= LAST_SAMPLE]
     points = [
-        struct.pack("<II4sIII", number, cue.sample, b"data", 0, 0, cue.sample) for number, cue in enumerate(told, 1)
+        struct.pack("<II4sIII", number, cue.sample, b"data", 0, 0, cue.sample) for number, cue in enumerate(kept, 1)
     ]
     notes = []
-    for number, cue in enumerate(told, 1):
+    for number, cue in enumerate(kept, 1):
         notes.append(_chunk(b"labl", struct.pack("<I", number) + _text(cue.label) + b"\0"))
         if cue.samples:
             length = min(cue.samples, LAST_SAMPLE)
@@ -53,7 +53,7 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
     places = _chunk(b"cue ", struct.pack("<I", len(points)) + b"".join(points)) + _chunk(
         b"LIST", b"adtl" + b"".join(notes)
     )
-    return _bext(description, time_reference) + (places if told else b"")
+    return _bext(description, time_reference) + (places if kept else b"")
 
 
 def _bext(description: str, time_reference: int) -> bytes:
