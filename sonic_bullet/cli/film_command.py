@@ -8,17 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.cli.output import clean_stdout, places, progress_bar, write_json
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option
-from sonic_bullet.cli.scene_commands import (
-    DEFAULT_SR,
-    Wish,
-    check_request,
-    is_log,
-    replayed,
-    simulated,
-    with_partial,
-)
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -62,7 +53,7 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @click.option("--shadows", is_flag=True, help="Draw shadows; takes twice as long.")
 @click.option("--audio", "codec", type=click.Choice(["aac", "pcm", "flac", "opus", "mp3"]),
               help="Codec of the sound. [default: mp4 aac, mov pcm, mkv flac]")  # fmt: skip
-@click.option("--sr", type=float, metavar="HZ", help=f"Sample rate. [default: {DEFAULT_SR}; a log's own]")
+@click.option("--sr", type=float, metavar="HZ", help="Sample rate. [default: 48000; a log's own]")
 @click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
 @click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
 @click.option(
@@ -77,6 +68,15 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @json_option
 def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
+    from sonic_bullet.cli.scene_commands import (
+        DEFAULT_SR,
+        Wish,
+        check_request,
+        is_log,
+        replayed,
+        simulated,
+        with_partial,
+    )
     from sonic_bullet.files import check_sr
     from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
     from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size
@@ -118,6 +118,8 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
             raise FileError("there is no microphone, so the film has no sound", "give one, --microphone 0,-1,0.5")
         pictures_in(result.log, look.fps, options["seconds"])
         events = None
+        with quiet_stderr():
+            import sonic_bullet.listener.pybullet.picture_world  # noqa: F401  which says when PyBullet was built
         with progress_bar("film") as (progress, tell):
             if options["overlay"]:
                 from sonic_bullet.soundtrack.sound_events import EventWitness

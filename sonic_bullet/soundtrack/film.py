@@ -23,7 +23,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.soundtrack.film_writer import FilmWriter, check_film_output, check_size, samples_of
-from sonic_bullet.soundtrack.overlay import under_way, with_contacts
+from sonic_bullet.soundtrack.overlay import shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import SoundEvent, touching_pairs
 from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of, staged
 
@@ -114,7 +114,7 @@ def make_film(
         if events is None or touching is None:
             return made
         time_s = float(k / look.fps)
-        return with_contacts(made, under_way(events, time_s), touching[k], log, time_s, camera)
+        return with_contacts(made, shown_at(events, time_s), touching[k], log, time_s, camera)
 
     width, height = look.size
     try:

@@ -74,7 +74,7 @@ def with_contacts(
     return np.asarray(image)
 
 
-def under_way(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
+def shown_at(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
     """Those to be seen at a time: lasting ones while they last, the others for `SHOWN_S`."""
     return [
         one

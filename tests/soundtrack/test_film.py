@@ -19,7 +19,7 @@ from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError, RecordError, SceneError
 from sonic_bullet.render import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
-from sonic_bullet.soundtrack.overlay import COLOURS, pixel, under_way, with_contacts
+from sonic_bullet.soundtrack.overlay import COLOURS, pixel, shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import IMPACT, EventWitness
 from sonic_bullet.soundtrack.staging import chosen_camera, duration_of, staged
 from sonic_bullet.soundtrack.stems import render_stems
@@ -170,11 +170,11 @@ def test_contacts_are_drawn_where_they_are() -> None:
     witness = EventWitness(log)
     events = witness.events(render_stems(log, witness=witness), log.sr)
     hit = max((one for one in events if one.kind == IMPACT), key=lambda one: one.impulse_n_s)
-    camera, size = Camera(hit.place_m + [0.0, -1.0, 0.5], hit.place_m), (200, 120)
+    camera, size = Camera(hit.place_m + np.array([0.0, -1.0, 0.5]), hit.place_m), (200, 120)
     time_s = hit.start_s + 0.02
-    now = under_way([hit], time_s)
+    now = shown_at([hit], time_s)
     assert now == [hit]
-    assert under_way([hit], hit.start_s - 0.01) == under_way([hit], hit.end_s + 1) == []
+    assert shown_at([hit], hit.start_s - 0.01) == shown_at([hit], hit.end_s + 1) == []
     blank = np.full((120, 200, 3), 255, np.uint8)
     drawn = with_contacts(blank, now, {}, log, time_s, camera)
     ring = (np.abs(drawn.astype(int) - COLOURS[IMPACT]).max(axis=2) < 30) & (np.arange(120)[:, None] > 40)
