@@ -47,6 +47,23 @@ class Camera:
         view = as_number(self.view_deg, "camera: view_deg", "give degrees, 40 say", least=1, most=170)
         store(self, eye_m=eye, target_m=target, view_deg=view)
 
+    def seen(self, place_m: Array) -> Array:
+        """(k, 3) points of the world as the camera has them: to its right, up, and ahead, in m."""
+        ahead = (self.target_m - self.eye_m) / np.linalg.norm(self.target_m - self.eye_m)
+        right = np.cross(ahead, self.up)
+        right = right / np.linalg.norm(right)
+        return np.asarray((place_m - self.eye_m) @ np.array([right, np.cross(right, ahead), ahead]).T)
+
+    @property
+    def up(self) -> Array:
+        """What is up in its pictures: z, or y where it looks along z."""
+        ahead = self.target_m - self.eye_m
+        return np.array([0.0, 1.0, 0.0] if np.linalg.norm(ahead[:2]) < 1e-6 * abs(ahead[2]) else [0.0, 0.0, 1.0])
+
+    def focal(self, height: int) -> float:
+        """Pixels that a thing as large as its distance covers, in pictures so high."""
+        return float(height / 2 / np.tan(np.radians(self.view_deg) / 2))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standing:

@@ -32,15 +32,10 @@ QUIETEST_DB, PIXELS_A_DB = 40.0, 0.5
 
 def pixel(place_m: Array, camera: Camera, size: tuple[int, int]) -> tuple[float, float] | None:
     """Where a point of the world is in a picture, x from the left and y from the top; None behind the camera."""
-    ahead = camera.target_m - camera.eye_m
-    ahead = ahead / np.linalg.norm(ahead)
-    up = np.array([0.0, 1.0, 0.0]) if abs(ahead[2]) > 1 - 1e-9 else np.array([0.0, 0.0, 1.0])
-    right = np.cross(ahead, up)
-    right = right / np.linalg.norm(right)
-    x, y, z = np.array([right, np.cross(right, ahead), ahead]) @ (place_m - camera.eye_m)
+    x, y, z = camera.seen(place_m)
     if z <= 0:
         return None
-    focal = size[1] / 2 / np.tan(np.radians(camera.view_deg) / 2)
+    focal = camera.focal(size[1])
     return float(size[0] / 2 + focal * x / z), float(size[1] / 2 - focal * y / z)
 
 

@@ -20,7 +20,9 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, SceneError
 
 FACES_MOST = 40_000
-"""Of a figure: PyBullet takes 131 072 vertices a shape, and here each face has its own three."""
+"""Of a shape: PyBullet takes 131 072 vertices, and here each face has its own three."""
+TILE = 32
+"""Pixels in which the part that is drawn grows: the renderer makes its memory anew for every other size."""
 LIGHT = (0.4, -0.6, 1.2)
 FAR_AWAY = (0.0, 0.0, -1e5)
 SMOOTH = 0.001
@@ -30,59 +32,86 @@ PLANE_M = 100.0
 
 
 class PyBulletPictures:
-    """`Pictures` by TinyRenderer, whose time goes by the pixels that figures cover: those that stand still before a
-    camera that does are drawn once, and what moves is set before or behind them by its depth.
+    """`Pictures` by TinyRenderer, whose time goes by pixels: figures that stand still before a camera that does are
+    drawn once, and of what moves the part of the picture alone that it is in, set before or behind them by its depth.
     """
 
     def __init__(self, figures: Sequence[Figure], size: tuple[int, int], shadows: bool, still: Array) -> None:
         self._client, self._size, self._shadow = direct_client(), size, int(shadows)
         self._bodies = [self._made(figure) for figure in figures]
+        self._radius_m = np.array([np.linalg.norm(figure.vertex_m, axis=1).max(initial=0) for figure in figures])
         # a shadow falls on who stands still, too
         self._still = still if not shadows else np.zeros(len(still), bool)
         self._backdrop: tuple[Array, Array] | None = None
 
-    def _made(self, figure: Figure) -> int:
+    def _made(self, figure: Figure) -> list[int]:
+        """A body for every `FACES_MOST` triangles."""
         vertex, face = simplified(figure.vertex_m, figure.face)
-        corner, normal = vertex[face].reshape(-1, 3), corner_normals(vertex, face).reshape(-1, 3)
-        shape = self._client.createVisualShape(
-            pybullet.GEOM_MESH,
-            vertices=corner.tolist(),
-            indices=list(range(len(corner))),
-            normals=normal.tolist(),
-            rgbaColor=[*figure.colour, 1],
-        )
-        if shape < 0:
-            raise SceneError("PyBullet does not draw a figure", "give it a simpler mesh")
-        return int(self._client.createMultiBody(0, -1, shape))
+        normals, bodies = corner_normals(vertex, face), []
+        for at in range(0, len(face), FACES_MOST):
+            corner, normal = vertex[face[at : at + FACES_MOST]], normals[at : at + FACES_MOST]
+            shape = self._client.createVisualShape(
+                pybullet.GEOM_MESH,
+                vertices=corner.reshape(-1, 3).tolist(),
+                indices=list(range(3 * len(corner))),
+                normals=normal.reshape(-1, 3).tolist(),
+                rgbaColor=[*figure.colour, 1],
+            )
+            if shape < 0:
+                raise SceneError("PyBullet does not draw a figure", "give it a simpler mesh")
+            bodies.append(int(self._client.createMultiBody(0, -1, shape)))
+        return bodies
 
     def picture(self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera) -> Array:
         """(height, width, 3) uint8 of all figures at poses (k, 3), (k, 4); who is not shown (k,) is left out."""
-        poses = position_m, quaternion_xyzw
+        poses, whole = (position_m, quaternion_xyzw), (0, 0, *self._size)
         if not self._still.any():
-            return self._taken(*poses, shown, camera)[0]
+            return self._taken(*poses, shown, camera, whole)[0]
         if self._backdrop is None:
-            self._backdrop = self._taken(*poses, shown & self._still, camera)
-        colours, depth = self._taken(*poses, shown & ~self._still, camera)
-        made, nearer = self._backdrop[0].copy(), depth < self._backdrop[1]
-        made[nearer] = colours[nearer]
+            self._backdrop = self._taken(*poses, shown & self._still, camera, whole)
+        made, moves = self._backdrop[0].copy(), shown & ~self._still
+        x0, y0, x1, y1 = part = self._part(position_m[moves], self._radius_m[moves], camera)
+        if x0 < x1 and y0 < y1:
+            colours, depth = self._taken(*poses, moves, camera, part)
+            nearer = depth < self._backdrop[1][y0:y1, x0:x1]
+            made[y0:y1, x0:x1][nearer] = colours[nearer]
         return made
 
-    def _taken(self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera) -> tuple[Array, Array]:
-        """Colours (height, width, 3) uint8 and depths (height, width)."""
+    def _part(self, position_m: Array, radius_m: Array, camera: Camera) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom of the part of the picture that spheres are in, in whole tiles."""
         width, height = self._size
-        for body, place, turn, there in zip(
+        x, y, z = camera.seen(position_m).T
+        if (z <= 2 * radius_m).any():
+            return 0, 0, width, height
+        focal = camera.focal(height)
+        # a sphere's outline reaches beyond r·f/z: by less than z/√(z²-r²) < 1.16 in angle, and off the middle once more
+        wide = 1.5 * focal * radius_m / z * (1 + (x**2 + y**2) / z**2)
+        across, down = width / 2 + focal * x / z, height / 2 - focal * y / z
+        low = [(edge // TILE) * TILE for edge in ((across - wide).min(initial=1e9), (down - wide).min(initial=1e9))]
+        high = [-(-edge // TILE) * TILE for edge in ((across + wide).max(initial=-1), (down + wide).max(initial=-1))]
+        return (
+            int(max(low[0], 0)), int(max(low[1], 0)), int(min(high[0], width)), int(min(high[1], height))
+        )  # fmt: skip
+
+    def _taken(
+        self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera, part: tuple[int, int, int, int]
+    ) -> tuple[Array, Array]:
+        """Colours (height, width, 3) uint8 and depths (height, width) of a part of the picture."""
+        (width, height), (x0, y0, x1, y1) = self._size, part
+        for bodies, place, turn, there in zip(
             self._bodies, position_m.tolist(), quaternion_xyzw.tolist(), shown.tolist(), strict=True
         ):
-            self._client.resetBasePositionAndOrientation(body, place if there else FAR_AWAY, turn)
+            for body in bodies:
+                self._client.resetBasePositionAndOrientation(body, place if there else FAR_AWAY, turn)
         away = float(np.linalg.norm(camera.target_m - camera.eye_m))
-        up = (0, 1, 0) if np.linalg.norm((camera.target_m - camera.eye_m)[:2]) < 1e-6 * away else (0, 0, 1)
-        view = self._client.computeViewMatrix(camera.eye_m.tolist(), camera.target_m.tolist(), up)
-        projection = self._client.computeProjectionMatrixFOV(
-            camera.view_deg, width / height, 0.02 * away, max(100.0 * away, 100.0)
-        )
+        view = self._client.computeViewMatrix(camera.eye_m.tolist(), camera.target_m.tolist(), camera.up.tolist())
+        near = 0.02 * away
+        right, top = near * width / 2 / camera.focal(height), near * height / 2 / camera.focal(height)
+        edges = [right * (2 * x / width - 1) for x in (x0, x1)] + [top * (1 - 2 * y / height) for y in (y1, y0)]
+        projection = self._client.computeProjectionMatrix(*edges, near, max(100.0 * away, 100.0))
         found = self._client.getCameraImage(
-            width,
-            height,
+            x1 - x0,
+            y1 - y0,
             view,
             projection,
             lightDirection=LIGHT,
@@ -91,7 +120,7 @@ class PyBulletPictures:
             flags=pybullet.ER_NO_SEGMENTATION_MASK,
         )
         colours, depth = np.asarray(found[2], np.uint8), np.asarray(found[3], np.float32)
-        return np.ascontiguousarray(colours.reshape(height, width, 4)[:, :, :3]), depth.reshape(height, width)
+        return np.ascontiguousarray(colours.reshape(y1 - y0, x1 - x0, 4)[:, :, :3]), depth.reshape(y1 - y0, x1 - x0)
 
     def close(self) -> None:
         """End the client."""
@@ -99,7 +128,7 @@ class PyBulletPictures:
 
 
 def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
-    """The surface with fewer triangles, where it is closed; never more than `FACES_MOST`."""
+    """The surface with fewer triangles, where it is closed."""
     import manifold3d
 
     size = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
@@ -108,7 +137,7 @@ def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
         mesh = made.simplify(SMOOTH * size).to_mesh()
         if len(mesh.tri_verts):
             vertex_m, face = np.asarray(mesh.vert_properties, float)[:, :3], np.asarray(mesh.tri_verts, np.int64)
-    return vertex_m, face[:FACES_MOST]
+    return vertex_m, face
 
 
 def standing(client_id: int) -> tuple[Standing, ...]:
