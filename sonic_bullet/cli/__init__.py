@@ -2,6 +2,7 @@
 
     render SCENE.py | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
     play SCENE.py | LOG.npz   -> the same, on a sound card
+    film SCENE.py | LOG.npz   -> the same, with pictures: .mp4 .mov .mkv
     modes MESH                -> ModalModel   -> table, JSON, npz
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
@@ -31,8 +32,10 @@ from sonic_bullet.cli.examples import (
     RENDER_EPILOG,
     RESIDUAL_EPILOG,
 )
+from sonic_bullet.cli.film_command import film
 from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
 from sonic_bullet.cli.play_command import play
+from sonic_bullet.cli.soundtrack_outputs import soundtrack_options
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
@@ -93,6 +96,7 @@ cli.add_command(cache)
     default=None,
     help="What presets sound beside their modes. [default: sounded; of a log, as it was rendered]",
 )
+@soundtrack_options
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scene_commands import run_render
@@ -101,6 +105,7 @@ def render(**options: Any) -> None:
 
 
 cli.add_command(play)
+cli.add_command(film)
 
 
 @cli.command(epilog=MODES_EPILOG)

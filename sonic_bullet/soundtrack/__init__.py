@@ -2,5 +2,6 @@
 
 ContactLog -> stems, events (tally.py) -> files a body, tables, cue points
            -> poses at each frame -> pictures (listener), contacts drawn in -> film (film_writer.py)
-Animation -> score/ -> ContactLog
+
+Animation -> score/ -> contacts -> ContactLog, which goes the way of any other
 """
