@@ -18,9 +18,9 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.records import Material, Microphone
-from sonic_bullet.render import synthesizer
 from sonic_bullet.render.presence import admit
 from sonic_bullet.render.synthesis_state import Setup, start
+from sonic_bullet.render.synthesizer import advance
 from sonic_bullet.soundtrack.score.animation import Animation
 
 SR = 8000
@@ -90,22 +90,18 @@ def pulses(log: ContactLog) -> list[Impact]:
     setup = Setup(SR, (Microphone(np.zeros(3)),), 0, log.air)
     state, found = start(setup), []
 
-    def seen(_: Any, state: Any, step: Any, count: int, drives: int) -> None:
+    def seen(state: Any, number: int, step: Any, count: int, drives: int) -> None:
         for pulse in state.scratch.pulse[:count]:
             low, high = (int(state.body[i]) for i in pulse["body"])
             begin = float(step["after_s"] if pulse["ahead"] else step["begin_s"])
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
             found.append(Impact(low, high, begin + float(pulse["start_s"]), impulse))
 
-    kept, synthesizer._add_residuals = synthesizer._add_residuals, seen
-    try:
-        for step in log.steps:
-            if step.body is not state.present:
-                admit(setup, state, step, log.bodies)
-            state.has_residual = True
-            synthesizer.advance(setup, state, [step])
-    finally:
-        synthesizer._add_residuals = kept
+    state.witness = seen
+    for step in log.steps:
+        if step.body is not state.present:
+            admit(setup, state, step, log.bodies)
+        advance(setup, state, [step])
     return found
 
 

@@ -97,7 +97,7 @@ def run_render(
 
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
         notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
-        say("\n".join([_summary(report, result.log), *(made.words if made is not None else ())]))
+        say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     write_json(json_to, described_render(result.log, report, notes) | (made.described if made else {}))
@@ -318,7 +318,8 @@ def _warnings(report: AudioReport) -> tuple[str, ...]:
     return ()
 
 
-def _summary(report: AudioReport, log: ContactLog) -> str:
+def summary(report: AudioReport, log: ContactLog) -> str:
+    """What was written, in one line."""
     from sonic_bullet.plots.scene_plot import quantity
 
     channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"

@@ -52,6 +52,12 @@ class AnimatedStage:
         self.reach_m = np.linalg.norm(np.abs(self.middle_m) + self.half_m, axis=1)
         self._holds = False
 
+    def __enter__(self) -> AnimatedStage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def close(self) -> None:
         """End the client; twice is once."""
         disconnect(self.client)
