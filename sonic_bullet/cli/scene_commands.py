@@ -96,7 +96,7 @@ def run_render(
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
+        notes = (*result.notes, *_by_hand(scene, result.log), *_coarse(result.log), *_oversized(result.log), *_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
@@ -281,6 +281,15 @@ def with_partial(
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
+
+
+def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of
+
+    moves = () if is_log(scene) else moves_of(log)
+    driven = any(one.drives for one in moves)
+    remedy = (f"contacts of what is driven are not simulated: sonic-bullet score {scene} lets it sound",)
+    return (*move_notes(log, moves), *(remedy if driven else ()))
 
 
 def _coarse(log: ContactLog) -> tuple[str, ...]:

@@ -24,10 +24,10 @@ materials and an export script for Blender."""
 
 
 @click.command(epilog=EPILOG)
-@click.argument("animation", metavar="ANIMATION")
+@click.argument("animation", metavar="ANIMATION|SCENE.py")
 @click.option("-o", "--output", required=True, metavar="NAME.wav", help="Sound file, as render has them.")
 @click.option("--materials", "table", metavar="TABLE.json", help="Who is made of what, by name patterns.")
-@click.option("--material", default="plastic", show_default=True, metavar="M", help="Of what moves and has none.")
+@click.option("--material", metavar="M", help="Of what moves and has none. [default: plastic]")
 @click.option("--fps", type=float, metavar="F", help="Frames a second, in place of the file's own.")
 @click.option("--scale", type=float, default=1.0, metavar="X", help="Of all lengths: 0.01 for centimetres.")
 @click.option("--sr", type=float, default=48_000, metavar="HZ", help="Sample rate. [default: 48000]")
@@ -44,7 +44,7 @@ materials and an export script for Blender."""
 @click.option("--seed", type=click.IntRange(0), default=0, help="Seed of the surfaces' roughness. [default: 0]")
 @json_option
 def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
-    """Give a baked animation (.glb .gltf .json .npz) its sound."""
+    """Give a baked animation (.glb .gltf .json .npz) its sound, or a scene that of bodies that it moves by hand."""
     from sonic_bullet.cli.output import described_render
     from sonic_bullet.cli.scene_commands import summary, with_partial
     from sonic_bullet.files import check_audio_output, check_levels, check_sr, write_audio, write_log
@@ -57,22 +57,18 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
     to, contacts_to, json_to = places(output, contacts, json_to)
     with clean_stdout(json_to) as say:
         with quiet_stderr():
-            from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation
+            from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
         rules = rules_of(options["table"])
         try:
             with progress_bar(Path(animation).name) as (progress, tell):
-                result = score_animation(
-                    animation,
-                    rules=rules,
-                    material=options["material"],
-                    fps=options["fps"],
-                    scale=options["scale"],
-                    sr=sr,
-                    seed=options["seed"],
-                    microphones=options["microphones"] or MICROPHONE,
-                    progress=progress,
-                    say=tell,
-                )
+                how: dict[str, Any] = {"sr": sr, "seed": options["seed"], "progress": progress, "say": tell}
+                if Path(animation).suffix.lower() == ".py":
+                    places_m = options["microphones"] or None
+                    result = score_scene(animation, microphones=places_m, material=options["material"], **how)
+                else:
+                    how |= {name: options[name] for name in ("fps", "scale")}
+                    how |= {"rules": rules, "material": options["material"] or "plastic"}
+                    result = score_animation(animation, microphones=options["microphones"] or MICROPHONE, **how)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, str(to), output, *levels.values()) from error
         if contacts_to is not None:

@@ -103,3 +103,14 @@ class Stage(Protocol):
 def free(bodies: Sequence[AnimatedBody]) -> Array:
     """(b,) who is moved by gravity and contacts alone."""
     return np.array([body.mass_kg > 0 and not body.driven for body in bodies], bool)
+
+
+def rotation(first: Array, second: Array) -> Array:
+    """Rotation vectors (…, 3) in rad, world frame, from the first orientations (…, 4) to the second: the logarithm of
+    q₂ q₁* [Sola 2017, Quaternion kinematics, eq. 105].
+    """
+    v, w, x, y = first[..., :3], first[..., 3:], second[..., :3], second[..., 3:]
+    axis, real = w * x - y * v - np.cross(x, v), w * y + (v * x).sum(axis=-1, keepdims=True)
+    length = np.linalg.norm(axis, axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(length, np.abs(real))
+    return np.asarray(np.where(real < 0, -1.0, 1.0) * axis * angle / np.maximum(length, 1e-300))

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.animated import AnimatedBody, Shot
+from sonic_bullet.listener.animated import AnimatedBody, Shot, rotation
 from sonic_bullet.listener.frames import MOTION, Motion, turned
-from sonic_bullet.listener.kinematics import rotation_between
 from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
@@ -269,14 +268,6 @@ def turned_back(vector: Array, rotation_rad: Array) -> Array:
     return np.asarray(
         vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1 - np.cos(angle))
     )
-
-
-def rotation(first: Array, second: Array) -> Array:
-    """Rotation vectors (…, 3), world frame, from the first orientations (…, 4) to the second."""
-    out = np.empty((*first.shape[:-1], 3))
-    for i in np.ndindex(first.shape[:-1]):
-        rotation_between(first[i], second[i], out[i])
-    return out
 
 
 def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.listener.animated import AnimatedBody
-from sonic_bullet.listener.frames import MOTION, turned
-from sonic_bullet.listener.kinematics import rotation_between
+from sonic_bullet.listener.animated import AnimatedBody, rotation
+from sonic_bullet.listener.frames import MOTION
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_kinds, as_number, shown
@@ -88,14 +87,6 @@ class Animation:
         motion["velocity_m_s"][0][self.free] -= self.gravity_m_s2 / self.fps
         motion["spin_rad_s"][0] = motion["spin_rad_s"][1]
         return motion
-
-
-def rotation(first: Array, second: Array) -> Array:
-    """Rotation vectors (…, 3) in rad, world frame, from the first orientations (…, 4) to the second."""
-    out = np.empty((*first.shape[:-1], 3))
-    for at in np.ndindex(first.shape[:-1]):
-        rotation_between(first[at], second[at], out[at])
-    return out
 
 
 def matrices(quaternion: Array) -> Array:

@@ -15,14 +15,15 @@ min |W(A f - r)|², f >= 0, W the inverse square root of mass and inertia: the r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
 from sonic_bullet.listener.animated import Stage
+from sonic_bullet.listener.frames import turned
 from sonic_bullet.listener.polling import NO_RAW
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.score.animation import Animation, matrices, rotation
+from sonic_bullet.soundtrack.score.animation import Animation, matrices
 
 TOUCH_M = 1.5e-3
 """How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""
@@ -53,20 +54,25 @@ def momentum_changes(animation: Animation, motion: Array) -> Array:
 
 
 def _halfway(turn: Array, whole_rad: Array) -> Array:
-    from sonic_bullet.listener.frames import turned
-
     shape = turn.shape
     return turned(turn.reshape(-1, 4), whole_rad.reshape(-1, 3) / 2).reshape(shape)
 
 
 def fitted_steps(
-    animation: Animation, stage: Stage, reach_m: Array, progress: Callable[[float], None] | None = None
+    animation: Animation,
+    stage: Stage,
+    reach_m: Array,
+    progress: Callable[[float], None] | None = None,
+    *,
+    known: Array | float = 0.0,
+    only: Set[int] | None = None,
 ) -> list[tuple[Array, Array]]:
     """MOTION (b,) and loaded RAW rows of each frame but the last. reach_m (b,): largest distance of a body's points from
-    its centre of mass.
+    its centre of mass. known (t, b, 6): momentum from contacts that are known already; only: of pairs with one of these
+    bodies, None: of all.
     """
     motion, step_s = animation.poses(), 1 / animation.fps
-    change = momentum_changes(animation, motion)
+    change = momentum_changes(animation, motion) - known
     static = ~animation.moving
     steps: list[tuple[Array, Array]] = []
     for k in range(len(animation) - 1):
@@ -75,6 +81,8 @@ def fitted_steps(
             after = motion[k + 1]
             speed = np.maximum(_speeds(motion[k], reach_m), _speeds(after, reach_m))
             pairs = near_pairs(motion[k], reach_m, speed * step_s + TOUCH_M, static, stage)
+            if only is not None:
+                pairs = [pair for pair in pairs if pair[0] in only or pair[1] in only]
             far = float(speed.max(initial=0.0)) * 2 * step_s + TOUCH_M
             raw = stage.closest(motion[k], pairs, far) if pairs else NO_RAW
             raw = raw[_can_touch(raw, motion[k], after, step_s, stage)]

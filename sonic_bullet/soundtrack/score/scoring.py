@@ -9,18 +9,20 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 
 import numpy as np
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.listener.animated import AnimatedBody
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path
-from sonic_bullet.records.errors import AnimationError, FileError, SceneWarning, SonicBulletError, interrupts
+from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.render import silence_notes
-from sonic_bullet.scene import RenderResult
+from sonic_bullet.scene import RenderResult, render_scene
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
 from sonic_bullet.soundtrack.score.animation import Animation
@@ -107,6 +109,40 @@ def score_animation(
                 error.partial = _result(listener, notes)  # type: ignore[union-attr]
                 raise
         return _result(listener, notes)
+
+
+def score_scene(
+    path: str | os.PathLike[str], *, progress: Callable[[float], None] | None = None, **options: Any
+) -> RenderResult:
+    """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
+
+    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored.
+    """
+    from sonic_bullet.render import render_kept
+    from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
+
+    shapes: dict[tuple[int, int], tuple[Shape, ...]] = {}
+
+    def look(listener: Listener) -> None:
+        for body in listener.world.living:
+            with suppress(MeshError):
+                shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
+
+    half = (lambda share: progress(0.5 * share)) if progress is not None else None
+    rest = (lambda share: progress(0.5 + 0.5 * share)) if progress is not None else None
+    result = render_scene(path, progress=half, at_end=look, **options)
+    moves = moves_of(result.log)
+    if not any(one.drives for one in moves):
+        raise AnimationError(f"{path} drives no body by hand", "render it: contacts are simulated")
+    known = {
+        i: shapes[body.body_id, body.link]
+        for i, body in enumerate(result.log.bodies)
+        if (body.body_id, body.link) in shapes
+    }
+    log = scored_by_hand(result.log, known, moves)
+    sound = render_kept(log, progress=rest)
+    notes = tuple(note for note in result.notes if note not in silence_notes(result.sound, result.log))
+    return RenderResult(sound, log, result.sr, (*notes, *move_notes(log, moves), *silence_notes(sound, log)))
 
 
 def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:

@@ -18,10 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.listener.animated import Shot, Stage
-from sonic_bullet.listener.frames import turned
+from sonic_bullet.listener.animated import Shot, Stage, rotation
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.score.animation import Animation, rotation
+from sonic_bullet.soundtrack.score.animation import Animation
 
 POSE_M, SPEED_M_S = 1e-4, 3e-2
 """σ_x, σ_v: a pose is believed to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
