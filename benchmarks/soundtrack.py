@@ -39,9 +39,7 @@ EARLY = 7
 
 
 def clicks(minutes: float, formats: list[str]) -> None:
-    print(
-        "| format | fps | early, samples off | late, samples off | pictures off | samples after the last picture |"
-    )
+    print("| format | fps | early, samples off | late, samples off | pictures off | samples after the last picture |")
     for form in formats:
         for fps in RATES:
             late = int(minutes * 60 * fps) + EARLY

@@ -1,6 +1,6 @@
 """What a world does: its log and its poses; and which impacts the run time accepts of a log.
 
-    Scene -> ContactLog, Animation;   ContactLog -> pulses -> Impact ..., those of a pair within two frames as one
+Scene -> ContactLog, Animation;   ContactLog -> pulses -> Impact ..., those of a pair within two frames as one
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ def run_render(
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_by_hand(scene, result.log), *_coarse(result.log), *_oversized(result.log), *_warnings(report))
+        notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
@@ -290,17 +290,6 @@ def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
     driven = any(one.drives for one in moves)
     remedy = (f"contacts of what is driven are not simulated: sonic-bullet score {scene} lets it sound",)
     return (*move_notes(log, moves), *(remedy if driven else ()))
-
-
-def _coarse(log: ContactLog) -> tuple[str, ...]:
-    from sonic_bullet.modal import COARSER
-
-    names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
-    return (
-        (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",)
-        if names
-        else ()
-    )
 
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:

@@ -128,9 +128,7 @@ class AnimatedStage:
         return np.concatenate(found) if found else NO_RAW
 
     def _nearest(self, a: int, b: int, reach_m: float) -> list[tuple[Any, ...]]:
-        return list(
-            pybullet.getClosestPoints(self.ids[a], self.ids[b], reach_m, physicsClientId=self.client_id)
-        )
+        return list(pybullet.getClosestPoints(self.ids[a], self.ids[b], reach_m, physicsClientId=self.client_id))
 
     def _pair(self, motion: Array, a: int, b: int, reach_m: float) -> list[Array]:
         points = self._nearest(a, b, reach_m)

@@ -40,7 +40,9 @@ class Animation:
         fps = as_number(self.fps, "fps", remedy, least=SLOWEST_FPS, most=FASTEST_FPS, error=AnimationError)
         bodies = as_kinds(self.bodies, AnimatedBody, "bodies", "give AnimatedBody", error=AnimationError)
         place = frozen_array(self.position_m, float, (None, len(bodies), 3), "animation: position_m")
-        turn = np.array(frozen_array(self.quaternion_xyzw, float, (len(place), len(bodies), 4), "animation: quaternion"))
+        turn = np.array(
+            frozen_array(self.quaternion_xyzw, float, (len(place), len(bodies), 4), "animation: quaternion")
+        )
         length = np.linalg.norm(turn, axis=2, keepdims=True)
         if not bodies or len(place) < 3:
             raise AnimationError(

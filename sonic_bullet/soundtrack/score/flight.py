@@ -1,7 +1,7 @@
 """What free flight says of an animation: gravity, and with it the scale; noise of the poses; who is moved by hand.
 
-    a(k) = (x(k+1) - 2x(k) + x(k-1)) fps²        in flight a = g, and of a noise σ in the poses √6 σ fps² is left
-    a hidden impulse: 5 √6 m σ fps               five standard deviations of m times the second difference's speed
+a(k) = (x(k+1) - 2x(k) + x(k-1)) fps²        in flight a = g, and of a noise σ in the poses √6 σ fps² is left
+a hidden impulse: 5 √6 m σ fps               five standard deviations of m times the second difference's speed
 """
 
 from __future__ import annotations

@@ -172,9 +172,7 @@ def _slerp(a: Array, b: Array, s: Array) -> Array:
     angle = np.arccos(dot)
     small = angle < 1e-6
     sine = np.where(small, 1.0, np.sin(angle))
-    return np.asarray(
-        np.where(small, a + s * (b - a), (np.sin((1 - s) * angle) * a + np.sin(s * angle) * b) / sine)
-    )
+    return np.asarray(np.where(small, a + s * (b - a), (np.sin((1 - s) * angle) * a + np.sin(s * angle) * b) / sine))
 
 
 def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
@@ -242,7 +240,11 @@ def _objects(
         matrix = world(i)
         stretch, place, turn = _rigid(name, matrix)
         yield ExportedObject(
-            name, upright(place * scale, "y"), tipped(turn), (vertex @ stretch.T * scale, face), stated=_stated(name, node)
+            name,
+            upright(place * scale, "y"),
+            tipped(turn),
+            (vertex @ stretch.T * scale, face),
+            stated=_stated(name, node),
         )
 
 
@@ -253,7 +255,9 @@ def _local(node: Mapping[str, Any], own: Mapping[str, _Sampler], at_s: Array) ->
     if "matrix" in node and not own:
         return np.broadcast_to(np.array(node["matrix"], float).reshape(4, 4).T, (len(at_s), 4, 4))
     part = {
-        path: own[path].at(at_s) if path in own else np.broadcast_to(np.array(node.get(path, rest), float), (len(at_s), len(rest)))
+        path: own[path].at(at_s)
+        if path in own
+        else np.broadcast_to(np.array(node.get(path, rest), float), (len(at_s), len(rest)))
         for path, rest in REST.items()
     }
     made = np.zeros((len(at_s), 4, 4))

@@ -1,8 +1,8 @@
 """Keyframes as plain files (docs/reference/animation.md), and tables of materials.
 
-    NAME.json                      header with poses in it -> Export
-    NAME.npz    header: its JSON as bytes; position (t, b, 3), quaternion_xyzw (t, b, 4) -> Export
-    TABLE.json  [{"name": "cup*", "material": "porcelain", …}, …] -> Rule ...
+NAME.json                      header with poses in it -> Export
+NAME.npz    header: its JSON as bytes; position (t, b, 3), quaternion_xyzw (t, b, 4) -> Export
+TABLE.json  [{"name": "cup*", "material": "porcelain", …}, …] -> Rule ...
 """
 
 from __future__ import annotations
@@ -99,9 +99,7 @@ def _numbers(arrays: Mapping[str, Array], name: str, bodies: int, width: int) ->
     """An array (frames, bodies, width) of floats of any precision."""
     found = arrays.get(name, np.zeros(0))
     if found.ndim != 3 or found.shape[1:] != (bodies, width) or found.dtype.kind != "f":
-        raise AnimationError(
-            f"{name} is {shown(found)}", f"give floating-point numbers (frames, {bodies}, {width})"
-        )
+        raise AnimationError(f"{name} is {shown(found)}", f"give floating-point numbers (frames, {bodies}, {width})")
     return np.asarray(found, float)
 
 

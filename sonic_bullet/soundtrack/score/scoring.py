@@ -1,6 +1,6 @@
 """From a file of poses to a sound and a contact log.
 
-    .glb .gltf .json .npz -> Export -> Animation -> checks -> steps (method.py) -> AnimatedWorld -> Listener -> RenderResult
+.glb .gltf .json .npz -> Export -> Animation -> checks -> steps (method.py) -> AnimatedWorld -> Listener -> RenderResult
 """
 
 from __future__ import annotations
@@ -88,7 +88,9 @@ def score_animation(
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
         driven = driven_bodies(animation, stage)
         if driven.any():
-            bodies = tuple(replace(x, driven=x.driven or bool(d)) for x, d in zip(animation.bodies, driven, strict=True))
+            bodies = tuple(
+                replace(x, driven=x.driven or bool(d)) for x, d in zip(animation.bodies, driven, strict=True)
+            )
             animation = replace(animation, bodies=bodies)
             stage.bodies = bodies
             stage.held |= driven
@@ -202,5 +204,3 @@ def rules_of(table: str | os.PathLike[str] | None) -> tuple[Rule, ...]:
     from sonic_bullet.soundtrack.score.keyframes import read_rules
 
     return read_rules(as_path(table, "table", "name a JSON table of materials"))
-
-
