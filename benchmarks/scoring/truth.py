@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import sonic_bullet as sb
-from tests.made.models import box_model
 from benchmarks.scoring.scenes import Scene
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
@@ -22,6 +21,7 @@ from sonic_bullet.render.presence import admit
 from sonic_bullet.render.synthesis_state import Setup, start
 from sonic_bullet.render.synthesizer import advance
 from sonic_bullet.soundtrack.score.animation import Animation
+from tests.made.models import box_model
 
 SR = 8000
 LEAST_N_S, LEAST_M_S = 0.01, 0.05
@@ -88,21 +88,21 @@ def scored(animation: Animation) -> ContactLog:
 def pulses(log: ContactLog) -> list[Impact]:
     """All that the run time plays as impacts."""
     setup = Setup(SR, (Microphone(np.zeros(3)),), 0, log.air)
-    state, found = start(setup), []
+    state, made = start(setup), []
 
-    def seen(state: Any, number: int, step: Any, count: int, drives: int) -> None:
-        for pulse in state.scratch.pulse[:count]:
+    def seen(state: Any, number: int, step: Any, found: int, drives: int) -> None:
+        for pulse in state.scratch.pulse[:found]:
             low, high = (int(state.body[i]) for i in pulse["body"])
             begin = float(step["after_s"] if pulse["ahead"] else step["begin_s"])
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
-            found.append(Impact(low, high, begin + float(pulse["start_s"]), impulse))
+            made.append(Impact(low, high, begin + float(pulse["start_s"]), impulse))
 
     state.witness = seen
     for step in log.steps:
         if step.body is not state.present:
             admit(setup, state, step, log.bodies)
         advance(setup, state, [step])
-    return found
+    return made
 
 
 def impacts(found: Iterable[Impact], window_s: float) -> list[Impact]:
@@ -130,3 +130,14 @@ def large(found: Sequence[Impact], mass_kg: Sequence[float]) -> list[Impact]:
         if one.impulse_n_s >= LEAST_N_S
         and one.impulse_n_s >= LEAST_M_S * min(m for m in (mass_kg[one.low], mass_kg[one.high]) if m > 0)
     ]
+
+
+def loads(log: ContactLog) -> list[tuple[int, int, float]]:
+    """Which pairs of bodies press on each other, and when: one for each pair and step."""
+    found = set()
+    for step, begin_s in zip(log.steps, log.start_s, strict=True):
+        for row in step.contacts.row:
+            if row["impulse_n_s"].any():
+                low, high = sorted((int(row["a"]), int(row["b"])))
+                found.add((low, high, float(begin_s)))
+    return sorted(found)

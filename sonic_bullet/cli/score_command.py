@@ -73,7 +73,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
             raise with_partial(error, str(to), output, *levels.values()) from error
         if contacts_to is not None:
             write_log(contacts_to, result.log)
-        report = replace(write_audio(to, result.sound, sr, **levels), path=output)
+        report = replace(write_audio(str(to), result.sound, sr, **levels), path=output)
         say(summary(report, result.log))
         for note in result.notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)

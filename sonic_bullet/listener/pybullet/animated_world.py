@@ -7,6 +7,8 @@ and at 240 Hz Bullet's own correction (0.2 of the depth a step) would throw them
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -62,18 +64,8 @@ class AnimatedStage:
         disconnect(self.client)
 
     def _made(self, body: AnimatedBody) -> int:
-        shapes = [options for shape in body.shapes for options in _collision(shape, body.name)]
-        options: dict[str, Any] = {
-            f"{name}s" if name != "halfExtents" else name: [one.get(name, usual) for one in shapes]
-            for name, usual in _USUAL.items()
-        }
         ask, cid = pybullet, self.client_id
-        if len(shapes) == 1 and shapes[0]["shapeType"] == pybullet.GEOM_PLANE:
-            shape = ask.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=cid)
-        else:
-            options["vertices"] = options.pop("verticess")
-            options["radii"] = options.pop("radiuss")
-            shape = ask.createCollisionShapeArray(**options, physicsClientId=cid)
+        shape = _compound([options for shape in body.shapes for options in _collision(shape, body.name)], cid)
         if shape < 0:
             raise AnimationError(f"body '{body.name}': PyBullet makes no collision shape of it", "simplify its mesh")
         made = int(ask.createMultiBody(body.mass_kg, shape, physicsClientId=cid))
@@ -190,7 +182,7 @@ class AnimatedStage:
             raws.append(raw)
             if polled or step == steps - 1:
                 motion[step + 1] = way[step + 1]
-                for row in np.flatnonzero(~self.held):
+                for row in np.flatnonzero(~self.held).tolist():
                     out = motion[step + 1, row]
                     out["position_m"], out["quaternion_xyzw"] = pybullet.getBasePositionAndOrientation(
                         self.ids[row], physicsClientId=cid
@@ -201,15 +193,33 @@ class AnimatedStage:
         return Shot(motion, tuple(raws), touching)
 
 
-_USUAL: dict[str, Any] = {
-    "shapeType": 0,
-    "radius": 0.0,
-    "halfExtents": [0, 0, 0],
-    "length": 0.0,
-    "vertices": [],
-    "collisionFramePosition": [0, 0, 0],
-    "collisionFrameOrientation": [0, 0, 0, 1],
-}
+def _compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
+    """A collision shape of one or several; several meshes go through files, of which PyBullet makes hulls."""
+    if len(shapes) == 1:
+        return int(pybullet.createCollisionShape(**shapes[0], physicsClientId=client_id))
+    with TemporaryDirectory() as folder:
+        names = [str(Path(folder, f"{number}.obj")) for number in range(len(shapes))]
+        for name, shape in zip(names, shapes, strict=True):
+            if "vertices" in shape:
+                Path(name).write_text(_wavefront(np.array(shape["vertices"])), "ascii")
+        made = pybullet.createCollisionShapeArray(
+            shapeTypes=[one["shapeType"] for one in shapes],
+            radii=[one.get("radius", 0.0) for one in shapes],
+            halfExtents=[one.get("halfExtents", [0, 0, 0]) for one in shapes],
+            lengths=[one.get("height", 0.0) for one in shapes],
+            fileNames=[name if "vertices" in one else "" for name, one in zip(names, shapes, strict=True)],
+            meshScales=[[1, 1, 1]] * len(shapes),
+            collisionFramePositions=[one["collisionFramePosition"] for one in shapes],
+            collisionFrameOrientations=[one["collisionFrameOrientation"] for one in shapes],
+            physicsClientId=client_id,
+        )
+    return int(made)
+
+
+def _wavefront(vertex: Array) -> str:
+    """A hull's corners as a mesh file; which faces they have does not matter to who takes their hull."""
+    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertex.tolist()]
+    return "\n".join([*corners, *(f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertex) - 1))]) + "\n"
 
 
 def _collision(shape: Shape, name: str) -> Iterator[dict[str, Any]]:
@@ -225,9 +235,9 @@ def _collision(shape: Shape, name: str) -> Iterator[dict[str, Any]]:
         yield {"shapeType": pybullet.GEOM_BOX, "halfExtents": [x / 2 for x in size], **placed}
     elif shape.kind in ("capsule", "cylinder"):
         kind = pybullet.GEOM_CAPSULE if shape.kind == "capsule" else pybullet.GEOM_CYLINDER
-        yield {"shapeType": kind, "radius": size[0], "length": size[1], **placed}
+        yield {"shapeType": kind, "radius": size[0], "height": size[1], **placed}
     elif shape.kind == "plane":
-        yield {"shapeType": pybullet.GEOM_PLANE, **placed}
+        yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
     else:
         for vertex in _parts(shape):
             try:

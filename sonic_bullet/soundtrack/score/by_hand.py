@@ -1,5 +1,5 @@
-"""Scripts that move bodies by hand: who is driven step by step sounds as an animation does, who is set elsewhere once is
-a teleport, and silent.
+"""Scripts that move bodies by hand: who is driven step by step sounds as an animation does, who is set elsewhere once
+is a teleport, and silent.
 
     ContactLog, shapes -> moves of each body -> Animation of all, driven ones marked
         -> momentum less what the simulated contacts gave -> places of driven pairs, fitted (impulse_fit.py)
@@ -156,7 +156,7 @@ def _given(step: Step, bodies: int, driven: set[int]) -> Array:
 
 
 def _merged(step: Step, made: Step, driven: set[int], moves: Sequence[Moves], number: int) -> Step:
-    """A step with the rows of driven bodies as they were fitted; nobody who is driven in it counts as moved elsewhere."""
+    """A step with the rows of driven bodies as they were fitted; who is driven in it was not moved elsewhere."""
     at_hand = np.array([any(a <= number < b for a, b in one.drives) for one in moves], bool)
     moved = step.teleported.copy()
     moved[[one.index for one, yes in zip(moves, at_hand, strict=True) if yes]] = False

@@ -40,8 +40,8 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExportedObject:
-    """An object as its export has it. mesh: vertices (v, 3) in m and faces (f, 3), object frame; or shapes. stated: what
-    the export itself says of it; inertia_kg_m2 (3,): principal moments along the object's axes, with that mass.
+    """An object as its export has it. mesh: vertices (v, 3) in m and faces (f, 3), object frame; or shapes. stated:
+    what the export itself says of it; inertia_kg_m2 (3,): principal moments along the object's axes, with that mass.
     position_m (t, 3), quaternion_xyzw (t, 4): of its origin.
     """
 

@@ -61,7 +61,7 @@ def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
 
 
 def driven_bodies(animation: Animation, stage: Stage) -> Array:
-    """(b,) who is moved by hand although nobody says so: in most frames in which it touches nothing it does not fall."""
+    """(b,) who is moved by hand though nobody says so: in most frames in which it touches nothing it does not fall."""
     motion, many = animation.poses(), len(animation.bodies)
     pull = float(np.linalg.norm(animation.gravity_m_s2))
     found = np.array([one.driven for one in animation.bodies], bool)

@@ -5,8 +5,8 @@
 
 What is read is rigid motion of meshes: a scale that stays is part of the mesh, one that changes, a skin or a morph is
 refused. y is up and a metre is 1 [3.4]; here z is up: (x, -z, y), as Blender had it before it exported. What a node's
-`extras` say (Blender: custom properties) of material, restitution, friction, mass_kg, driven counts as stated, and so do
-mass and isKinematic of KHR_physics_rigid_bodies.
+`extras` say (Blender: custom properties) of material, restitution, friction, mass_kg, driven counts as stated, and so
+do mass and isKinematic of KHR_physics_rigid_bodies.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ class _Sampler:
             found = _slerp(self.value[i], self.value[j], s)
         else:
             found = self.value[i] + s * (self.value[j] - self.value[i])
-        return found / np.linalg.norm(found, axis=1, keepdims=True) if self.turns else found
+        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True) if self.turns else found)
 
 
 def _slerp(a: Array, b: Array, s: Array) -> Array:
@@ -306,7 +306,7 @@ def _mesh(file: _File, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
 
 def _stated(name: str, node: Mapping[str, Any]) -> Rule:
     """What a node says of itself; what is no number or text there is passed over."""
-    extras = node.get("extras") if isinstance(node.get("extras"), dict) else {}
+    extras: Mapping[str, Any] = node["extras"] if isinstance(node.get("extras"), dict) else {}
     body = (node.get("extensions") or {}).get("KHR_physics_rigid_bodies") or {}
     motion = body.get("motion") or {}
 

@@ -9,7 +9,7 @@ the triangle is the kernel). For Bullet's own steps the triangle has one sample:
     MOTION (t, b) -> second differences; who can touch -> places (Stage.closest)
         -> non-negative least squares of all bodies that touch each other, friction as a pyramid -> RAW of each frame
 
-min |W(A f - r)|², f >= 0, W the inverse square root of mass and inertia: the residual is a kinetic energy [after Erleben
+min |W(A f - r)|², f >= 0, W the inverse square root of mass and inertia: the residual is a kinetic energy [Erleben
 2007 and Todorov 2014, who solve for the forward step; nonnegative least squares: Lawson & Hanson 1974, ch. 23].
 """
 
@@ -67,9 +67,9 @@ def fitted_steps(
     known: Array | float = 0.0,
     only: Set[int] | None = None,
 ) -> list[tuple[Array, Array]]:
-    """MOTION (b,) and loaded RAW rows of each frame but the last. reach_m (b,): largest distance of a body's points from
-    its centre of mass. known (t, b, 6): momentum from contacts that are known already; only: of pairs with one of these
-    bodies, None: of all.
+    """MOTION (b,) and loaded RAW rows of each frame but the last. reach_m (b,): largest distance of a body's points
+    from its centre of mass. known (t, b, 6): momentum from contacts that are known already; only: of pairs with one of
+    these bodies, None: of all.
     """
     motion, step_s = animation.poses(), 1 / animation.fps
     change = momentum_changes(animation, motion) - known
@@ -109,8 +109,8 @@ def near_pairs(motion: Array, reach_m: Array, margin_m: Array, static: Array, st
 
 
 def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: Stage) -> Array:
-    """(k,) whether a place closes within the frame before or after: carried on with the speeds that it had, or back with
-    those that it has then.
+    """(k,) whether a place closes within the frame before or after: carried on with the speeds that it had, or back
+    with those that it has then.
     """
     if not len(raw):
         return np.zeros(0, bool)
@@ -130,7 +130,7 @@ def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:
 
 
 def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage: Stage) -> Array:
-    """RAW rows with the forces whose impulses over a frame give each body its `change` (b, 6); rows without are gone."""
+    """RAW rows with the forces whose impulses over a frame give each body its `change` (b, 6); others are gone."""
     if not len(raw):
         return raw
     from scipy.optimize import nnls

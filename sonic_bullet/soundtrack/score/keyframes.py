@@ -130,7 +130,8 @@ def _object(one: _Object, position: Array, turn: Array, folder: Path, unit: floa
         raise AnimationError(
             f"{shown(one.name)} has {len(given)} shapes", "give one of mesh, sphere_m, box_m, cylinder_m"
         )
-    mesh, shapes = None, ()
+    mesh: tuple[Array, Array] | None = None
+    shapes: tuple[Shape, ...] = ()
     if one.mesh is not None:
         vertex, face = _mesh(one, folder)
         mesh = vertex * unit, face

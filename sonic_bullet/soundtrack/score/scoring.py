@@ -8,11 +8,10 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
 
 import numpy as np
 
@@ -77,7 +76,8 @@ def score_animation(
     Raises SonicBulletError; where it was interrupted under way, the exception carries what was scored so far as
     ``partial``.
     """
-    sr, notes = check_sr(sr), ()
+    sr = check_sr(sr)
+    notes: tuple[str, ...] = ()
     if not isinstance(animation, Animation):
         animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
     notes += _check_fall(animation)
@@ -113,9 +113,7 @@ def score_animation(
         return _result(listener, notes)
 
 
-def score_scene(
-    path: str | os.PathLike[str], *, progress: Callable[[float], None] | None = None, **options: Any
-) -> RenderResult:
+def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = None, **options: Any) -> RenderResult:
     """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
 
     Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored.

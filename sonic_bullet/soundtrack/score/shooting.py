@@ -161,7 +161,7 @@ class Shooting:
 
     def _stepped(self, k: int, best: _Try, islands: list[Array], touching: Array) -> _Try:
         """One Gauss-Newton step of every island, whole, halved or quartered."""
-        most = max(len(x) for x in islands)
+        most = max(map(len, islands))
         columns: dict[int, list[Array]] = {i: [] for i in range(len(islands))}
         for member in range(most):
             for axis in range(6):
