@@ -7,8 +7,9 @@
 n pictures last n/fps seconds: `samples_of` of them are heard, silence where the sound is shorter. Lossy codecs begin
 with samples that are no sound (aac 1024, opus 312, mp3 1105): the encoder gives them times before 0 and the container
 says that they are left out (an edit list in mp4 and mov, CodecDelay in mkv), so players and decoders begin with ours.
-Those of aac and mp3 code blocks of 1024 and 1152 samples, and silence fills the last: the container says where the
-sound ends within it; a decoder that does not look gives up to 1.2 kilosamples of silence more. No picture waits for a
+Those of aac and mp3 code blocks of 1024 and 1152 samples, and silence would fill the last, which decoders play: as many
+samples go before time 0 besides the codec's own that the last block is full (`lead_of`; the edit list leaves them out
+as it does the codec's, mkv has no such list), and blocks after the end stay out of the file. No picture waits for a
 later one (no B-frames), so that pictures need no such list. mkv tells times in whole milliseconds, each rounded by
 itself; the number of its pictures and samples is exact.
 
@@ -39,19 +40,22 @@ from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 
 class _Codec(NamedTuple):
-    """An audio codec by ffmpeg's name, its sample format, and bits a second a channel, 0: as many as it takes."""
+    """An audio codec by ffmpeg's name, its sample format, and bits a second a channel, 0: as many as it takes. block: of
+    samples, 0 where the last may be short; delay: of samples, before the first of ours."""
 
     name: str
     sample: str
     bits_per_s: int = 0
+    block: int = 0
+    delay: int = 0
 
 
 CODECS = {
-    "aac": _Codec("aac", "fltp", 128_000),
+    "aac": _Codec("aac", "fltp", 128_000, 1024, 1024),
     "pcm": _Codec("pcm_s24le", "s32"),
     "flac": _Codec("flac", "s32"),
     "opus": _Codec("libopus", "flt", 96_000),
-    "mp3": _Codec("libmp3lame", "fltp", 128_000),
+    "mp3": _Codec("libmp3lame", "fltp", 128_000, 1152, 1105),
 }
 CONTAINERS = {".mp4": ("aac", "mp3"), ".mov": ("pcm", "aac"), ".mkv": ("flac", "opus", "pcm", "aac", "mp3")}
 """Extension -> codecs that players know there, the usual one first."""
@@ -81,6 +85,12 @@ def as_fps(text: object) -> Fraction:
 def samples_of(pictures: int, fps: Fraction, sr: int) -> int:
     """Samples until the end of so many pictures: the nearest to n·sr/fps, by whole numbers."""
     return math.floor(pictures * sr / fps + Fraction(1, 2))
+
+
+def lead_of(codec: str, samples: int) -> int:
+    """Silent samples before time 0 with which delay, lead and sound are whole blocks."""
+    chosen = CODECS[codec]
+    return -(chosen.delay + samples) % chosen.block if chosen.block else 0
 
 
 def check_film_output(
@@ -126,7 +136,8 @@ class FilmWriter:
     """A film that grows picture by picture; a context manager.
 
     sound: (channels, n) pascals, told all at once because it is there before the pictures are; gain_per_pa: file units
-    a pascal, what is beyond 1 is clipped and counted. size: width and height, even numbers. progress of the sound goes
+    a pascal, what is beyond 1 is clipped and counted. pictures: how many there will be, None: as many as the sound lasts;
+    with fewer or more the last block of aac or mp3 ends in silence. size: width and height, even numbers. progress of the sound goes
     with the pictures: each brings what is heard while it is shown.
     """
 
@@ -140,6 +151,7 @@ class FilmWriter:
         size: tuple[int, int],
         codec: str | None = None,
         gain_per_pa: float = 1.0,
+        pictures: int | None = None,
     ) -> None:
         av = pyav()
         self.path, self.sr, self.fps, self.sound, self.gain = os.fspath(path), check_sr(sr), fps, sound, gain_per_pa
@@ -171,6 +183,10 @@ class FilmWriter:
         except BaseException:
             self.partial.close()
             raise
+        if pictures is None:
+            pictures = math.ceil(sound.shape[1] * fps / self.sr)
+        self._lead = 0 if container == "matroska" else lead_of(self.codec, samples_of(pictures, fps, self.sr))
+        self._ahead, self._blocks = CODECS[self.codec].delay + self._lead, 0
 
     def write(self, picture: Array) -> None:
         """Append a picture (height, width, 3) uint8, and the sound that goes with it. Raises FileError (disk)."""
@@ -189,21 +205,26 @@ class FilmWriter:
         av = pyav()
         if stop <= self.samples:
             return
-        block = np.zeros((self.sound.shape[0], stop - self.samples), np.float32)
+        lead = 0 if self.samples else self._lead
+        block = np.zeros((self.sound.shape[0], lead + stop - self.samples), np.float32)
         known = self.sound.read(self.samples, stop) * self.gain
         self.clipped += int(np.count_nonzero(np.abs(known) > 1))
-        block[:, : known.shape[1]] = np.clip(known, -1, 1)
+        block[:, lead : lead + known.shape[1]] = np.clip(known, -1, 1)
         frame = av.AudioFrame.from_ndarray(block, format="fltp", layout=self._audio.layout.name)
-        frame.sample_rate, frame.pts, frame.time_base = self.sr, self.samples, Fraction(1, self.sr)
+        frame.sample_rate, frame.pts, frame.time_base = self.sr, self.samples - lead, Fraction(1, self.sr)
         self._mux_sound(self._audio.encode(frame), end)
         self.samples = stop
 
     def _mux_sound(self, packets: Any, end: int | None = None) -> None:
-        """Coded sound into the file. end: the sample where all of it does: what fills the last block is not counted."""
+        """Coded sound into the file. end: the sample where all of it does: what begins later is left out."""
+        block = CODECS[self.codec].block
         for packet in packets:
-            if end is not None and packet.time_base == Fraction(1, self.sr) and packet.pts is not None:
-                left = max(end - packet.pts, 1)
-                packet.duration = min(packet.duration or left, left)
+            # counted here: lame's last packet has a time before its place
+            begin, self._blocks = self._blocks * block - self._ahead, self._blocks + 1
+            if end is not None and block:
+                if begin >= end:
+                    continue
+                packet.duration = min(block, end - begin)
             self._container.mux(packet)
 
     def _disk(self) -> Any:
