@@ -138,7 +138,7 @@ class Shooting:
                 break
             speed = best.speed.copy()
             miss = best.residual[:, :6] * POSE_M
-            miss[:, 3:] /= self._gyration_m[:, None]
+            miss[:, 3:] /= np.maximum(self._gyration_m, 1e-12)[:, None]
             speed[wrong] -= miss[wrong] * self._animation.fps
             best = self._shot(k, speed, best.restitution)
         return best
