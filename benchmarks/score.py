@@ -1,4 +1,4 @@
-"""How much of what happened does `score` find in exported poses? The truth is what the simulation's own log sounds like.
+"""How much of what happened does `score` find in exported poses? The truth is what the simulation's own log plays.
 
     python -m benchmarks.score [--fps 240,60,24] [--scene dice] [--float32] [--quiet]
 
@@ -128,8 +128,13 @@ def quiet(name: str, scene: Scene, fps: int, single: bool) -> None:
     kept = {f for _, f in matched(true, found, 2 / fps).pairs if f is not None}
     late = [one for one in found if one.time_s > HEARD_AT_REST_S]
     invented = [one for one in late if one not in kept]
-    print(f"| {name} | {fps} | {'float32' if single else ''} | {sum(t.time_s > HEARD_AT_REST_S for t in true)} | {len(late)} | "
-          f"{len(invented)} | {1e3 * sum(one.impulse_n_s for one in invented):.3g} | {len(large(invented, mass))} |")  # fmt: skip
+    expected = sum(t.time_s > HEARD_AT_REST_S for t in true)
+    weight = 1e3 * sum(one.impulse_n_s for one in invented)
+    print(
+        f"| {name} | {fps} | {'float32' if single else 'float64'} | {expected} | {len(late)} | {len(invented)} |",
+        end="",
+    )
+    print(f" {weight:.3g} | {len(large(invented, mass))} |", flush=True)
 
 
 def main() -> None:

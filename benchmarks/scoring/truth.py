@@ -70,7 +70,7 @@ def at_rate(animation: Animation, every: int, *, single: bool = False) -> Animat
 
 def scored(animation: Animation) -> ContactLog:
     """The log that `score` makes of it."""
-    from sonic_bullet.listener.pybullet.animated_world import AnimatedStage, AnimatedWorld
+    from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
     from sonic_bullet.soundtrack.score.method import found_steps
 
     stage = AnimatedStage(animation.bodies, animation.gravity_m_s2)

@@ -33,11 +33,11 @@ from sonic_bullet.cli.examples import (
     RENDER_EPILOG,
     RESIDUAL_EPILOG,
 )
-from sonic_bullet.cli.film_command import film
 from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
 from sonic_bullet.cli.play_command import play
-from sonic_bullet.cli.score_command import score
-from sonic_bullet.cli.soundtrack_outputs import soundtrack_options
+from sonic_bullet.cli.soundtrack.film_command import film
+from sonic_bullet.cli.soundtrack.score_command import score
+from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"

@@ -19,7 +19,7 @@ from sonic_bullet.cli.output import (
     status,
     write_json,
 )
-from sonic_bullet.cli.soundtrack_outputs import Soundtrack, SoundtrackWish
+from sonic_bullet.cli.soundtrack.soundtrack_outputs import Soundtrack, SoundtrackWish
 from sonic_bullet.files import (
     AudioReport,
     check_audio_output,

@@ -1,10 +1,10 @@
 """What the score of an animation asks of a simulator: how near bodies are in a pose, and what follows from a start.
 
-    AnimatedBody ... -> Stage: MOTION (b,) -> closest: RAW (k,), no force        -> a fit of impulses
+    AnimatedBody ... -> PoseStage: MOTION (b,) -> closest: RAW (k,), no force        -> a fit of impulses
                                MOTION (b,) -> shoot: MOTION (n + 1, b), RAW each -> a search for the start
     n steps of MOTION and RAW -> AnimatedWorld -> Step, as of any other world
 
-PyBullet's is listener/pybullet/animated_world.py.
+PyBullet's is listener/pybullet/staged/animated_world.py.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Shot:
     touching: Array
 
 
-class Stage(Protocol):
+class PoseStage(Protocol):
     """A simulated world that is set, asked and shot, never left to itself. Bodies are counted as they were given.
 
     reach_m (b,): how far a body's points are from its centre of mass at most.

@@ -2,8 +2,8 @@
 
     Figure (triangles, colour) … -> open_pictures -> Pictures.picture(poses, Camera) -> (height, width, 3) uint8
 
-PyBullet's own renderer is one (listener/pybullet/picture_world.py), without a window or a graphics card; another one
-answers `picture` and takes the place.
+PyBullet's own renderer is one (listener/pybullet/staged/picture_world.py), without a window or a graphics card; another
+one answers `picture` and takes the place.
 """
 
 from __future__ import annotations
@@ -93,13 +93,13 @@ def open_pictures(
     """A world of figures to take pictures of, width and height in pixels. still (k,): who will stand as it is in all
     pictures, and before the same camera. Raises SceneError.
     """
-    from sonic_bullet.listener.pybullet.picture_world import PyBulletPictures
+    from sonic_bullet.listener.pybullet.staged.picture_world import PyBulletPictures
 
     return PyBulletPictures(figures, size, shadows, np.zeros(len(figures), bool) if still is None else still)
 
 
 def standing_in(client_id: int) -> tuple[Standing, ...]:
     """All links of a PyBullet world that have a shape, as they stand now."""
-    from sonic_bullet.listener.pybullet.picture_world import standing
+    from sonic_bullet.listener.pybullet.staged.picture_world import standing
 
     return standing(client_id)

@@ -118,7 +118,9 @@ def make_film(
 
     width, height = look.size
     try:
-        with FilmWriter(path, sound, sr, fps=look.fps, size=look.size, codec=codec, gain_per_pa=gain, pictures=count) as film:
+        with FilmWriter(
+            path, sound, sr, fps=look.fps, size=look.size, codec=codec, gain_per_pa=gain, pictures=count
+        ) as film:
             for picture in arrays_in_order(draw, count, (height, width, 3), np.uint8):
                 film.write(picture)
                 if progress is not None:

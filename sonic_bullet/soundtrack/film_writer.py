@@ -40,8 +40,10 @@ from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 
 class _Codec(NamedTuple):
-    """An audio codec by ffmpeg's name, its sample format, and bits a second a channel, 0: as many as it takes. block: of
-    samples, 0 where the last may be short; delay: of samples, before the first of ours."""
+    """An audio codec by ffmpeg's name, its sample format, and bits a second a channel, 0: as many as it takes.
+
+    block: of samples, 0 where the last may be short; delay: of samples, before the first of ours.
+    """
 
     name: str
     sample: str
@@ -135,10 +137,10 @@ def pyav() -> Any:
 class FilmWriter:
     """A film that grows picture by picture; a context manager.
 
-    sound: (channels, n) pascals, told all at once because it is there before the pictures are; gain_per_pa: file units
-    a pascal, what is beyond 1 is clipped and counted. pictures: how many there will be, None: as many as the sound lasts;
-    with fewer or more the last block of aac or mp3 ends in silence. size: width and height, even numbers. progress of the sound goes
-    with the pictures: each brings what is heard while it is shown.
+    sound: (channels, n) pascals, all at once because it is there before the pictures are; gain_per_pa: file units a
+    pascal, what is beyond 1 is clipped and counted. size: width and height, even numbers. pictures: how many there will
+    be, None: as many as the sound lasts; with fewer or more the last block of aac or mp3 ends in silence. Each picture
+    brings the sound that belongs to it.
     """
 
     def __init__(

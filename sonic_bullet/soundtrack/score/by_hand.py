@@ -89,7 +89,7 @@ def scored_by_hand(
     """The log with the contacts of driven bodies. shapes: of bodies by their index. Raises AnimationError where bodies
     come or go, steps change their length, or a driven body has no mass and no model to tell it.
     """
-    from sonic_bullet.listener.pybullet.animated_world import AnimatedStage, AnimatedWorld
+    from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     driven = {one.index for one in moves if one.drives}
     if not driven:

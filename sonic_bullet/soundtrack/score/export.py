@@ -83,14 +83,14 @@ def assembled(
     moving = Animation(export.fps, tuple(blank), place, turn).moving  # checks them, too
     notes, bodies, materials, plain = list(export.notes), [], {}, []
     for i, one in enumerate(export.objects):
-        told = _told(one, rules)
-        material = told.material or (default if moving[i] else None)
-        if told.material is None and material is not None:
+        said = _stated_of(one, rules)
+        material = said.material or (default if moving[i] else None)
+        if said.material is None and material is not None:
             plain.append(one.name)
         if material is not None:
             materials[one.name] = material
         density = load_material(material).density_kg_m3 if material is not None else 1000.0
-        body, centre, axes = _body(one, told, density, bool(moving[i]))
+        body, centre, axes = _body(one, said, density, bool(moving[i]))
         bodies.append(body)
         place[:, i] += np.einsum("tij,j->ti", matrices(turn[:, i]), centre)
         turn[:, i] = _times(turn[:, i], axes)
@@ -108,7 +108,7 @@ def _listed(names: Sequence[str]) -> str:
     return few + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
-def _told(one: ExportedObject, rules: Sequence[Rule]) -> Rule:
+def _stated_of(one: ExportedObject, rules: Sequence[Rule]) -> Rule:
     """What export and rules say of an object."""
     found = one.stated
     for rule in rules:
@@ -122,7 +122,7 @@ def _told(one: ExportedObject, rules: Sequence[Rule]) -> Rule:
     return found
 
 
-def _body(one: ExportedObject, told: Rule, density: float, moves: bool) -> tuple[AnimatedBody, Array, Array]:
+def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple[AnimatedBody, Array, Array]:
     """The body, its centre of mass in the object frame, and the quaternion of its principal axes there."""
     centre, axes, moments, mass = np.zeros(3), np.array([0.0, 0, 0, 1]), np.zeros(3), 0.0
     shapes = one.shapes
@@ -144,16 +144,16 @@ def _body(one: ExportedObject, told: Rule, density: float, moves: bool) -> tuple
         shapes = (Shape("mesh", vertex_m=(vertex - centre) @ turn, face=face),)
     elif moves:
         moments, mass = _primitive(shapes[0], density)
-    if moves and told.mass_kg is not None and told.mass_kg > 0:
-        moments, mass = moments * told.mass_kg / mass, told.mass_kg
-    if moves and one.inertia_kg_m2 is not None and told.mass_kg is not None:
+    if moves and said.mass_kg is not None and said.mass_kg > 0:
+        moments, mass = moments * said.mass_kg / mass, said.mass_kg
+    if moves and one.inertia_kg_m2 is not None and said.mass_kg is not None:
         moments = matrices(axes).T @ np.diag(one.inertia_kg_m2) @ matrices(axes)
         moments = np.diag(moments)
-    kinematic = bool(told.driven) or (moves and told.mass_kg == 0)
+    kinematic = bool(said.driven) or (moves and said.mass_kg == 0)
     made = AnimatedBody(
         one.name, shapes, mass if moves else 0.0, moments,
-        RESTITUTION if told.restitution is None else told.restitution,
-        FRICTION if told.friction is None else told.friction, kinematic and moves,
+        RESTITUTION if said.restitution is None else said.restitution,
+        FRICTION if said.friction is None else said.friction, kinematic and moves,
     )  # fmt: skip
     return made, centre, axes
 

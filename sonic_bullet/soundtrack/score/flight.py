@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.animated import Stage
+from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 
@@ -60,7 +60,7 @@ def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
     return SIGMAS * float(np.sqrt(6)) * mass_kg * noise_m * fps
 
 
-def driven_bodies(animation: Animation, stage: Stage) -> Array:
+def driven_bodies(animation: Animation, stage: PoseStage) -> Array:
     """(b,) who is moved by hand though nobody says so: in most frames in which it touches nothing it does not fall."""
     motion, many = animation.poses(), len(animation.bodies)
     pull = float(np.linalg.norm(animation.gravity_m_s2))

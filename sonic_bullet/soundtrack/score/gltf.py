@@ -139,7 +139,7 @@ class _Sampler:
 
     time_s: Array
     value: Array
-    way: str
+    interpolation: str
     turns: bool
 
     def at(self, time_s: Array) -> Array:
@@ -149,14 +149,14 @@ class _Sampler:
         j = np.minimum(i + 1, len(key) - 1)
         width = np.maximum(key[j] - key[i], 1e-12)
         s = np.clip((x - key[i]) / width, 0, 1)[:, None]
-        if self.way == "CUBICSPLINE":
+        if self.interpolation == "CUBICSPLINE":
             knots = self.value.reshape(len(key), 3, -1)
             a, b = knots[i], knots[j]
             found = (
                 (2 * s**3 - 3 * s**2 + 1) * a[:, 1] + width[:, None] * (s**3 - 2 * s**2 + s) * a[:, 2]
                 + (3 * s**2 - 2 * s**3) * b[:, 1] + width[:, None] * (s**3 - s**2) * b[:, 0]
             )  # fmt: skip
-        elif self.way == "STEP":
+        elif self.interpolation == "STEP":
             found = np.where(s >= 1, self.value[j], self.value[i])
         elif self.turns:
             found = _slerp(self.value[i], self.value[j], s)
@@ -186,12 +186,12 @@ def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
             sampler = animation["samplers"][channel["sampler"]]
             time_s = file.accessor(sampler["input"])[:, 0].astype(float)
             value = file.accessor(sampler["output"]).astype(float)
-            way = sampler.get("interpolation", "LINEAR")
-            if len(value) != len(time_s) * (3 if way == "CUBICSPLINE" else 1) or (np.diff(time_s) <= 0).any():
+            how = sampler.get("interpolation", "LINEAR")
+            if len(value) != len(time_s) * (3 if how == "CUBICSPLINE" else 1) or (np.diff(time_s) <= 0).any():
                 raise AnimationError("a sampler has not one value a key, or keys out of order", _REMEDY)
             if not (np.isfinite(time_s).all() and np.isfinite(value).all()):
                 raise AnimationError("a sampler holds numbers that are none", _REMEDY)
-            found.setdefault(node, {})[path] = _Sampler(time_s, value, way, path == "rotation")
+            found.setdefault(node, {})[path] = _Sampler(time_s, value, how, path == "rotation")
     return found
 
 

@@ -6,7 +6,7 @@
 exact for linear momentum whatever happens within a frame (Taylor's theorem with the remainder as an integral, of which
 the triangle is the kernel). For Bullet's own steps the triangle has one sample: the impulse of step k.
 
-    MOTION (t, b) -> second differences; who can touch -> places (Stage.closest)
+    MOTION (t, b) -> second differences; who can touch -> places (PoseStage.closest)
         -> non-negative least squares of all bodies that touch each other, friction as a pyramid -> RAW of each frame
 
 min |W(A f - r)|², f >= 0, W the inverse square root of mass and inertia: the residual is a kinetic energy [Erleben
@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
-from sonic_bullet.listener.animated import Stage
+from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.listener.frames import turned
 from sonic_bullet.listener.polling import NO_RAW
 from sonic_bullet.records import Array
@@ -60,7 +60,7 @@ def _halfway(turn: Array, whole_rad: Array) -> Array:
 
 def fitted_steps(
     animation: Animation,
-    stage: Stage,
+    stage: PoseStage,
     reach_m: Array,
     progress: Callable[[float], None] | None = None,
     *,
@@ -99,7 +99,9 @@ def _speeds(motion: Array, reach_m: Array) -> Array:
     )
 
 
-def near_pairs(motion: Array, reach_m: Array, margin_m: Array, static: Array, stage: Stage) -> list[tuple[int, int]]:
+def near_pairs(
+    motion: Array, reach_m: Array, margin_m: Array, static: Array, stage: PoseStage
+) -> list[tuple[int, int]]:
     """Pairs whose bounding boxes are near, one of which moves."""
     low, high = stage.boxes(motion)
     low, high = low - margin_m[:, None], high + margin_m[:, None]
@@ -108,7 +110,7 @@ def near_pairs(motion: Array, reach_m: Array, margin_m: Array, static: Array, st
     return [(int(a), int(b)) for a, b in zip(*np.nonzero(np.triu(meet, 1)), strict=True)]
 
 
-def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: Stage) -> Array:
+def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: PoseStage) -> Array:
     """(k,) whether a place closes within the frame before or after: carried on with the speeds that it had, or back
     with those that it has then.
     """
@@ -129,7 +131,7 @@ def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:
     return np.asarray(((v[0] - v[1]) * raw["normal"]).sum(axis=1))
 
 
-def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage: Stage) -> Array:
+def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage: PoseStage) -> Array:
     """RAW rows with the forces whose impulses over a frame give each body its `change` (b, 6); others are gone."""
     if not len(raw):
         return raw
@@ -148,9 +150,9 @@ def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage
     for rows in _components(a, b, movable, free):
         bodies = sorted({int(x) for x in (*a[rows], *b[rows]) if movable[x]})
         # who is driven tells of forces only where nobody free does
-        told = [x for x in bodies if free[x]] or bodies
-        row_of = {body: i for i, body in enumerate(told)}
-        matrix = np.zeros((6 * len(told), 4 * len(rows)))
+        tells = [x for x in bodies if free[x]] or bodies
+        row_of = {body: i for i, body in enumerate(tells)}
+        matrix = np.zeros((6 * len(tells), 4 * len(rows)))
         for c, r in enumerate(rows):
             n, t, s = out["normal"][r], out["tangent_1"][r], out["tangent_2"][r]
             force = np.stack([n + mu[r] * t, n - mu[r] * t, n + mu[r] * s, n - mu[r] * s])
@@ -159,7 +161,7 @@ def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage
                     i = 6 * row_of[int(body)]
                     wrench = np.concatenate([force, np.cross(arm, force)], axis=1)
                     matrix[i : i + 6, 4 * c : 4 * c + 4] += sign * whiten[body] @ wrench.T
-        right = np.concatenate([whiten[x] @ change[x] for x in told])
+        right = np.concatenate([whiten[x] @ change[x] for x in tells])
         ridge = np.sqrt(EVEN) * np.linalg.norm(matrix, 2) * np.eye(matrix.shape[1]) / 10
         share = nnls(np.concatenate([matrix, ridge]), np.concatenate([right, np.zeros(len(ridge))]))[0]
         pyramid = share.reshape(-1, 4) * animation.fps

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import ceil
 
-from sonic_bullet.listener.animated import Stage
+from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import fitted_steps
@@ -16,7 +16,7 @@ STEP_HZ = 240.0
 
 
 def found_steps(
-    animation: Animation, stage: Stage, progress: Callable[[float], None] | None = None
+    animation: Animation, stage: PoseStage, progress: Callable[[float], None] | None = None
 ) -> tuple[list[tuple[Array, Array]], float]:
     """MOTION (b,) at the start of each step with its loaded RAW rows, and the length of a step in s."""
     if animation.fps >= FIT_FROM_FPS:

@@ -81,7 +81,7 @@ def score_animation(
     if not isinstance(animation, Animation):
         animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
     notes += _check_fall(animation)
-    from sonic_bullet.listener.pybullet.animated_world import AnimatedStage, AnimatedWorld
+    from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     say = say or (lambda text: None)
     half = (lambda share: progress(0.7 * share)) if progress is not None else None

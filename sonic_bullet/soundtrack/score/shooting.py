@@ -1,6 +1,6 @@
 """Below 120 poses a second: what happened between two frames is found by letting it happen.
 
-    pose k, speed v, restitution e -> Stage.shoot, 240 Hz -> pose' at k+1        pose' - pose(k+1) -> better v, e
+    pose k, speed v, restitution e -> PoseStage.shoot, 240 Hz -> pose' at k+1        pose' - pose(k+1) -> better v, e
 
 Single shooting with a prior [Press et al., Numerical Recipes, 3rd ed. 2007, sec. 18.1]: v is the speed with which the
 frame before ended, moved as little as it must be, and e what explains the next pose best,
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.listener.animated import Shot, Stage, rotation
+from sonic_bullet.listener.animated import PoseStage, Shot, rotation
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 
@@ -49,7 +49,7 @@ class _Try:
 class Shooting:
     """A search through an animation, frame by frame. substeps: steps of the simulation to a frame."""
 
-    def __init__(self, animation: Animation, stage: Stage, substeps: int) -> None:
+    def __init__(self, animation: Animation, stage: PoseStage, substeps: int) -> None:
         self._animation, self._stage, self._substeps = animation, stage, substeps
         self._step_s = 1 / animation.fps / substeps
         self._motion = animation.poses()
@@ -180,7 +180,7 @@ class Shooting:
         for i, island in enumerate(islands):
             slope = (tried.residual - best.residual)[island].ravel() / (e - best.restitution)[island[0]]
             matrix = np.stack([*columns[i], slope], axis=1)
-            damped = 1e-3 * np.eye(matrix.shape[1]) * max(np.linalg.norm(matrix, 2), 1e-9)
+            damped = 1e-3 * np.eye(matrix.shape[1]) * max(float(np.linalg.norm(matrix, 2)), 1e-9)
             moves.append(
                 np.linalg.lstsq(
                     np.concatenate([matrix, damped]),

@@ -119,7 +119,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         pictures_in(result.log, look.fps, options["seconds"])
         events = None
         with quiet_stderr():
-            import sonic_bullet.listener.pybullet.picture_world  # noqa: F401  which says when PyBullet was built
+            import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
         with progress_bar("film") as (progress, tell):
             if options["overlay"]:
                 from sonic_bullet.soundtrack.sound_events import EventWitness

@@ -32,7 +32,7 @@ ROLLING = 1e-4
 
 
 class AnimatedStage:
-    """Bodies in a client of their own; see listener.animated.Stage."""
+    """Bodies in a client of their own; see listener.animated.PoseStage."""
 
     def __init__(self, bodies: Sequence[AnimatedBody], gravity_m_s2: Array) -> None:
         self.bodies, self.gravity_m_s2 = tuple(bodies), gravity_m_s2
@@ -77,7 +77,7 @@ class AnimatedStage:
         return made
 
     def boxes(self, motion: Array) -> tuple[Array, Array]:
-        """See Stage."""
+        """See PoseStage."""
         frame = np.array([pybullet.getMatrixFromQuaternion(q) for q in motion["quaternion_xyzw"].tolist()])
         frame = frame.reshape(-1, 3, 3)
         middle = motion["position_m"] + np.einsum("bij,bj->bi", frame, self.middle_m)
@@ -85,7 +85,7 @@ class AnimatedStage:
         return middle - half, middle + half
 
     def rows(self, body_id: Array) -> Array:
-        """See Stage."""
+        """See PoseStage."""
         return np.array([self.row_of[body] for body in body_id.tolist()], np.int64)
 
     def hold(self, holds: bool) -> None:
@@ -111,7 +111,7 @@ class AnimatedStage:
         )
 
     def closest(self, motion: Array, pairs: Sequence[tuple[int, int]], reach_m: float) -> Array:
-        """See Stage."""
+        """See PoseStage."""
         for row in sorted({row for pair in pairs for row in pair}):
             self._set(row, motion[row])
         found: list[Array] = []
@@ -157,22 +157,22 @@ class AnimatedStage:
     def shoot(
         self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
     ) -> Shot:
-        """See Stage."""
+        """See PoseStage."""
         cid, many = self.client_id, len(self.ids)
         self.hold(True)
         pybullet.setTimeStep(dt_s, physicsClientId=cid)
-        way = between(start, end, steps, dt_s)
+        course = between(start, end, steps, dt_s)
         motion, raws = np.zeros((steps + 1, many), MOTION), []
         touching = np.zeros((many, many), bool)
         for row in range(many):
-            self._set(row, start[row] if not self.held[row] else way[0, row])
+            self._set(row, start[row] if not self.held[row] else course[0, row])
             if not self.held[row]:
                 pybullet.changeDynamics(self.ids[row], -1, restitution=float(restitution[row]), physicsClientId=cid)
-        moved = [row for row in range(many) if self.held[row] and start[row] != way[-1, row]]
-        motion[0] = np.where(self.held, way[0], start)
+        moved = [row for row in range(many) if self.held[row] and start[row] != course[-1, row]]
+        motion[0] = np.where(self.held, course[0], start)
         for step in range(steps):
             for row in moved if step else ():
-                self._set(row, way[step, row])
+                self._set(row, course[step, row])
             pybullet.stepSimulation(physicsClientId=cid)
             points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
             for one in points:
@@ -181,7 +181,7 @@ class AnimatedStage:
                     touching[a, b] = touching[b, a] = True
             raws.append(raw)
             if polled or step == steps - 1:
-                motion[step + 1] = way[step + 1]
+                motion[step + 1] = course[step + 1]
                 for row in np.flatnonzero(~self.held).tolist():
                     out = motion[step + 1, row]
                     out["position_m"], out["quaternion_xyzw"] = pybullet.getBasePositionAndOrientation(
@@ -280,15 +280,15 @@ def turned_back(vector: Array, rotation_rad: Array) -> Array:
 
 def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
     """MOTION (steps + 1, b) on the straight way from a pose to another, with the speed of that way."""
-    way = np.zeros((steps + 1, len(start)), MOTION)
+    course = np.zeros((steps + 1, len(start)), MOTION)
     move = end["position_m"] - start["position_m"]
     turn = rotation(start["quaternion_xyzw"], end["quaternion_xyzw"])
     for step in range(steps + 1):
         share = step / steps
-        way[step]["position_m"] = start["position_m"] + share * move
-        way[step]["quaternion_xyzw"] = turned(start["quaternion_xyzw"], share * turn)
-        way[step]["velocity_m_s"], way[step]["spin_rad_s"] = move / (steps * dt_s), turn / (steps * dt_s)
-    return way
+        course[step]["position_m"] = start["position_m"] + share * move
+        course[step]["quaternion_xyzw"] = turned(start["quaternion_xyzw"], share * turn)
+        course[step]["velocity_m_s"], course[step]["spin_rad_s"] = move / (steps * dt_s), turn / (steps * dt_s)
+    return course
 
 
 class AnimatedWorld(PyBulletWorld):
