@@ -95,16 +95,16 @@ def assembled(
         place[:, i] += np.einsum("tij,j->ti", matrices(turn[:, i]), centre)
         turn[:, i] = _times(turn[:, i], axes)
     if plain:
-        notes.append(f"{_listed(plain)} sound as {default}: no rule and no property names a material")
+        notes.append(f"{default} is what {_listed(plain)} sound as: no rule and no property names a material")
     silent = [one.name for i, one in enumerate(export.objects) if not moving[i] and one.name not in materials]
     if silent:
-        notes.append(f"{_listed(silent)} never move and are silent partners; a rule with a material lets them sound")
+        notes.append(f"silent partners, as they never move: {_listed(silent)}; a rule with a material lets them sound")
     _check_apart(names, place, turn, moving)
     return Animation(export.fps, tuple(bodies), place, turn, export.gravity_m_s2, materials), tuple(notes)
 
 
 def _listed(names: Sequence[str]) -> str:
-    few = ", ".join(name[:40] for name in names[:5])
+    few = ", ".join(shown(name) for name in names[:5])
     return few + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.files import check_sr
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.records.coerce import as_number, as_path
+from sonic_bullet.records.coerce import as_number, as_path, shown
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.render import silence_notes
 from sonic_bullet.scene import RenderResult, render_scene
@@ -168,7 +168,7 @@ def _check_fall(animation: Animation) -> tuple[str, ...]:
 
 
 def _driven_notes(bodies: Sequence[AnimatedBody]) -> tuple[str, ...]:
-    names = [one.name for one in bodies if one.driven]
+    names = [shown(one.name) for one in bodies if one.driven]
     return (f"{', '.join(names[:8])} moved by hand: what it pushes is heard, not what pushes it",) if names else ()
 
 
@@ -184,7 +184,7 @@ def _noise_notes(animation: Animation) -> tuple[str, ...]:
         return ()
     return (
         f"poses are good to {noise_m * 1e6:.3g} µm: impacts below {speed:.2g} m/s ({worst[0] * 1e3:.2g} mN s of "
-        f"{worst[1]}) are not told from it and not played",
+        f"{shown(worst[1])}) are hidden in that and not played",
     )
 
 

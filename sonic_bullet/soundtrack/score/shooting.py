@@ -21,6 +21,7 @@ import numpy as np
 from sonic_bullet.listener.animated import PoseStage, Shot, rotation
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.impulse_fit import _whitening
 
 POSE_M, SPEED_M_S = 1e-4, 3e-2
 """σ_x, σ_v: a pose is believed to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
@@ -64,21 +65,73 @@ class Shooting:
         lag = 0.5 * (substeps + 1) / substeps / animation.fps
         self._prior[self._free, :3] -= lag * animation.gravity_m_s2
         self._trust_m_s = FIRST_SPEED_M_S
-        self.left_m_s: list[Array] = []
 
     def steps(self, progress: Callable[[float], None] | None = None) -> list[tuple[Array, Array]]:
         """MOTION (b,) and loaded RAW rows of each step."""
         found: list[tuple[Array, Array]] = []
+        before: Shot | None = None
+        owed = np.zeros_like(self._prior)
         for k in range(len(self._motion) - 1):
             best = self._searched(k)
-            shot = self._shot(k, best.speed, best.restitution, polled=True).shot
-            found += list(zip(shot.motion[:-1], shot.raw, strict=True))
-            self.left_m_s.append(best.speed - self._prior)
+            if before is not None:
+                missing = best.speed - self._prior
+                found += self._corrected(before, owed + missing)
+                owed = np.where(before.touching.any(axis=1)[:, None], 0, missing)
+            before = shot = self._shot(k, best.speed, best.restitution, polled=True).shot
             last = shot.motion[-1]
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
             self._trust_m_s = SPEED_M_S
             if progress is not None:
                 progress((k + 1) / len(self._motion))
+        return found + self._corrected(before, owed) if before is not None else found
+
+    def _corrected(self, shot: Shot, missing: Array) -> list[tuple[Array, Array]]:
+        """A frame's steps with its impulses scaled: what speed (b, 6) the next frame began with beyond that with which
+        this one ended, its touches gave too, each by a share of its own.
+        """
+        from scipy.optimize import lsq_linear
+
+        strikes = self._strikes(shot)
+        if not strikes:
+            return list(zip(shot.motion[:-1], shot.raw, strict=True))
+        whiten = _whitening(self._animation, shot.motion[-1])
+        mass = np.array([one.mass_kg for one in self._animation.bodies])
+        sure = 1 / (np.sqrt(np.maximum(mass, 1e-12)) * SPEED_M_S)
+        matrix = np.zeros((len(mass), 6, len(strikes)))
+        for column, rows in enumerate(strikes.values()):
+            for number, row in rows:
+                at, raw = shot.motion[number], shot.raw[number][row : row + 1]
+                force = raw["normal"] * raw["force_n"][:, None]
+                force = force + raw["tangent_1"] * raw["friction_1_n"][:, None]
+                force = force + raw["tangent_2"] * raw["friction_2_n"][:, None]
+                for sign, who, point in ((1, "body_a", "point_a_m"), (-1, "body_b", "point_b_m")):
+                    i = int(self._stage.rows(raw[who])[0])
+                    arm = raw[point] - at["position_m"][i]
+                    impulse = sign * self._step_s * np.concatenate([force, np.cross(arm, force)], axis=1)[0]
+                    matrix[i, :, column] += sure[i] * whiten[i] @ impulse
+        free = self._free
+        inverse = np.linalg.inv(whiten[free])  # whitened momentum is the root of mass and inertia times speed
+        right = sure[free, None] * np.einsum("bij,bj->bi", np.swapaxes(inverse, 1, 2), missing[free])
+        whole = np.concatenate([matrix[free].reshape(-1, len(strikes)), np.eye(len(strikes))])
+        share = lsq_linear(whole, np.concatenate([right.ravel(), np.zeros(len(strikes))]), bounds=(-1, np.inf)).x
+        raws = [raw.copy() for raw in shot.raw]
+        for rows, more in zip(strikes.values(), share.tolist(), strict=True):
+            for number, row in rows:
+                for name in ("force_n", "friction_1_n", "friction_2_n"):
+                    raws[number][name][row] *= 1 + more
+        return list(zip(shot.motion[:-1], raws, strict=True))
+
+    def _strikes(self, shot: Shot) -> dict[tuple[int, int, int], list[tuple[int, int]]]:
+        """(step, row) of the loaded places of a pair in steps without a pause, by pair and first step."""
+        found: dict[tuple[int, int, int], list[tuple[int, int]]] = {}
+        last: dict[tuple[int, int], tuple[int, int]] = {}  # first step, and latest, of a pair
+        for number, raw in enumerate(shot.raw):
+            for row, (a, b, force) in enumerate(zip(raw["body_a"], raw["body_b"], raw["force_n"], strict=True)):
+                if force > 0:
+                    first, latest = last.get((a, b), (number, number))
+                    first = first if number - latest <= 1 else number
+                    last[a, b] = first, number
+                    found.setdefault((int(a), int(b), first), []).append((number, row))
         return found
 
     def _shot(self, k: int, speed: Array, restitution: Array, *, polled: bool = False) -> _Try:
