@@ -186,7 +186,7 @@ class FilmWriter:
             self.partial.close()
             raise
         if pictures is None:
-            pictures = math.ceil(sound.shape[1] * fps / self.sr)
+            pictures = math.ceil((sound.shape[1] - Fraction(1, 2)) * fps / self.sr)  # the inverse of `samples_of`
         self._lead = 0 if container == "matroska" else lead_of(self.codec, samples_of(pictures, fps, self.sr))
         self._ahead, self._blocks = CODECS[self.codec].delay + self._lead, 0
 

@@ -58,7 +58,7 @@ def bounce_m(time_s: Array, drop_m: float, restitution: float, gravity: float = 
 
 @dataclass(frozen=True)
 class Keys:
-    """Poses at `fps`. position_m (t, 3), quaternion_xyzw (t, 4): of the origins of meshes; extras: custom properties."""
+    """Poses at `fps`. position_m (t, 3), quaternion_xyzw (t, 4): of meshes' origins; extras: custom properties."""
 
     fps: float
     mesh: Mapping[str, tuple[Array, Array]]
