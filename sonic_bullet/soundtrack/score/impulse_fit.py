@@ -146,7 +146,7 @@ def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage
     out["tangent_1"], out["tangent_2"] = _tangents(raw["normal"])
     mu = friction[a] * friction[b]
     arms = [raw[point] - motion["position_m"][i] for i, point in ((a, "point_a_m"), (b, "point_b_m"))]
-    whiten = _whitening(animation, motion)
+    whiten = whitening(animation, motion)
     for rows in _components(a, b, movable, free):
         bodies = sorted({int(x) for x in (*a[rows], *b[rows]) if movable[x]})
         # who is driven tells of forces only where nobody free does
@@ -178,7 +178,7 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
     return first, np.cross(normal, first)
 
 
-def _whitening(animation: Animation, motion: Array) -> Array:
+def whitening(animation: Animation, motion: Array) -> Array:
     """(b, 6, 6) inverse square roots of mass and inertia in the world's axes; 0 for who has none."""
     frame = matrices(motion["quaternion_xyzw"])
     found = np.zeros((len(animation.bodies), 6, 6))

@@ -21,7 +21,7 @@ import numpy as np
 from sonic_bullet.listener.animated import PoseStage, Shot, rotation
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
-from sonic_bullet.soundtrack.score.impulse_fit import _whitening
+from sonic_bullet.soundtrack.score.impulse_fit import whitening
 
 POSE_M, SPEED_M_S = 1e-4, 3e-2
 """σ_x, σ_v: a pose is believed to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
@@ -76,7 +76,7 @@ class Shooting:
             if before is not None:
                 missing = best.speed - self._prior
                 found += self._corrected(before, owed + missing)
-                owed = np.where(before.touching.any(axis=1)[:, None], 0, missing)
+                owed = np.where(np.any(before.touching, axis=1, keepdims=True), 0.0, missing)
             before = shot = self._shot(k, best.speed, best.restitution, polled=True).shot
             last = shot.motion[-1]
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
@@ -94,9 +94,9 @@ class Shooting:
         strikes = self._strikes(shot)
         if not strikes:
             return list(zip(shot.motion[:-1], shot.raw, strict=True))
-        whiten = _whitening(self._animation, shot.motion[-1])
+        whiten = whitening(self._animation, shot.motion[-1])
         mass = np.array([one.mass_kg for one in self._animation.bodies])
-        sure = 1 / (np.sqrt(np.maximum(mass, 1e-12)) * SPEED_M_S)
+        trust = 1 / (np.sqrt(np.maximum(mass, 1e-12)) * SPEED_M_S)
         matrix = np.zeros((len(mass), 6, len(strikes)))
         for column, rows in enumerate(strikes.values()):
             for number, row in rows:
@@ -108,10 +108,10 @@ class Shooting:
                     i = int(self._stage.rows(raw[who])[0])
                     arm = raw[point] - at["position_m"][i]
                     impulse = sign * self._step_s * np.concatenate([force, np.cross(arm, force)], axis=1)[0]
-                    matrix[i, :, column] += sure[i] * whiten[i] @ impulse
+                    matrix[i, :, column] += trust[i] * whiten[i] @ impulse
         free = self._free
         inverse = np.linalg.inv(whiten[free])  # whitened momentum is the root of mass and inertia times speed
-        right = sure[free, None] * np.einsum("bij,bj->bi", np.swapaxes(inverse, 1, 2), missing[free])
+        right = trust[free, None] * np.einsum("bij,bj->bi", np.swapaxes(inverse, 1, 2), missing[free])
         whole = np.concatenate([matrix[free].reshape(-1, len(strikes)), np.eye(len(strikes))])
         share = lsq_linear(whole, np.concatenate([right.ravel(), np.zeros(len(strikes))]), bounds=(-1, np.inf)).x
         raws = [raw.copy() for raw in shot.raw]
