@@ -71,10 +71,12 @@ def at_rate(animation: Animation, every: int, *, single: bool = False) -> Animat
 def scored(animation: Animation) -> ContactLog:
     """The log that `score` makes of it."""
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
-    from sonic_bullet.soundtrack.score.method import found_steps
+    from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
     stage = AnimatedStage(animation.bodies, animation.gravity_m_s2)
-    steps, dt_s = found_steps(animation, stage)
+    steps: list[Any] = []
+    find_steps(animation, stage, steps)
+    dt_s = 1 / animation.fps / substeps_of(animation.fps)
     listener = sb.attach(AnimatedWorld(stage, steps, dt_s), sr=SR)
     for body in stage.ids:
         listener.add(body, material=SOLID, model=box_model((0.05, 0.05, 0.05), (3000.0,)))

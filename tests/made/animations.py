@@ -16,6 +16,7 @@ from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.export import Export, ExportedObject
 
 EDGES_M = (0.08, 0.05, 0.03)
 RADIUS_M, MASS_KG = 0.02, 0.1
@@ -95,6 +96,15 @@ def dropped(fps: int = 240, seconds: float = 0.6) -> Keys:
         {"floor": np.broadcast_to(still, (len(kept), 3)), "box": np.array([p for p, _ in kept])},
         {"floor": np.broadcast_to([0.0, 0, 0, 1], (len(kept), 4)), "box": np.array([q for _, q in kept])},
     )  # fmt: skip
+
+
+def export_of(keys: Keys) -> Export:
+    """The same as a reader gives it."""
+    objects = [
+        ExportedObject(name, keys.position_m[name], keys.quaternion_xyzw[name], mesh)
+        for name, mesh in keys.mesh.items()
+    ]
+    return Export(keys.fps, tuple(objects), np.array([0, 0, -9.81]))
 
 
 def y_up(vector: Array) -> Array:

@@ -23,7 +23,7 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation, matrices
-from sonic_bullet.soundtrack.score.impulse_fit import fitted_steps
+from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 
 DRIVEN_STEPS = 4
 """Steps in a row that a hand moves a body at least: the shortest load that the run time takes for lasting, too."""
@@ -107,7 +107,8 @@ def scored_by_hand(
     )  # fmt: skip
     known = [_given(step, len(bodies), driven) for step in steps]
     with AnimatedStage(bodies, animation.gravity_m_s2) as stage:
-        found = fitted_steps(animation, stage, stage.reach_m, progress, known=np.stack(known), only=driven)
+        found: list[tuple[Array, Array]] = []
+        fit_steps(animation, stage, found, progress, known=np.stack(known), only=driven)
         world = AnimatedWorld(stage, found, steps[0].dt_s)
         for body in stage.ids:
             world.add(body)

@@ -48,12 +48,25 @@ def fall_m_s2(animation: Animation) -> float | None:
     return float(np.quantile(np.linalg.norm(accelerations(animation)[:-1], axis=2)[steady], 0.9))
 
 
-def pose_noise_m(animation: Animation) -> float | None:
-    """Standard deviation of a coordinate of the poses, from how much steady falls differ; None where nobody falls."""
-    steady = _steady(animation)
-    if steady.sum() < LEAST_FRAMES:
+def alone(animation: Animation, stage: PoseStage) -> Array:
+    """(t, b) who is near nobody."""
+    motion = animation.poses()
+    found = np.zeros(motion.shape, bool)
+    for k in range(len(motion)):
+        low, high = stage.boxes(motion[k])
+        meet = ((low[:, None] - NEAR_M <= high[None]) & (high[:, None] + NEAR_M >= low[None])).all(axis=2)
+        found[k] = meet.sum(axis=1) == 1
+    return found
+
+
+def pose_noise_m(animation: Animation, apart: Array) -> float | None:
+    """Standard deviation of a coordinate of the poses, from the third differences of flights, in which a parabola has
+    none; None where nobody flies. apart (t, b): who is near nobody.
+    """
+    flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3] & animation.free & animation.moving
+    if flies.sum() < LEAST_FRAMES:
         return None
-    third = np.diff(animation.position_m, 3, axis=0)[steady]  # of white noise √20 σ
+    third = np.diff(animation.position_m, 3, axis=0)[flies]  # of white noise √20 σ
     return float(MAD * np.median(np.abs(third)) / np.sqrt(20))
 
 
@@ -62,21 +75,15 @@ def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
     return SIGMAS * float(np.sqrt(6)) * mass_kg * noise_m * fps
 
 
-def driven_bodies(animation: Animation, stage: PoseStage) -> Array:
+def driven_bodies(animation: Animation, apart: Array) -> Array:
     """(b,) who is moved by hand though nobody says so: in most frames in which it touches nothing it does not fall."""
-    motion, many = animation.poses(), len(animation.bodies)
     pull = float(np.linalg.norm(animation.gravity_m_s2))
     found = np.array([one.driven for one in animation.bodies], bool)
     if pull == 0:
         return found
     wrong = np.linalg.norm(accelerations(animation) - animation.gravity_m_s2, axis=2) > HANDED * pull
-    alone = np.zeros((len(animation), many), bool)
-    for k in range(len(animation)):
-        low, high = stage.boxes(motion[k])
-        meet = ((low[:, None] - NEAR_M <= high[None]) & (high[:, None] + NEAR_M >= low[None])).all(axis=2)
-        alone[k] = meet.sum(axis=1) == 1
-    alone = alone[2:] & alone[1:-1] & alone[:-2]
+    flies = apart[2:] & apart[1:-1] & apart[:-2]
     moving = animation.moving & (np.array([one.mass_kg for one in animation.bodies]) > 0)
-    enough = alone.sum(axis=0) >= LEAST_FRAMES
-    share = (wrong & alone).sum(axis=0) / np.maximum(alone.sum(axis=0), 1)
+    enough = flies.sum(axis=0) >= LEAST_FRAMES
+    share = (wrong & flies).sum(axis=0) / np.maximum(flies.sum(axis=0), 1)
     return np.asarray(found | (moving & enough & (share > HANDED)))

@@ -58,23 +58,22 @@ def _halfway(turn: Array, whole_rad: Array) -> Array:
     return turned(turn.reshape(-1, 4), whole_rad.reshape(-1, 3) / 2).reshape(shape)
 
 
-def fitted_steps(
+def fit_steps(
     animation: Animation,
     stage: PoseStage,
-    reach_m: Array,
+    found: list[tuple[Array, Array]],
     progress: Callable[[float], None] | None = None,
     *,
     known: Array | float = 0.0,
     only: Set[int] | None = None,
-) -> list[tuple[Array, Array]]:
-    """MOTION (b,) and loaded RAW rows of each frame but the last. reach_m (b,): largest distance of a body's points
-    from its centre of mass. known (t, b, 6): momentum from contacts that are known already; only: of pairs with one of
-    these bodies, None: of all.
+) -> None:
+    """Append MOTION (b,) and loaded RAW rows of each frame but the last. known (t, b, 6): momentum from contacts that
+    are known already; only: of pairs with one of these bodies, None: of all.
     """
+    reach_m = stage.reach_m
     motion, step_s = animation.poses(), 1 / animation.fps
     change = momentum_changes(animation, motion) - known
     static = ~animation.moving
-    steps: list[tuple[Array, Array]] = []
     for k in range(len(animation) - 1):
         raw = NO_RAW
         if k:
@@ -87,10 +86,9 @@ def fitted_steps(
             raw = stage.closest(motion[k], pairs, far) if pairs else NO_RAW
             raw = raw[_can_touch(raw, motion[k], after, step_s, stage)]
             raw = loaded(animation, motion[k], raw, change[k], stage)
-        steps.append((motion[k], raw))
+        found.append((motion[k], raw))
         if progress is not None:
             progress((k + 1) / len(animation))
-    return steps
 
 
 def _speeds(motion: Array, reach_m: Array) -> Array:

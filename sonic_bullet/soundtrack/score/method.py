@@ -1,4 +1,4 @@
-"""Which way the contacts of an animation are found, and the steps that the run time is given."""
+"""How the contacts of an animation are found, and the steps that the run time is given."""
 
 from __future__ import annotations
 
@@ -8,18 +8,26 @@ from math import ceil
 from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
-from sonic_bullet.soundtrack.score.impulse_fit import fitted_steps
+from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 from sonic_bullet.soundtrack.score.shooting import Shooting
 
 FIT_FROM_FPS = 119.0
 STEP_HZ = 240.0
 
 
-def found_steps(
-    animation: Animation, stage: PoseStage, progress: Callable[[float], None] | None = None
-) -> tuple[list[tuple[Array, Array]], float]:
-    """MOTION (b,) at the start of each step with its loaded RAW rows, and the length of a step in s."""
+def substeps_of(fps: float) -> int:
+    """Steps to a frame."""
+    return 1 if fps >= FIT_FROM_FPS else ceil(STEP_HZ / fps - 1e-9)
+
+
+def find_steps(
+    animation: Animation,
+    stage: PoseStage,
+    found: list[tuple[Array, Array]],
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Append MOTION (b,) at the start of each step with its loaded RAW rows: stopped, it leaves those so far."""
     if animation.fps >= FIT_FROM_FPS:
-        return fitted_steps(animation, stage, stage.reach_m, progress), 1 / animation.fps
-    substeps = ceil(STEP_HZ / animation.fps - 1e-9)
-    return Shooting(animation, stage, substeps).steps(progress), 1 / animation.fps / substeps
+        fit_steps(animation, stage, found, progress)
+    else:
+        Shooting(animation, stage, substeps_of(animation.fps)).find_steps(found, progress)

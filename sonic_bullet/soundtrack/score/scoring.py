@@ -26,8 +26,8 @@ from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, Rule, assembled
-from sonic_bullet.soundtrack.score.flight import FALL_RANGE, driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
-from sonic_bullet.soundtrack.score.method import found_steps
+from sonic_bullet.soundtrack.score.flight import FALL_RANGE, alone, driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
+from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
 ENDINGS = (".glb", ".gltf", ".json", ".npz")
 MICROPHONE = (0.0, -1.0, 0.5)
@@ -86,7 +86,8 @@ def score_animation(
     say = say or (lambda text: None)
     half = (lambda share: progress(0.7 * share)) if progress is not None else None
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
-        driven = driven_bodies(animation, stage)
+        apart = alone(animation, stage)
+        driven = driven_bodies(animation, apart)
         if driven.any():
             bodies = tuple(
                 replace(x, driven=x.driven or bool(d)) for x, d in zip(animation.bodies, driven, strict=True)
@@ -95,8 +96,14 @@ def score_animation(
             stage.bodies = bodies
             stage.held |= driven
         say("who touches whom")
-        steps, dt_s = found_steps(animation, stage, half)
-        notes += _driven_notes(animation.bodies) + _noise_notes(animation) + _deep_notes(steps)
+        steps: list[tuple[Array, Array]] = []
+        stopped: KeyboardInterrupt | None = None
+        try:
+            find_steps(animation, stage, steps, half)
+        except KeyboardInterrupt as error:  # those so far are played and kept
+            stopped = error
+        dt_s = 1 / animation.fps / substeps_of(animation.fps)
+        notes += _driven_notes(animation.bodies) + _noise_notes(animation, apart) + _deep_notes(steps)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
             listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=seed, microphone=microphones)
@@ -110,6 +117,9 @@ def score_animation(
             except (SonicBulletError, KeyboardInterrupt) as error:
                 error.partial = _result(listener, notes)  # type: ignore[union-attr]
                 raise
+        if stopped is not None:
+            stopped.partial = _result(listener, notes)  # type: ignore[attr-defined]
+            raise stopped
         return _result(listener, notes)
 
 
@@ -172,9 +182,9 @@ def _driven_notes(bodies: Sequence[AnimatedBody]) -> tuple[str, ...]:
     return (f"{', '.join(names[:8])} moved by hand: what it pushes is heard, not what pushes it",) if names else ()
 
 
-def _noise_notes(animation: Animation) -> tuple[str, ...]:
+def _noise_notes(animation: Animation, apart: Array) -> tuple[str, ...]:
     """What noise in the poses hides, where it is more than a light touch."""
-    noise_m = pose_noise_m(animation)
+    noise_m = pose_noise_m(animation, apart)
     if noise_m is None:
         return ()
     hidden = [(hidden_n_s(one.mass_kg, noise_m, animation.fps), one.name) for one in animation.bodies if one.mass_kg]

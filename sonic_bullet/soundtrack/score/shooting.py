@@ -66,9 +66,8 @@ class Shooting:
         self._prior[self._free, :3] -= lag * animation.gravity_m_s2
         self._trust_m_s = FIRST_SPEED_M_S
 
-    def steps(self, progress: Callable[[float], None] | None = None) -> list[tuple[Array, Array]]:
-        """MOTION (b,) and loaded RAW rows of each step."""
-        found: list[tuple[Array, Array]] = []
+    def find_steps(self, found: list[tuple[Array, Array]], progress: Callable[[float], None] | None = None) -> None:
+        """Append MOTION (b,) and loaded RAW rows of each step."""
         before: Shot | None = None
         owed = np.zeros_like(self._prior)
         for k in range(len(self._motion) - 1):
@@ -83,7 +82,8 @@ class Shooting:
             self._trust_m_s = SPEED_M_S
             if progress is not None:
                 progress((k + 1) / len(self._motion))
-        return found + self._corrected(before, owed) if before is not None else found
+        if before is not None:
+            found += self._corrected(before, owed)
 
     def _corrected(self, shot: Shot, missing: Array) -> list[tuple[Array, Array]]:
         """A frame's steps with its impulses scaled: what speed (b, 6) the next frame began with beyond that with which

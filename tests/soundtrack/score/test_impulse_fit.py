@@ -9,7 +9,7 @@ from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.soundtrack.score.animation import Animation
-from sonic_bullet.soundtrack.score.impulse_fit import fitted_steps, momentum_changes
+from sonic_bullet.soundtrack.score.impulse_fit import fit_steps, momentum_changes
 from tests.made.animations import MASS_KG, RADIUS_M, ball_animation, ball_body, bounce_m
 
 FPS, GRAVITY = 240.0, 9.81
@@ -22,7 +22,8 @@ def wrench(animation: Animation) -> Array:
 def impulses(animation: Animation) -> Array:
     """(t,) normal impulse that is found at each frame, all places together."""
     with AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
-        steps = fitted_steps(animation, stage, stage.reach_m)
+        steps: list[tuple[Array, Array]] = []
+        fit_steps(animation, stage, steps)
     return np.array([raw["force_n"].sum() for _, raw in steps]) / animation.fps
 
 

@@ -108,7 +108,7 @@ def test_a_fall_tells_gravity_and_the_noise_of_its_poses() -> None:
     place = still.position_m.copy()
     place[:, 1] += noise_m * rng.standard_normal((400, 3))
     noisy = replace(still, position_m=place)
-    found = pose_noise_m(noisy)
+    found = pose_noise_m(noisy, np.ones((400, 2), bool))
     assert found == pytest.approx(noise_m, rel=0.25)
     assert hidden_n_s(0.1, noise_m, 240) == pytest.approx(5 * np.sqrt(6) * 0.1 * noise_m * 240)
 

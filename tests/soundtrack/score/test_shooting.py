@@ -8,7 +8,7 @@ import pytest
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage
 from sonic_bullet.soundtrack.score.animation import Animation
-from sonic_bullet.soundtrack.score.method import found_steps
+from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 from tests.made.animations import MASS_KG, RADIUS_M, ball_animation, bounce_m
 
 GRAVITY, DROP_M, REBOUND = 9.81, 0.08, 0.7
@@ -17,7 +17,9 @@ GRAVITY, DROP_M, REBOUND = 9.81, 0.08, 0.7
 def found(animation: Animation) -> tuple[np.ndarray, np.ndarray]:
     """Times and normal impulses of steps with a load."""
     with AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
-        steps, step_s = found_steps(animation, stage)
+        steps: list[tuple[np.ndarray, np.ndarray]] = []
+        find_steps(animation, stage, steps)
+    step_s = 1 / animation.fps / substeps_of(animation.fps)
     impulse = np.array([raw["force_n"].sum() for _, raw in steps]) * step_s
     kept = impulse > 0
     return np.arange(len(steps))[kept] * step_s, impulse[kept]
