@@ -71,11 +71,13 @@ def at_rate(animation: Animation, every: int, *, single: bool = False) -> Animat
 def scored(animation: Animation) -> ContactLog:
     """The log that `score` makes of it."""
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
+    from sonic_bullet.soundtrack.score.flight import alone, hidden_n_s, pose_noise_m
     from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
     stage = AnimatedStage(animation.bodies, animation.gravity_m_s2)
     steps: list[Any] = []
-    find_steps(animation, stage, steps)
+    noise_m = pose_noise_m(animation, alone(animation, stage)) or 0.0
+    find_steps(animation, stage, steps, hidden_m_s=hidden_n_s(1.0, noise_m, animation.fps))
     dt_s = 1 / animation.fps / substeps_of(animation.fps)
     listener = sb.attach(AnimatedWorld(stage, steps, dt_s), sr=SR)
     for body in stage.ids:

@@ -32,9 +32,10 @@ EVEN = 1e-4
 STIFF = 1e9
 
 
-def momentum_changes(animation: Animation, motion: Array) -> Array:
+def momentum_changes(animation: Animation, motion: Array, hidden_m_s: float = 0.0) -> Array:
     """(t, b, 6) linear and angular momentum (world, about the centre of mass) that contacts gave round each frame, in
-    N·s and N·m·s; zero in the first and last, of which nothing is known, and for who is not heavy.
+    N·s and N·m·s; zero in the first and last, of which nothing is known, and for who is not heavy. Who changes its
+    speed by less than hidden_m_s, and its spin by what is no more at its radius of gyration, changes neither.
     """
     mass = np.array([one.mass_kg for one in animation.bodies])
     step_s = 1 / animation.fps
@@ -42,13 +43,17 @@ def momentum_changes(animation: Animation, motion: Array) -> Array:
     velocity = motion["velocity_m_s"]
     change = velocity[2:] - velocity[1:-1]
     weight = np.where(np.array([one.driven for one in animation.bodies])[:, None], 0.0, animation.gravity_m_s2)
-    found[1:-1, :, :3] = mass[:, None] * (change - weight * step_s)
     inertia = np.stack([one.inertia_kg_m2 for one in animation.bodies])
+    gyration_m = np.sqrt(inertia.sum(axis=1) / (2 * np.maximum(mass, 1e-12)))
+    rim_m_s = gyration_m * np.linalg.norm(np.diff(motion["spin_rad_s"][1:], axis=0), axis=2)
+    still = np.maximum(np.linalg.norm(change, axis=2), rim_m_s) < hidden_m_s
+    change = np.where(still[..., None], 0.0, change)
+    found[1:-1, :, :3] = mass[:, None] * (change - weight * step_s)
     spin, turn = motion["spin_rad_s"][1:], motion["quaternion_xyzw"]
     half = _halfway(turn[:-1], spin * step_s)
     frame = matrices(half)
     momentum = np.einsum("tbij,bj,tbkj,tbk->tbi", frame, inertia, frame, spin)
-    found[1:-1, :, 3:] = momentum[1:] - momentum[:-1]
+    found[1:-1, :, 3:] = np.where(still[..., None], 0.0, momentum[1:] - momentum[:-1])
     found[:, mass == 0] = 0
     return found
 
@@ -66,13 +71,15 @@ def fit_steps(
     *,
     known: Array | float = 0.0,
     only: Set[int] | None = None,
+    hidden_m_s: float = 0.0,
 ) -> None:
     """Append MOTION (b,) and loaded RAW rows of each frame but the last. known (t, b, 6): momentum from contacts that
-    are known already; only: of pairs with one of these bodies, None: of all.
+    are known already; only: of pairs with one of these bodies, None: of all; hidden_m_s: a change of speed below that
+    is none, but noise in the poses.
     """
     reach_m = stage.reach_m
     motion, step_s = animation.poses(), 1 / animation.fps
-    change = momentum_changes(animation, motion) - known
+    change = momentum_changes(animation, motion, hidden_m_s) - known
     static = ~animation.moving
     for k in range(len(animation) - 1):
         raw = NO_RAW

@@ -25,9 +25,14 @@ def find_steps(
     stage: PoseStage,
     found: list[tuple[Array, Array]],
     progress: Callable[[float], None] | None = None,
+    *,
+    hidden_m_s: float = 0.0,
 ) -> None:
-    """Append MOTION (b,) at the start of each step with its loaded RAW rows: stopped, it leaves those so far."""
+    """Append MOTION (b,) at the start of each step with its loaded RAW rows: stopped, it leaves those so far.
+
+    hidden_m_s: the change of speed from frame to frame that is not told from noise in the poses.
+    """
     if animation.fps >= FIT_FROM_FPS:
-        fit_steps(animation, stage, found, progress)
+        fit_steps(animation, stage, found, progress, hidden_m_s=hidden_m_s)
     else:
         Shooting(animation, stage, substeps_of(animation.fps)).find_steps(found, progress)

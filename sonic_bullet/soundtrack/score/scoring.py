@@ -95,15 +95,16 @@ def score_animation(
             animation = replace(animation, bodies=bodies)
             stage.bodies = bodies
             stage.held |= driven
+        noise_m = pose_noise_m(animation, apart)
         say("who touches whom")
         steps: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
         try:
-            find_steps(animation, stage, steps, half)
+            find_steps(animation, stage, steps, half, hidden_m_s=hidden_n_s(1.0, noise_m or 0.0, animation.fps))
         except KeyboardInterrupt as error:  # those so far are played and kept
             stopped = error
         dt_s = 1 / animation.fps / substeps_of(animation.fps)
-        notes += _driven_notes(animation.bodies) + _noise_notes(animation, apart) + _deep_notes(steps)
+        notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m) + _deep_notes(steps)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
             listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=seed, microphone=microphones)
@@ -182,9 +183,8 @@ def _driven_notes(bodies: Sequence[AnimatedBody]) -> tuple[str, ...]:
     return (f"{', '.join(names[:8])} moved by hand: what it pushes is heard, not what pushes it",) if names else ()
 
 
-def _noise_notes(animation: Animation, apart: Array) -> tuple[str, ...]:
+def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
     """What noise in the poses hides, where it is more than a light touch."""
-    noise_m = pose_noise_m(animation, apart)
     if noise_m is None:
         return ()
     hidden = [(hidden_n_s(one.mass_kg, noise_m, animation.fps), one.name) for one in animation.bodies if one.mass_kg]

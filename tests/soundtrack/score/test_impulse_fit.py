@@ -88,3 +88,14 @@ def test_who_is_driven_is_pushed_and_tells_nothing() -> None:
     place = np.stack([0 * time_s, 0 * time_s, 1 + np.sin(9 * time_s)], axis=1)[:, None]
     animation = Animation(FPS, (body,), place, np.broadcast_to([0.0, 0, 0, 1], (20, 1, 4)))
     assert not impulses(animation).any()
+
+
+def test_noise_that_is_known_does_not_rattle_what_stands() -> None:
+    """Poses of a ball that stands, good to 20 µm: it is carried by its weight; unknown, the noise would shake it."""
+    rng, sigma_m = np.random.default_rng(3), 2e-5
+    animation = ball_animation(RADIUS_M + sigma_m * rng.standard_normal(60), FPS)
+    motion = animation.poses()
+    weight = MASS_KG * GRAVITY / FPS
+    known = momentum_changes(animation, motion, 5 * np.sqrt(6) * sigma_m * FPS)[1:-1, 1, 2]
+    assert known == pytest.approx(np.full(58, weight), rel=1e-6)
+    assert momentum_changes(animation, motion)[1:-1, 1, 2].std() > 0.2 * weight
