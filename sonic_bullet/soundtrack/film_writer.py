@@ -89,6 +89,11 @@ def samples_of(pictures: int, fps: Fraction, sr: int) -> int:
     return math.floor(pictures * sr / fps + Fraction(1, 2))
 
 
+def pictures_of(samples: int, fps: Fraction, sr: int) -> int:
+    """The fewest pictures that last so many samples: the inverse of `samples_of`."""
+    return math.ceil((samples - Fraction(1, 2)) * fps / sr)
+
+
 def lead_of(codec: str, samples: int) -> int:
     """Silent samples before time 0 with which delay, lead and sound are whole blocks."""
     chosen = CODECS[codec]
@@ -186,7 +191,7 @@ class FilmWriter:
             self.partial.close()
             raise
         if pictures is None:
-            pictures = math.ceil((sound.shape[1] - Fraction(1, 2)) * fps / self.sr)  # the inverse of `samples_of`
+            pictures = pictures_of(sound.shape[1], fps, self.sr)
         self._lead = 0 if container == "matroska" else lead_of(self.codec, samples_of(pictures, fps, self.sr))
         self._ahead, self._blocks = CODECS[self.codec].delay + self._lead, 0
 

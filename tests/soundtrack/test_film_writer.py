@@ -17,6 +17,7 @@ from sonic_bullet.soundtrack.film_writer import (
     as_fps,
     check_film_output,
     check_size,
+    pictures_of,
     samples_of,
     write_film,
 )
@@ -162,3 +163,11 @@ def test_a_film_that_is_stopped_is_a_film_of_what_was_finished(tmp_path: Path, e
 
 def test_every_codec_is_tried() -> None:
     assert {codec for _, codec in FORMATS} == set(CODECS)
+
+
+@pytest.mark.parametrize("fps", ["24", "25", "30000/1001", "30", "60", "240"])
+def test_as_many_pictures_as_their_samples_last(fps: str) -> None:
+    rate = Fraction(fps)
+    for count in (*range(1, 60), 17_988, 35_999, 144_007):
+        assert pictures_of(samples_of(count, rate, SR), rate, SR) == count
+        assert pictures_of(samples_of(count, rate, SR) + 1, rate, SR) == count + 1
