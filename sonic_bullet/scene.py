@@ -75,13 +75,15 @@ def render_scene(
     residual: bool = True,
     progress: Progress | None = None,
     say: Say | None = None,
+    at_end: Callable[[Listener], object] | None = None,
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the
     bodies of a plain script. residual: whether what materials sound beside their modes is sounded. progress is given
-    the share done, say what is being computed before the first step (modes: seconds a body). Raises SonicBulletError;
-    where the scene broke or was interrupted under way, the exception carries what was rendered so far as ``partial``.
+    the share done, say what is being computed before the first step (modes: seconds a body). at_end: is shown the
+    listener while its world is still there. Raises SonicBulletError; where the scene broke or was interrupted under
+    way, the exception carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -96,6 +98,8 @@ def render_scene(
         try:
             with interrupts():
                 notes = stage.run(seconds, progress, say)
+                if at_end is not None:
+                    at_end(stage.need_listener())
         except (SonicBulletError, KeyboardInterrupt) as error:
             with suppress(SonicBulletError):  # a script's own listener may keep nothing
                 error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]

@@ -11,11 +11,12 @@ import time
 from multiprocessing import active_children, get_context
 from pathlib import Path
 
+import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import sonic_bullet.parallel as module
-from sonic_bullet.parallel import one_thread, parallel_map, said_here
+from sonic_bullet.parallel import arrays_in_order, one_thread, parallel_map, said_here
 from sonic_bullet.records.errors import AudioError
 
 TWO = module._can_fork()
@@ -179,3 +180,46 @@ def test_what_the_other_process_says_is_said_here() -> None:
     assert sorted(line.split()[0] for line in heard) == [str(number) for number in range(6)]
     if module._can_fork():
         assert len({line.split()[2] for line in heard}) == 2
+
+
+def test_arrays_come_in_order_whoever_makes_them() -> None:
+    def make(number: int) -> np.ndarray:
+        time.sleep(0.002)
+        return np.array([number, os.getpid()])
+
+    made = list(arrays_in_order(make, 60, (2,), np.int64))
+    assert [int(one[0]) for one in made] == list(range(60))
+    if module._can_fork():
+        assert len({int(one[1]) for one in made}) == 2
+    assert [int(one[0]) for one in arrays_in_order(make, 1, (2,), np.int64)] == [0]
+    assert list(arrays_in_order(make, 0, (2,), np.int64)) == []
+
+
+def test_arrays_that_the_other_process_cannot_make_are_made_here_and_raise_here() -> None:
+    here = os.getpid()
+
+    def make(number: int) -> np.ndarray:
+        time.sleep(0.002)
+        if os.getpid() != here and number > 10:
+            raise ValueError
+        return np.array([number])
+
+    assert [int(one[0]) for one in arrays_in_order(make, 40, (1,), np.int64)] == list(range(40))
+
+    def fail(number: int) -> np.ndarray:
+        if number == 20:
+            raise ValueError("twenty")
+        return np.array([number])
+
+    made = []
+    with pytest.raises(ValueError, match="twenty"):
+        for one in arrays_in_order(fail, 40, (1,), np.int64):
+            made.append(int(one[0]))
+    assert made == list(range(len(made))) and len(made) <= 20
+
+
+def test_who_stops_reading_leaves_no_process() -> None:
+    reading = arrays_in_order(lambda number: np.array([number]), 1000, (1,), np.int64)
+    assert int(next(reading)[0]) == 0
+    reading.close()
+    assert active_children() == []

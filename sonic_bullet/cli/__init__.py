@@ -2,6 +2,8 @@
 
     render SCENE.py | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
     play SCENE.py | LOG.npz   -> the same, on a sound card
+    film SCENE.py | LOG.npz   -> the same, with pictures: .mp4 .mov .mkv
+    score ANIMATION           -> a baked animation's sound and contact log
     modes MESH                -> ModalModel   -> table, JSON, npz
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
@@ -35,6 +37,9 @@ from sonic_bullet.cli.examples import (
 )
 from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
 from sonic_bullet.cli.play_command import play
+from sonic_bullet.cli.soundtrack.film_command import film
+from sonic_bullet.cli.soundtrack.score_command import score
+from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 
 DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
@@ -97,6 +102,7 @@ cli.add_command(baseline)
     default=None,
     help="What presets sound beside their modes. [default: sounded; of a log, as it was rendered]",
 )
+@soundtrack_options
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scene_commands import run_render
@@ -105,6 +111,8 @@ def render(**options: Any) -> None:
 
 
 cli.add_command(play)
+cli.add_command(film)
+cli.add_command(score)
 
 
 @cli.command(epilog=MODES_EPILOG)

@@ -13,13 +13,26 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.machine.terminal import shown_by, status
 from sonic_bullet.records.errors import FileError
 
-__all__ = ["clean_stdout", "places", "progress_bar", "quiet_stderr", "status", "table", "write_json"]
+if TYPE_CHECKING:
+    from sonic_bullet.files import AudioReport, ContactLog
+
+__all__ = [
+    "clean_stdout",
+    "described_render",
+    "places",
+    "progress_bar",
+    "quiet_stderr",
+    "status",
+    "table",
+    "write_json",
+]
 
 
 @contextmanager
@@ -164,3 +177,47 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
         return "  ".join(cells).rstrip()
 
     return "\n".join(line(row) for row in [head, *rows])
+
+
+def described_render(log: ContactLog, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:
+    """What was rendered, as JSON."""
+    return {
+        "output": report.path,
+        "format": report.format,
+        "subtype": report.subtype,
+        "sr": report.sr,
+        "channels": report.channels,
+        "frames": report.frames,
+        "seconds": report.seconds,
+        "peak_pa": report.peak_pa,
+        "rms_pa": report.rms_pa,
+        "gain_per_pa": report.gain_per_pa,
+        "clipped": report.clipped,
+        "steps": len(log.steps),
+        "contacts": len(log),
+        "bodies": _bodies(log),
+        "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in log.events],
+        "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in log.changes],
+        "engine": dict(log.engine),
+        "versions": dict(log.versions),
+        "notes": list(notes),
+    }
+
+
+def _bodies(log: ContactLog) -> list[dict[str, Any]]:
+    return [
+        {
+            "body": body.body_id,
+            "link": body.link,
+            "name": body.name.encode("utf-8", "replace").decode(),
+            "material": None if body.material is None else body.material.name,
+            "modes": None if body.model is None else body.model.mode_count,
+            "dropped": None if body.model is None else body.model.dropped,
+            "since_step": body.since_step,
+            "until_step": body.until_step,
+            "mounting": body.mounting,
+            "options": None if body.options is None else asdict(body.options),
+            "dynamics": dict(body.dynamics),
+        }
+        for body in log.bodies
+    ]

@@ -6,11 +6,20 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
+from sonic_bullet.cli.output import (
+    clean_stdout,
+    described_render,
+    places,
+    progress_bar,
+    quiet_stderr,
+    status,
+    write_json,
+)
+from sonic_bullet.cli.soundtrack.soundtrack_outputs import Soundtrack, SoundtrackWish
 from sonic_bullet.files import (
     AudioReport,
     check_audio_output,
@@ -27,6 +36,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.files.rows.spool import KeptSound
     from sonic_bullet.scene import RenderResult
+    from sonic_bullet.session import Listener
 
 DEFAULT_SR = 48_000
 
@@ -47,45 +57,56 @@ def run_render(
     seed: int | None,
     material: str | None,
     residual: bool | None,
+    **soundtrack: Any,
 ) -> None:
-    """The `render` command.
+    """The `render` command. soundtrack: options of `SoundtrackWish`.
 
     Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far.
     """
     rate = None if sr is None else check_sr(sr)
-    _check_request(scene, seconds, peak_dbfs, lufs, material)
+    check_request(scene, seconds, peak_dbfs, lufs, material)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
-    to, contacts, picture, json_to = _check_places(output, contacts, picture, json_to)
+    extras = SoundtrackWish(**soundtrack).checked(output)
+    to, contacts, picture, json_to, events_to = _check_places(output, contacts, picture, json_to, extras.events)
+    made: Soundtrack | None = None
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
-                wish = _Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
-                result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
+                wish = Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
+                result: RenderResult | _Replay = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
-            raise _with_partial(error, to, output, peak_dbfs, lufs) from error
+            raise with_partial(error, to, output, peak_dbfs, lufs) from error
         if contacts is not None:
             try:
                 write_log(contacts, result.log, models or "included")
             except SonicBulletError as error:
                 error.partial = result  # type: ignore[attr-defined]
-                raise _with_partial(error, to, output, peak_dbfs, lufs) from error
-        report = replace(_written(to, result, peak_dbfs, lufs), path=output)
+                raise with_partial(error, to, output, peak_dbfs, lufs) from error
+        try:
+            with progress_bar("stems and events") as (progress, tell):
+                made = extras.made(result.log, result.sr, events_to, progress, tell)
+        except (SonicBulletError, KeyboardInterrupt) as error:
+            error.partial = result  # type: ignore[union-attr]
+            raise with_partial(error, to, output, peak_dbfs, lufs) from error
+        report = replace(_written(to, result, peak_dbfs, lufs, made), path=output)
+        if made is not None:
+            made.write(report)
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_oversized(result.log), *_warnings(report))
-        say(_summary(report, result.log))
+        notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *_warnings(report))
+        say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, _described(result, report, notes))
+    write_json(json_to, described_render(result.log, report, notes) | (made.described if made else {}))
 
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """The `doctor` command. Raises SonicBulletError."""
     (json_to,) = places(json_to)
-    if _is_log(scene):
+    if is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
     with clean_stdout(json_to) as say:
         with quiet_stderr():
@@ -107,13 +128,15 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     )
 
 
-def _is_log(scene: str) -> bool:
+def is_log(scene: str) -> bool:
+    """Whether a scene is a contact log, by its name."""
     return Path(scene).suffix.lower() == ".npz"
 
 
-def _check_request(
+def check_request(
     scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None
 ) -> None:
+    """Raise what is wrong with what is asked of a scene or log, before anything runs."""
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
     check_levels(peak_dbfs, lufs)
@@ -123,7 +146,7 @@ def _check_request(
         raise FileError(
             f"cannot render {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz"
         )
-    if material is not None and _is_log(scene):
+    if material is not None and is_log(scene):
         raise FileError(
             "--material does not apply to a contact log, whose bodies bring theirs", "leave it out, or render the scene"
         )
@@ -133,26 +156,25 @@ def _check_request(
         load_material(material)
 
 
-def _check_places(
-    output: str, contacts: str | None, picture: str | None, json_to: str | None
-) -> tuple[str, str | None, str | None, str | None]:
+def _check_places(output: str, *others: str | None) -> tuple[str, str | None, str | None, str | None, str | None]:
     """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated.
 
     Raises FileError.
     """
     check_audio_output(output)
+    contacts, picture, _, _ = others
     if contacts is not None and not contacts.endswith(".npz"):
         raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
     if picture is not None:
         from sonic_bullet.plots.scene_plot import check_picture_output
 
         check_picture_output(picture)
-    to, *others = places(output, contacts, picture, json_to)
-    return str(to), others[0], others[1], others[2]
+    to, *found = places(output, *others)
+    return str(to), found[0], found[1], found[2], found[3]
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
+class Wish:
     """What the user asked of a render; None and empty: as the scene or the log has it."""
 
     seconds: float | None
@@ -163,9 +185,11 @@ class _Wish:
     residual: bool | None
     progress: Callable[[float], None]
     say: Callable[[str], None]
+    at_end: Callable[[Listener], object] | None = None
 
 
-def _simulated(scene: str, wish: _Wish) -> RenderResult:
+def simulated(scene: str, wish: Wish) -> RenderResult:
+    """A scene, run."""
     with quiet_stderr():
         from sonic_bullet.scene import render_scene
 
@@ -178,7 +202,7 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
         "material": wish.material,
         "residual": wish.residual is not False,
     }
-    return render_scene(scene, **asked, progress=wish.progress, say=wish.say)
+    return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,7 +215,7 @@ class _Replay:
     notes: tuple[str, ...] = ()
 
 
-def _replayed(path: str, wish: _Wish) -> _Replay:
+def replayed(path: str, wish: Wish) -> _Replay:
     """A log's sound: bit for bit the render it came from, where no option changes it."""
     import numpy as np
 
@@ -221,18 +245,21 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
     return _Replay(sound, log, rate, silence_notes(sound, log))
 
 
-def _written(output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None) -> AudioReport:
+def _written(
+    output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None, made: Soundtrack | None
+) -> AudioReport:
     """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
     from sonic_bullet.render import why_silent
 
     try:
-        return write_audio(output, result.sound, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+        cues = {} if made is None else made.cues_for(result.sound.shape[1])
+        return write_audio(output, result.sound, result.sr, peak_dbfs=peak_dbfs, lufs=lufs, **cues)
     except AudioError as error:
         reason = None if result.sound.peaks().any() else why_silent(result.log)
         raise AudioError(error.what, reason) if reason else error from error
 
 
-def _with_partial(
+def with_partial(
     error: SonicBulletError | KeyboardInterrupt, to: str, output: str, peak_dbfs: float | None, lufs: float | None
 ) -> SonicBulletError | KeyboardInterrupt:
     """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a
@@ -254,6 +281,15 @@ def _with_partial(
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
+
+
+def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
+    from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of
+
+    moves = () if is_log(scene) else moves_of(log)
+    driven = any(one.drives for one in moves)
+    remedy = (f"contacts of what is driven are not simulated: sonic-bullet score {scene} lets it sound",)
+    return (*move_notes(log, moves), *(remedy if driven else ()))
 
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:
@@ -280,7 +316,8 @@ def _warnings(report: AudioReport) -> tuple[str, ...]:
     return ()
 
 
-def _summary(report: AudioReport, log: ContactLog) -> str:
+def summary(report: AudioReport, log: ContactLog) -> str:
+    """What was written, in one line."""
     from sonic_bullet.plots.scene_plot import quantity
 
     channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"
@@ -291,46 +328,3 @@ def _summary(report: AudioReport, log: ContactLog) -> str:
         f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, "
         f"rms {report.rms_pa:.4g} {unit}{scale}"
     )
-
-
-def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:
-    return {
-        "output": report.path,
-        "format": report.format,
-        "subtype": report.subtype,
-        "sr": report.sr,
-        "channels": report.channels,
-        "frames": report.frames,
-        "seconds": report.seconds,
-        "peak_pa": report.peak_pa,
-        "rms_pa": report.rms_pa,
-        "gain_per_pa": report.gain_per_pa,
-        "clipped": report.clipped,
-        "steps": len(result.log.steps),
-        "contacts": len(result.log),
-        "bodies": _bodies(result.log),
-        "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in result.log.events],
-        "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in result.log.changes],
-        "engine": dict(result.log.engine),
-        "versions": dict(result.log.versions),
-        "notes": list(notes),
-    }
-
-
-def _bodies(log: ContactLog) -> list[dict[str, Any]]:
-    return [
-        {
-            "body": body.body_id,
-            "link": body.link,
-            "name": body.name.encode("utf-8", "replace").decode(),
-            "material": None if body.material is None else body.material.name,
-            "modes": None if body.model is None else body.model.mode_count,
-            "dropped": None if body.model is None else body.model.dropped,
-            "since_step": body.since_step,
-            "until_step": body.until_step,
-            "mounting": body.mounting,
-            "options": None if body.options is None else asdict(body.options),
-            "dynamics": dict(body.dynamics),
-        }
-        for body in log.bodies
-    ]

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ import numpy as np
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
 from sonic_bullet.files.levels import as_sound, check_levels, gain_per_pa
+from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
@@ -124,7 +126,7 @@ class AudioWriter:
     `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it
     has been read back. Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file
     NAME.partial.EXT and says so in the error; NAME.EXT is untouched. gain_per_pa: file units for one pascal.
-    expected_frames: chooses RF64 over WAV where the file will pass 4 GiB.
+    expected_frames: chooses RF64 over WAV where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV.
     """
 
     def __init__(
@@ -136,6 +138,7 @@ class AudioWriter:
         gain_per_pa: float = 1.0,
         subtype: str | None = None,
         expected_frames: int = 0,
+        chunks: bytes = b"",
     ) -> None:
         """Opens the partial file.
 
@@ -148,8 +151,8 @@ class AudioWriter:
         self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
-        self.frame_bytes = channels * SAMPLE_BYTES.get(self.subtype, 0)
-        if self.format == "WAV" and expected_frames * self.frame_bytes > CHUNK_LIMIT_BYTES:
+        self.frame_bytes, self.chunks = channels * SAMPLE_BYTES.get(self.subtype, 0), chunks
+        if self.format == "WAV" and expected_frames * self.frame_bytes + len(chunks) > CHUNK_LIMIT_BYTES:
             self.format = "RF64"
         self.frames = self.clipped = self.over = 0
         self.peak_pa = self.energy_pa2 = 0.0
@@ -261,9 +264,11 @@ class AudioWriter:
 
     def _name_it(self) -> None:
         """Give the whole file its name. Raises FileError, OSError."""
+        if self.chunks:
+            append_chunks(self.partial.fd, self.chunks)
         if self._read_back() != self.frames:
             raise self._refused()
-        _forget_time(self.partial.fd)
+        forget_time(self.partial.fd)
         self.partial.replace(self.target)
 
     def _keep(self) -> int:
@@ -297,18 +302,6 @@ class AudioWriter:
         return frames
 
 
-def _forget_time(fd: int) -> None:
-    """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal
-    sound, equal bytes.
-    """
-    os.lseek(fd, 0, os.SEEK_SET)
-    head = os.read(fd, 512)
-    found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
-    if found >= 0:
-        os.lseek(fd, found + 12, os.SEEK_SET)
-        os.write(fd, bytes(4))
-
-
 def write_audio(
     path: str | os.PathLike[str],
     samples: Array | KeptSound,
@@ -318,16 +311,21 @@ def write_audio(
     lufs: float | None = None,
     full_scale_pa: float = 1.0,
     subtype: str | None = None,
+    cues: Sequence[Cue] | None = None,
+    time_reference: int = 0,
 ) -> AudioReport:
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
     The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of
     ``peak_dbfs`` (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. Over 4 GiB a .wav is
-    written as RF64. Raises AudioError (rate, NaN, silence or under 0.4 s where loudness is asked, both levels given)
-    and FileError (place, format).
+    written as RF64. cues: places named in a .wav (none of them: [] still says where the file begins), time_reference:
+    its first sample on the timeline it is for (files.riff). Raises AudioError (rate, NaN, silence or under 0.4 s where
+    loudness is asked, both levels given) and FileError (place, format).
     """
     rate = check_sr(sr)
-    check_audio_output(path, subtype)
+    _, container, _ = check_audio_output(path, subtype)
+    if cues is not None and container not in ("WAV", "RF64"):
+        raise FileError(f"cannot write cue points to {brief(path)}: {container} has none", "end the name with .wav")
     check_levels(peak_dbfs, lufs)
     full_scale_pa = as_number(
         full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError
@@ -337,7 +335,9 @@ def write_audio(
     if channels == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
-    with AudioWriter(path, rate, channels, gain_per_pa=gain, subtype=subtype, expected_frames=frames) as writer:
+    chunks = b"" if cues is None else wave_chunks(cues, description=Path(path).stem, time_reference=time_reference)
+    options: dict[str, Any] = {"gain_per_pa": gain, "subtype": subtype, "expected_frames": frames, "chunks": chunks}
+    with AudioWriter(path, rate, channels, **options) as writer:
         for block in sound.blocks(BLOCK_FRAMES):
             writer.write(block)
     return writer.report()

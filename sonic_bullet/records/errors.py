@@ -68,6 +68,10 @@ class SceneWarning(UserWarning):
     """Part of a world is left out of its sound, and the rest goes on; said once for each thing left out."""
 
 
+class AnimationError(SonicBulletError):
+    """An animation cannot be read, or there is nothing in it that could sound."""
+
+
 class LogError(SonicBulletError):
     """A contact log is cut, foreign or inconsistent."""
 

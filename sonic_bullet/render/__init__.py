@@ -108,11 +108,11 @@ def render_kept(
 def _blocks(
     log: ContactLog, residual: bool, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
 ) -> Iterator[Array]:
-    _make_radiation_known(log, say)
+    make_radiation_known(log, say)
     synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, keep=False)
-    quenches = _quenches(log)
+    quenches = quenched_steps(log)
     done = 0
-    for steps in _together(log.steps, quenches):
+    for steps in together(log.steps, quenches):
         if done in quenches:
             synth.quench()
         yield synth.play(steps, log.bodies)
@@ -122,7 +122,8 @@ def _blocks(
     yield synth.rest()
 
 
-def _make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:
+def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:
+    """Have how the bodies' modes radiate, computed now where it is not kept; say is told."""
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:
             if say is not None:
@@ -130,11 +131,12 @@ def _make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) ->
             radiation_of(body.model, log.air)
 
 
-def _quenches(log: ContactLog) -> set[int]:
+def quenched_steps(log: ContactLog) -> set[int]:
+    """Steps before which all that rings stops."""
     return {event.step for event in log.events if event.kind == "quench"}
 
 
-def _together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
+def together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
     """Steps that a replay takes in at once: of the same bodies, with no quench between."""
     group: list[Step] = []
     for number, step in enumerate(steps):
@@ -156,9 +158,9 @@ def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> 
 
     say is called with what is being computed before the first step.
     """
-    _make_radiation_known(log, say)
+    make_radiation_known(log, say)
     synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=log.residual, keep=False)
-    quenches = _quenches(log)
+    quenches = quenched_steps(log)
     for number, step in enumerate(log.steps):
         if number in quenches:
             synth.quench()

@@ -144,18 +144,22 @@ def ring(
 
 
 @njit(nogil=True, error_model="numpy")
-def sum_at_sensors(source, n, reads, out, out_at):  # pragma: no cover - compiled
-    """What sensors that read modes by themselves (reads (c,): their weight set, 0 for a microphone) make of a step.
-    False where that is no number.
+def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - compiled
+    """What sensors that read modes by themselves (reads (c,): their weight set, 0 for a microphone) make of a step,
+    apart 1: of each body of it. False where that is no number.
     """
-    for c in range(len(reads)):
+    channels = len(reads)
+    for c in range(channels):
         if reads[c] == 0:
             continue
         for k in range(n):
             total = 0.0
             for b in range(source.shape[1]):
                 total += source[reads[c], b, k]
-            out[c, out_at + k] = total
+                if apart:
+                    out[b * channels + c, out_at + k] = source[reads[c], b, k]
+            if not apart:
+                out[c, out_at + k] = total
             if not abs(total) < np.inf:
                 return False
     return True
@@ -168,14 +172,16 @@ def advance_steps(
     bodies, faces, nodes, shapes, frequency_hz, spectrum, pairs, active, counts, free, gain,
     pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
     bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz,
-    source, pushed, sounds, microphone_m, samples_per_m, sources, places, lines, memory, taps, reads, pressure, out,
+    source, pushed, sounds, microphone_m, samples_per_m, sources, places, lines, memory, taps, reads, apart, pressure,
+    out,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Steps ``first`` … of the table into out (channels, samples of all of them): how many are done, why it came back,
     and how many pulses and drives the last one has.
 
     taken: number of the first step of the table; start: sample of out's first. contacts: of all steps; position (k, b,
     3), quaternion (k, b, 4), teleported (k, b). pressure (microphones, as out). pause: come back before the first step
-    is heard; resume: the first step rings already, and is to be heard.
+    is heard; resume: the first step rings already, and is to be heard. apart 1: out is (bodies·channels, …) and
+    pressure (bodies·microphones, …), body by body, nothing summed.
     """
     found, drives, done = 0, 0, 0
     for i in range(first, len(steps)):
@@ -214,7 +220,7 @@ def advance_steps(
                 return done, PAUSED, found, drives
             status = finish(
                 number, step, start, x, window_position, window_teleported, source, pushed, microphone_m,
-                samples_per_m, sources, places, lines, memory, taps, reads, pressure, out,
+                samples_per_m, sources, places, lines, memory, taps, reads, apart, pressure, out,
             )  # fmt: skip
             if status != DONE:
                 return done, status, found, drives
@@ -225,7 +231,7 @@ def advance_steps(
 @njit(nogil=True, error_model="numpy")
 def finish(
     number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, samples_per_m, sources,
-    places, lines, memory, taps, reads, pressure, out,
+    places, lines, memory, taps, reads, apart, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``; why
     not, where it cannot be.
@@ -234,16 +240,16 @@ def finish(
     status = hear(
         step.sample, number, step.count, np.int64(0), source[0], pushed, window_position[here], window_position[there],
         window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK),
-        pressure, at,
+        pressure, at, apart,
     )  # fmt: skip
     if status != DONE:
         return status
-    if not sum_at_sensors(source, step.count, reads, out, at):
+    if not sum_at_sensors(source, step.count, reads, out, at, apart):
         return BROKEN
     m = 0
-    for c in range(len(reads)):
-        if reads[c] == 0:
+    for row in range(len(out)):
+        if reads[row % len(reads)] == 0:
             for k in range(at, at + step.count):
-                out[c, k] = pressure[m, k]
+                out[row, k] = pressure[m, k]
             m += 1
     return DONE

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from sonic_bullet.synth.strikes import SPAN
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
     """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium; residual: whether
-    those of materials are heard.
+    those of materials are heard; apart: whether frames are (b·channels, n), body by body, instead of their sum.
     """
 
     sr: int
@@ -41,6 +41,7 @@ class Setup:
     seed: int
     air: Air
     residual: bool = True
+    apart: bool = False
 
     @property
     def microphone_m(self) -> Array:
@@ -180,6 +181,7 @@ class State:
     lengths of those taken in and not rendered. body (b,): each body's index in the log, ascending; present: those of
     the step taken in last (the others are gone, and ring on where they were); newest: the highest so far. quenches:
     steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
+    witness: is shown every step once it rings (`Witness`), one at a time then.
     """
 
     window: Window
@@ -203,6 +205,7 @@ class State:
     scratch: StepScratch = field(default_factory=StepScratch)
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
+    witness: Witness | None = None
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -243,8 +246,14 @@ class State:
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
-            self.reads, self.has_residual,
+            self.reads, self.has_residual, self.witness,
         )  # fmt: skip
+
+
+class Witness(Protocol):
+    """Whoever looks at what sounds in a step, and why: strikes and drives lie in the state's tables."""
+
+    def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None: ...
 
 
 def start(setup: Setup) -> State:

@@ -46,7 +46,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     while steps:
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
             quench(state)
-        count = 1 if state.has_residual else len(steps)
+        count = 1 if state.has_residual or state.witness is not None else len(steps)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next one begins anew there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead)])
         frames.append(_advanced(setup, state, steps[:count]))
@@ -80,23 +80,23 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
 
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """`advance` of steps without a quench between; of one alone where a body has a residual."""
-    sr, begin, pause = setup.sr, state.ringing.at, state.has_residual
+    sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
     table, clock, waiting = _schedule(sr, state, steps)
     contacts, poses = _joined(steps)
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
-    out = np.zeros((len(setup.sensors), stop - begin))
-    pressure = (
-        out if len(state.path.microphone_m) == len(out) else np.zeros((len(state.path.microphone_m), stop - begin))
-    )
+    groups, microphones = len(state.body) if setup.apart else 1, len(state.path.microphone_m)
+    out = np.zeros((groups * len(setup.sensors), stop - begin))
+    pressure = out if microphones == len(setup.sensors) else np.zeros((groups * microphones, stop - begin))
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
     done, resume, taken = 0, False, state.taken
     while done < len(steps):
         arguments = (
-            done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), pressure, out
+            done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), int(setup.apart),
+            pressure, out,
         )  # fmt: skip
         if not getattr(driver.advance_steps, "overloads", True):
             make_driver(arguments)
@@ -107,7 +107,10 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
         elif status == driver.PAUSED:
-            _add_residuals(setup, state, table[done], found, drives)
+            if state.has_residual:
+                _add_residuals(setup, state, table[done], found, drives)
+            if state.witness is not None:
+                state.witness(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
         elif status == driver.BROKEN:
             what = "the synthesizer made NaN or infinite samples, or lost a strike"
             raise AudioError(what, "report the contact log: this must not happen")
@@ -173,7 +176,7 @@ def drained(setup: Setup, state: State, last: Step | None) -> Array:
     """
     missing = len(state.waiting)
     if last is None or not missing:
-        return np.zeros((len(setup.sensors), 0))
+        return np.zeros((len(setup.sensors) * (len(state.body) if setup.apart else 1), 0))
     state = state.copy()
     count = clock_after(state).sample(setup.sr) - state.clock.sample(setup.sr)
     still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))

@@ -178,14 +178,14 @@ def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):
 
 @njit(nogil=True, error_model="numpy")
 def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, samples_per_m,
-         sources, places, lines, memory, taps, work, out, out_at):  # fmt: skip  # pragma: no cover - compiled
+         sources, places, lines, memory, taps, work, out, out_at, apart=0):  # fmt: skip  # pragma: no cover - compiled
     """Pressure (Pa) at samples at … at + n - 1 of the step into out (c, ≥ out_at + n) from column out_at on.
 
     source (≥ b, ·) in Pa·m, pushed (≥ b, 3, ·) in Pa·m along each axis, x (·): where between the step's ends each
     sample lies, 0 … 1; all three from column ``first`` on. begin_m, end_m (≥ b, 3), teleported (≥ b,): moved by hand.
     step ≥ 0: number of the step these samples are (part of). sources (b,) SOURCE, places (t,) PLACE, lines (t·c,) LINE,
     memory: what is under way, changed in place. taps: `tap_polynomials`. work (WORK,): lent. Bodies are summed in
-    order; below 1e-30 Pa: 0.
+    order; below 1e-30 Pa: 0. apart 1: they are not summed, and out is (b·c, …), body by body.
     """
     source, pushed, begin_m, end_m = borrowed(source), borrowed(pushed), borrowed(begin_m), borrowed(end_m)
     sources, places, lines, memory = borrowed(sources), borrowed(places), borrowed(lines), borrowed(memory)
@@ -197,8 +197,9 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
     if status != DONE:
         return status
     channels = len(microphone_m)
-    for c in range(channels):
-        clear(out, c * out.shape[1] + out_at, n)
+    rows = channels * (len(sources) if apart else 1)
+    for row in range(rows):
+        clear(out, row * out.shape[1] + out_at, n)
     emitted, delay, observed = work[:_SPAN], work[_SPAN : 2 * _SPAN], work[2 * _SPAN : 3 * _SPAN]
     geometry, tail, kept = work[3 * _SPAN : 3 * _SPAN + 8], work[3 * _SPAN + 8 : WORK - KEPT], work[WORK - KEPT : WORK]
     kept[TAPS * LANES] = np.nan
@@ -232,9 +233,10 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
                     if _listen(
                         line, at + lo, count, emitted, delay, observed, memory, ring_at, mask, taps, kept, steep
                     ):
-                        add(observed, out, c * out.shape[1] + out_at + lo, count)
+                        row = (b * channels if apart else 0) + c
+                        add(observed, out, row * out.shape[1] + out_at + lo, count)
                     lo += count
             p = place.next
-    for c in range(channels):
-        flush(out, c * out.shape[1] + out_at, n)
+    for row in range(rows):
+        flush(out, row * out.shape[1] + out_at, n)
     return DONE

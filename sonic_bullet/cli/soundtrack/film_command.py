@@ -1,0 +1,178 @@
+"""`film`: a scene or a contact log as pictures with their sound."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
+from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.records.errors import FileError, SonicBulletError
+
+if TYPE_CHECKING:
+    from sonic_bullet.listener.pictures import Standing
+    from sonic_bullet.session import Listener
+    from sonic_bullet.soundtrack.film import FilmReport
+
+EPILOG = """\b
+Examples:
+  sonic-bullet film scenes/tabletop.py -o tabletop.mp4 --fps 60 --peak-dbfs -1
+  sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow link0
+  sonic-bullet film drop.npz -o drop.mkv --camera 0.5,-1,0.8 --look-at 0,0,0.1 --size 1920x1080
+Frame rates are fractions: 24, 25, 30000/1001. Needs PyAV: pip install 'sonic_bullet[film]'"""
+
+
+class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
+    """WIDTHxHEIGHT in pixels."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """The two numbers; click's usage error where there are none."""
+        if isinstance(value, tuple):
+            return value
+        width, x, height = str(value).lower().partition("x")
+        if not (x and width.isdecimal() and height.isdecimal()) or len(str(value)) > 20:
+            self.fail(f"{str(value)[:40]!r} is no size: 1280x720 say", param, ctx)
+        return int(width), int(height)
+
+
+@click.command(epilog=EPILOG)
+@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.option("-o", "--output", required=True, metavar="NAME.mp4", help="Film: .mp4 .mov .mkv")
+@click.option("--seconds", type=float, metavar="S", help="How long. [default: the scene's own, else 4; all of a log]")
+@click.option("--fps", default="30", show_default=True, metavar="F", help="Pictures a second: 24, 25, 30000/1001, 60 …")
+@click.option("--size", type=Size(), default="1280x720", show_default=True, help="Of the pictures, even numbers.")
+@click.option("--camera", type=Numbers("X,Y,Z"), help="Where it stands, in m. [default: it takes in what moves]")
+@click.option("--look-at", type=Numbers("X,Y,Z"), help="What it looks at, in m. [default: the middle of what moves]")
+@click.option("--follow", metavar="BODY", help="Name of a body that the camera goes with.")
+@click.option("--overlay", is_flag=True, help="Draw contacts as they are heard, and why others are silent.")
+@click.option("--shadows", is_flag=True, help="Draw shadows; takes twice as long.")
+@click.option("--audio", "codec", type=click.Choice(["aac", "pcm", "flac", "opus", "mp3"]),
+              help="Codec of the sound. [default: mp4 aac, mov pcm, mkv flac]")  # fmt: skip
+@click.option("--sr", type=float, metavar="HZ", help="Sample rate. [default: 48000; a log's own]")
+@click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
+@click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
+@click.option(
+    "--microphone",
+    "microphones",
+    type=Numbers("X,Y,Z"),
+    multiple=True,
+    help="A microphone in the world, in m; two are stereo. [default: the scene's own]",
+)
+@click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
+@click.option("--material", metavar="M", help="Material of the bodies of a script that names none.")
+@json_option
+def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
+    """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
+    from sonic_bullet.cli.scene_commands import (
+        DEFAULT_SR,
+        Wish,
+        check_request,
+        is_log,
+        replayed,
+        simulated,
+        with_partial,
+    )
+    from sonic_bullet.files import check_sr
+    from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
+    from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size
+
+    rate = None if options["sr"] is None else check_sr(options["sr"])
+    levels = {name: options[name] for name in ("peak_dbfs", "lufs")}
+    check_request(scene, options["seconds"], options["peak_dbfs"], options["lufs"], options["material"])
+    look = FilmLook(
+        as_fps(options["fps"]),
+        check_size(options["size"]),
+        options["camera"],
+        options["look_at"],
+        options["follow"],
+        options["shadows"],
+    )
+    check_film_output(output, rate or DEFAULT_SR, max(len(options["microphones"]), 1), options["codec"])
+    to, json_to = places(output, json_to)
+    standing: list[Standing] = []
+
+    def at_end(listener: Listener) -> None:
+        from sonic_bullet.listener import PyBulletWorld
+        from sonic_bullet.listener.pictures import standing_in
+
+        if isinstance(listener.world, PyBulletWorld):
+            standing.extend(standing_in(listener.world.client_id))
+
+    sound_to = str(Path(str(to)).with_suffix(".wav"))
+    with clean_stdout(json_to) as say:
+        with progress_bar(Path(scene).name) as (progress, tell):
+            wish = Wish(
+                options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, progress,
+                tell, at_end,
+            )  # fmt: skip
+            try:
+                result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
+            except (SonicBulletError, KeyboardInterrupt) as error:
+                raise with_partial(error, sound_to, sound_to, *levels.values()) from error
+        if not result.log.sensors:
+            raise FileError("there is no microphone, so the film has no sound", "give one, --microphone 0,-1,0.5")
+        pictures_in(result.log, look.fps, options["seconds"])
+        events = None
+        with quiet_stderr():
+            import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
+        with progress_bar("film") as (progress, tell):
+            if options["overlay"]:
+                from sonic_bullet.soundtrack.sound_events import EventWitness
+                from sonic_bullet.soundtrack.stems import render_stems
+
+                witness = EventWitness(result.log)
+                stems = render_stems(result.log, sr=result.sr, witness=witness, progress=progress, say=tell)
+                events = witness.events(stems, result.sr)
+            report = make_film(
+                str(to),
+                result.log,
+                result.sound,
+                result.sr,
+                look=look,
+                seconds=options["seconds"],
+                standing=standing,
+                events=events,
+                codec=options["codec"],
+                **levels,
+                progress=progress,
+            )
+        say(_summary(output, report))
+        notes = (*result.notes, *report.notes, *_clipped(report))
+        for note in notes:
+            print(f"sonic-bullet: note: {note}", file=sys.stderr)
+    write_json(json_to, _described(output, report, notes))
+
+
+def _summary(output: str, report: FilmReport) -> str:
+    width, height = report.size
+    channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"
+    return (
+        f"{output}: {float(report.pictures / report.fps):.3f} s, {report.pictures} pictures of {width}x{height} at "
+        f"{report.fps} a second, {report.codec}, {channels}, {report.sr} Hz, scaled by {report.gain_per_pa:.4g}"
+    )
+
+
+def _clipped(report: FilmReport) -> tuple[str, ...]:
+    return (f"{report.clipped} samples were clipped at full scale; --peak-dbfs -1 avoids it",) * bool(report.clipped)
+
+
+def _described(output: str, report: FilmReport, notes: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "output": output,
+        "pictures": report.pictures,
+        "fps": str(report.fps),
+        "size": list(report.size),
+        "seconds": float(report.pictures / report.fps),
+        "samples": report.samples,
+        "sr": report.sr,
+        "channels": report.channels,
+        "codec": report.codec,
+        "gain_per_pa": report.gain_per_pa,
+        "clipped": report.clipped,
+        "notes": list(notes),
+    }

@@ -1,0 +1,80 @@
+"""`score`: the sound of a baked animation."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
+from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.records.errors import FileError, SonicBulletError
+
+EPILOG = """\b
+Examples:
+  sonic-bullet score take1.glb -o take1.wav --materials table.json --peak-dbfs -1
+  sonic-bullet score keys.npz -o keys.wav --contacts heard.npz
+  sonic-bullet render heard.npz -o again.wav --stems stems --events what.csv
+  sonic-bullet score shot.glb -o shot.wav --scale 0.01 --fps 24
+A contact log that it writes goes to render and film as any other. docs/how-to/score-an-animation.md has a table of
+materials and an export script for Blender."""
+
+
+@click.command(epilog=EPILOG)
+@click.argument("animation", metavar="ANIMATION|SCENE.py")
+@click.option("-o", "--output", required=True, metavar="NAME.wav", help="Sound file, as render has them.")
+@click.option("--materials", "table", metavar="TABLE.json", help="Who is made of what, by name patterns.")
+@click.option("--material", metavar="M", help="Of what moves and has none. [default: plastic]")
+@click.option("--fps", type=float, metavar="F", help="Frames a second, in place of the file's own.")
+@click.option("--scale", type=float, default=1.0, metavar="X", help="Of all lengths: 0.01 for centimetres.")
+@click.option("--sr", type=float, default=48_000, metavar="HZ", help="Sample rate. [default: 48000]")
+@click.option("--contacts", metavar="NAME.npz", help="Also write the contact log, for render and film.")
+@click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
+@click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
+@click.option(
+    "--microphone",
+    "microphones",
+    type=Numbers("X,Y,Z"),
+    multiple=True,
+    help="A microphone in the world, in m, z up; repeat for more channels. [default: 0,-1,0.5]",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, help="Seed of the surfaces' roughness. [default: 0]")
+@json_option
+def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
+    """Give a baked animation (.glb .gltf .json .npz) its sound, or a scene that of bodies that it moves by hand."""
+    from sonic_bullet.cli.output import described_render
+    from sonic_bullet.cli.scene_commands import summary, with_partial
+    from sonic_bullet.files import check_audio_output, check_levels, check_sr, write_audio, write_log
+
+    sr, levels = check_sr(options["sr"]), {name: options[name] for name in ("peak_dbfs", "lufs")}
+    check_levels(*levels.values())
+    check_audio_output(output)
+    if contacts is not None and not contacts.endswith(".npz"):
+        raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
+    to, contacts_to, json_to = places(output, contacts, json_to)
+    with clean_stdout(json_to) as say:
+        with quiet_stderr():
+            from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
+        rules = rules_of(options["table"])
+        try:
+            with progress_bar(Path(animation).name) as (progress, tell):
+                how: dict[str, Any] = {"sr": sr, "seed": options["seed"], "progress": progress, "say": tell}
+                if Path(animation).suffix.lower() == ".py":
+                    places_m = options["microphones"] or None
+                    result = score_scene(animation, microphones=places_m, material=options["material"], **how)
+                else:
+                    how |= {name: options[name] for name in ("fps", "scale")}
+                    how |= {"rules": rules, "material": options["material"] or "plastic"}
+                    result = score_animation(animation, microphones=options["microphones"] or MICROPHONE, **how)
+        except (SonicBulletError, KeyboardInterrupt) as error:
+            raise with_partial(error, str(to), output, *levels.values()) from error
+        if contacts_to is not None:
+            write_log(contacts_to, result.log)
+        report = replace(write_audio(str(to), result.sound, sr, **levels), path=output)
+        say(summary(report, result.log))
+        for note in result.notes:
+            print(f"sonic-bullet: note: {note}", file=sys.stderr)
+    write_json(json_to, described_render(result.log, report, result.notes))

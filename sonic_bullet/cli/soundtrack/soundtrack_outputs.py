@@ -1,0 +1,161 @@
+"""What `render` writes besides the mix: stems, events, cue points.
+
+SoundtrackWish (options) -> checked -> made (one more run of the log, body by body) -> Soundtrack -> written
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sonic_bullet.cli.output import folder_place
+from sonic_bullet.records.errors import FileError
+
+if TYPE_CHECKING:
+    from sonic_bullet.files import AudioReport, ContactLog
+    from sonic_bullet.soundtrack.sound_events import SoundEvent
+    from sonic_bullet.soundtrack.stems import Stem
+
+WITH_CUES = (".wav", ".rf64")
+
+
+def soundtrack_options(command: Any) -> Any:
+    """The options of `SoundtrackWish`."""
+    for option in reversed(
+        (
+            click.option("--stems", metavar="DIR", help="Also write a sound a body, which add up to the mix."),
+            click.option(
+                "--stem-peak-dbfs",
+                type=click.FloatRange(-200, 0),
+                metavar="DB",
+                help="Scale each stem to a peak of its own. [default: all as the mix is]",
+            ),
+            click.option(
+                "--events",
+                metavar="NAME.json|csv",
+                help="Also write every impact, roll and slide: when, who, where, how strong, how loud.",
+            ),
+            click.option("--cues", is_flag=True, help="Mark events in the WAV, and in stems, as cue points."),
+            click.option(
+                "--time-reference",
+                "time_reference_s",
+                type=click.FloatRange(0),
+                metavar="S",
+                help="With --cues: where on your timeline the file begins. [default: 0]",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True, slots=True)
+class SoundtrackWish:
+    """What is asked for."""
+
+    stems: str | None = None
+    stem_peak_dbfs: float | None = None
+    events: str | None = None
+    cues: bool = False
+    time_reference_s: float | None = None
+
+    def checked(self, output: str) -> SoundtrackWish:
+        """The same with the stems' folder absolute and tried. Raises FileError."""
+        if self.events is not None and Path(self.events).suffix.lower() not in (".json", ".csv"):
+            raise FileError(f"cannot write {self.events}: events are JSON or CSV", "end the name with .json or .csv")
+        if self.cues and Path(output).suffix.lower() not in WITH_CUES:
+            raise FileError(f"cannot write cue points to {output}", "end its name with .wav")
+        if self.time_reference_s is not None and not self.cues:
+            raise FileError("--time-reference is told beside cue points", "give --cues too")
+        if self.stem_peak_dbfs is not None and self.stems is None:
+            raise FileError("--stem-peak-dbfs is of stems", "give --stems DIR too")
+        return self if self.stems is None else replace(self, stems=folder_place(self.stems, ""))
+
+    def made(
+        self,
+        log: ContactLog,
+        sr: int,
+        events_to: str | None,
+        progress: Callable[[float], None],
+        say: Callable[[str], None],
+    ) -> Soundtrack | None:
+        """Stems and events of a log; None where nothing is asked for. Raises SonicBulletError."""
+        if self.stems is None and self.events is None and not self.cues:
+            return None
+        from sonic_bullet.soundtrack.sound_events import EventWitness
+        from sonic_bullet.soundtrack.stems import render_stems
+
+        witness = EventWitness(log) if self.events is not None or self.cues else None
+        stems = render_stems(log, sr=sr, witness=witness, progress=progress, say=say)
+        events = witness.events(stems, sr) if witness is not None else ()
+        return Soundtrack(self, log, sr, stems, events, events_to)
+
+
+@dataclass(slots=True)
+class Soundtrack:
+    """What was made; `write` puts it where it is to go, and then `words` and `described` say so."""
+
+    wish: SoundtrackWish
+    log: ContactLog
+    sr: int
+    stems: Sequence[Stem]
+    events: Sequence[SoundEvent]
+    events_to: str | None
+    words: list[str] = field(default_factory=list)
+    described: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def time_reference(self) -> int:
+        """In samples."""
+        return round((self.wish.time_reference_s or 0.0) * self.sr)
+
+    def cues_for(self, frames: int, body: int | None = None) -> dict[str, Any]:
+        """Keywords of `write_audio` for a file of so many frames."""
+        if not self.wish.cues:
+            return {}
+        from sonic_bullet.soundtrack.sound_events import cues_of
+
+        return {
+            "cues": cues_of(self.events, self.log, self.sr, frames, body),
+            "time_reference": self.time_reference,
+        }
+
+    def write(self, mix: AudioReport) -> None:
+        """Events and stems. Raises FileError, AudioError naming what is written already."""
+        from sonic_bullet.soundtrack.event_tables import write_events
+        from sonic_bullet.soundtrack.stems import write_stems
+
+        if self.events_to is not None and self.wish.events is not None:
+            counts = write_events(self.events_to, self.events, self.log)
+            self.words.append(f"{self.wish.events}: {', '.join(f'{n} {kind}s' for kind, n in counts.items())}")
+            self.described["sounding"] = counts
+        if self.wish.stems is None:
+            return
+        reports = list(
+            write_stems(
+                self.wish.stems,
+                self.stems,
+                self.sr,
+                gain_per_pa=mix.gain_per_pa,
+                peak_dbfs=self.wish.stem_peak_dbfs,
+                cues=(lambda body: self.cues_for(mix.frames, body)["cues"]) if self.wish.cues else None,
+                time_reference=self.time_reference,
+            )
+        )
+        self.words.append(f"{self.wish.stems}{os.sep}: {len(reports)} stems")
+        self.described["stems"] = [
+            {
+                "path": report.path,
+                "body": self.log.bodies[stem.index].body_id,
+                "link": self.log.bodies[stem.index].link,
+                "name": self.log.bodies[stem.index].name.encode("utf-8", "replace").decode(),
+                "peak_pa": report.peak_pa,
+                "gain_per_pa": report.gain_per_pa,
+            }
+            for stem, report in zip(self.stems, reports, strict=True)
+        ]

@@ -1,0 +1,99 @@
+"""What a WAV file says of its sound: places with names, and when on a longer clock it begins.
+
+    cue  (places)  + LIST adtl (labl: a name, ltxt: how long)   [IBM and Microsoft, Multimedia Programming Interface
+                                                                 and Data Specifications 1.0 (1991), ch. 3]
+    bext (description, time reference in samples)               [EBU Tech 3285 v1, sec. 2.3]
+
+They stand behind the samples, where readers of RIFF find chunks in any order. No time of day is among them: equal
+sound, equal bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sonic_bullet.records.coerce import as_text, as_whole
+
+LAST_SAMPLE = 2**32 - 1
+"""Of a cue, which is told in 32 bits: a day at 48 kHz."""
+TEXT_BYTES = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """A place in a sound file: its first sample, how many it lasts (0: a point), and what it is called."""
+
+    sample: int
+    samples: int
+    label: str
+
+    def __post_init__(self) -> None:
+        for name in ("sample", "samples"):
+            as_whole(getattr(self, name), f"{name} of a cue", "count from the start of the file", least=0)
+        as_text(self.label, "label of a cue", "give a text")
+
+
+def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: int = 0) -> bytes:
+    """Chunks `bext`, `cue ` and `LIST adtl` for a file. time_reference: its first sample, counted from the start of the
+    timeline it is cut from. Cues beyond `LAST_SAMPLE` are left out.
+    """
+    kept = [cue for cue in cues if cue.sample <= LAST_SAMPLE]
+    points = [
+        struct.pack("<II4sIII", number, cue.sample, b"data", 0, 0, cue.sample) for number, cue in enumerate(kept, 1)
+    ]
+    notes = []
+    for number, cue in enumerate(kept, 1):
+        notes.append(_chunk(b"labl", struct.pack("<I", number) + _text(cue.label) + b"\0"))
+        if cue.samples:
+            length = min(cue.samples, LAST_SAMPLE)
+            notes.append(_chunk(b"ltxt", struct.pack("<II4sHHHH", number, length, b"rgn ", 0, 0, 0, 0)))
+    places = _chunk(b"cue ", struct.pack("<I", len(points)) + b"".join(points)) + _chunk(
+        b"LIST", b"adtl" + b"".join(notes)
+    )
+    return _bext(description, time_reference) + (places if kept else b"")
+
+
+def _bext(description: str, time_reference: int) -> bytes:
+    """Version 1: 602 bytes, without date and time."""
+    body = struct.pack(
+        "<256s32s32s10s8sQH64s190s", _text(description, 255), b"sonic_bullet", b"", b"", b"", time_reference, 1, b"",
+        b"",
+    )  # fmt: skip
+    return _chunk(b"bext", body)
+
+
+def _chunk(name: bytes, body: bytes) -> bytes:
+    return name + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
+
+
+def _text(text: str, most: int = TEXT_BYTES) -> bytes:
+    """A text for a chunk: UTF-8, no NUL in it."""
+    return text.replace("\0", " ").encode("utf-8", "replace")[:most].decode("utf-8", "ignore").encode()
+
+
+def append_chunks(fd: int, chunks: bytes) -> None:
+    """Chunks behind all that an open, whole WAV or RF64 file holds. Raises OSError."""
+    size = os.lseek(fd, 0, os.SEEK_END)
+    left = memoryview(b"\0" * (size % 2) + chunks)
+    while left:
+        left = left[os.write(fd, left) :]
+    whole = os.lseek(fd, 0, os.SEEK_CUR) - 8
+    os.lseek(fd, 0, os.SEEK_SET)
+    is_long = os.read(fd, 4) == b"RF64"  # its size stands in the chunk ds64 [EBU Tech 3306, sec. 3.5]
+    os.lseek(fd, 20 if is_long else 4, os.SEEK_SET)
+    os.write(fd, struct.pack("<Q" if is_long else "<I", whole))
+
+
+def forget_time(fd: int) -> None:
+    """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal
+    sound, equal bytes.
+    """
+    os.lseek(fd, 0, os.SEEK_SET)
+    head = os.read(fd, 512)
+    found = head.split(b"data")[0].split(b"SSND")[0].find(b"PEAK")
+    if found >= 0:
+        os.lseek(fd, found + 12, os.SEEK_SET)
+        os.write(fd, bytes(4))

@@ -1,0 +1,116 @@
+"""What the score of an animation asks of a simulator: how near bodies are in a pose, and what follows from a start.
+
+    AnimatedBody ... -> PoseStage: MOTION (b,) -> closest: RAW (k,), no force        -> a fit of impulses
+                               MOTION (b,) -> shoot: MOTION (n + 1, b), RAW each -> a search for the start
+    n steps of MOTION and RAW -> AnimatedWorld -> Step, as of any other world
+
+PyBullet's is listener/pybullet/staged/animated_world.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.arrays import frozen_array, require, store
+from sonic_bullet.records.coerce import as_flag, as_number, as_text, shown
+from sonic_bullet.records.errors import RecordError
+
+HEAVIEST_KG = 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnimatedBody:
+    """A body that an animation moves.
+
+    shapes: in the body frame, origin at the centre of mass, axes along the principal inertia. mass_kg: 0 where nothing
+    moves it but the animation. inertia_kg_m2 (3,): principal moments. restitution, friction: the pair's are products of
+    both bodies'. driven: something besides gravity and contacts moves it, a hand or a motor.
+    """
+
+    name: str
+    shapes: tuple[Shape, ...]
+    mass_kg: float
+    inertia_kg_m2: Array
+    restitution: float = 0.7
+    friction: float = 0.7
+    driven: bool = False
+
+    def __post_init__(self) -> None:
+        who = f"body {shown(self.name)}"
+        as_text(self.name, "the name of a body", "give a text")
+        store(
+            self,
+            mass_kg=as_number(self.mass_kg, f"{who}: mass_kg", "give kilograms, 0 or more", least=0, most=HEAVIEST_KG),
+            inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3,), f"{who}: inertia_kg_m2"),
+            restitution=as_number(
+                self.restitution, f"{who}: restitution", "give a number from 0 to 1", least=0, most=1
+            ),
+            friction=as_number(self.friction, f"{who}: friction", "give a number, 0 or more", least=0, most=100),
+            driven=as_flag(self.driven, f"{who}: driven"),
+        )
+        require(len(self.shapes) > 0, f"{who} has no shape", "give it a mesh")
+        if self.mass_kg > 0 and not (self.inertia_kg_m2 > 0).all():
+            raise RecordError(f"{who}: a moment of inertia is not above 0", "give its three principal moments")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """What a simulator makes of a start. motion (n + 1, b) of MOTION: at the starts of n steps, and after the last;
+    raw: RAW rows of each step, none where nobody asked. touching (b, b): who exchanged a force.
+    """
+
+    motion: Array
+    raw: tuple[Array, ...]
+    touching: Array
+
+
+class PoseStage(Protocol):
+    """A simulated world that is set, asked and shot, never left to itself. Bodies are counted as they were given.
+
+    reach_m (b,): how far a body's points are from its centre of mass at most.
+    """
+
+    reach_m: Array
+
+    def boxes(self, motion: Array) -> tuple[Array, Array]:
+        """Corners (b, 3), lowest and highest, of boxes along the world's axes round the bodies in that pose."""
+        ...
+
+    def rows(self, body_id: Array) -> Array:
+        """Which bodies, as they were given, RAW rows mean by these ids (k,)."""
+        ...
+
+    def closest(self, motion: Array, pairs: Sequence[tuple[int, int]], reach_m: float) -> Array:
+        """RAW (k,) without force of the places where these pairs are nearer than reach_m in that pose (b,) of MOTION:
+        of faces and edges that lie on each other their corners.
+        """
+        ...
+
+    def shoot(
+        self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
+    ) -> Shot:
+        """What follows in so many steps from a start (b,) of MOTION, with that restitution (b,); who is driven or has
+        mass 0 goes straight to `end` (b,).
+        """
+        ...
+
+
+def free(bodies: Sequence[AnimatedBody]) -> Array:
+    """(b,) who is moved by gravity and contacts alone."""
+    return np.array([body.mass_kg > 0 and not body.driven for body in bodies], bool)
+
+
+def rotation(first: Array, second: Array) -> Array:
+    """Rotation vectors (…, 3) in rad, world frame, from the first orientations (…, 4) to the second: the logarithm of
+    q₂ q₁* [Sola 2017, Quaternion kinematics, eq. 105].
+    """
+    v, w, x, y = first[..., :3], first[..., 3:], second[..., :3], second[..., 3:]
+    axis, real = w * x - y * v - np.cross(x, v), w * y + (v * x).sum(axis=-1, keepdims=True)
+    length = np.linalg.norm(axis, axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(length, np.abs(real))
+    return np.asarray(np.where(real < 0, -1.0, 1.0) * axis * angle / np.maximum(length, 1e-300))

@@ -1,0 +1,334 @@
+"""PyBullet as the stage of an animation, and the animation as a world that is listened to.
+
+Nothing pushes bodies apart that overlap in a pose (contactERP = 0): poses of animations overlap by up to a centimetre,
+and at 240 Hz Bullet's own correction (0.2 of the depth a step) would throw them at half a metre per second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.listener.animated import AnimatedBody, Shot, rotation
+from sonic_bullet.listener.frames import MOTION, Motion, turned
+from sonic_bullet.listener.polling import NO_RAW, RAW
+from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
+from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
+from sonic_bullet.listener.pybullet.questions import Settings, contact_points
+from sonic_bullet.listener.pybullet.urdf_meshes import hull
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.errors import AnimationError, MeshError, SceneError
+
+TILT_M = 2e-3
+"""By how much the ends of a body are tilted to find the corners of a face that lies on another: Bullet's own perturbed
+queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m)."""
+ROLLING = 1e-4
+
+
+class AnimatedStage:
+    """Bodies in a client of their own; see listener.animated.PoseStage."""
+
+    def __init__(self, bodies: Sequence[AnimatedBody], gravity_m_s2: Array) -> None:
+        self.bodies, self.gravity_m_s2 = tuple(bodies), gravity_m_s2
+        self.client = direct_client()
+        self.client_id: int = self.client._client
+        self.held = np.array([one.mass_kg == 0 or one.driven for one in bodies], bool)
+        self.round = np.array([len(b.shapes) == 1 and b.shapes[0].kind == "sphere" for b in bodies], bool)
+        cid = self.client_id
+        pybullet.setGravity(*map(float, gravity_m_s2), physicsClientId=cid)
+        pybullet.setPhysicsEngineParameter(
+            erp=0, contactERP=0, deterministicOverlappingPairs=1, physicsClientId=cid
+        )  # fmt: skip
+        self.ids = [self._made(body) for body in bodies]
+        self.row_of = {body: row for row, body in enumerate(self.ids)}
+        corners = np.array([pybullet.getAABB(body, physicsClientId=cid) for body in self.ids])  # as made: at the origin
+        self.middle_m, self.half_m = corners.mean(axis=1), np.diff(corners, axis=1)[:, 0] / 2
+        self.extent_m = np.linalg.norm(self.half_m, axis=1)
+        self.reach_m = np.linalg.norm(np.abs(self.middle_m) + self.half_m, axis=1)
+        self._holds = False
+
+    def __enter__(self) -> AnimatedStage:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the client; twice is once."""
+        disconnect(self.client)
+
+    def _made(self, body: AnimatedBody) -> int:
+        ask, cid = pybullet, self.client_id
+        shape = _compound([options for shape in body.shapes for options in _collision(shape, body.name)], cid)
+        if shape < 0:
+            raise AnimationError(f"body '{body.name}': PyBullet makes no collision shape of it", "simplify its mesh")
+        made = int(ask.createMultiBody(body.mass_kg, shape, physicsClientId=cid))
+        ask.changeDynamics(
+            made, -1, localInertiaDiagonal=body.inertia_kg_m2.tolist() if body.mass_kg else [0, 0, 0],
+            restitution=body.restitution, lateralFriction=body.friction, linearDamping=0, angularDamping=0,
+            contactProcessingThreshold=0, physicsClientId=cid,
+        )  # fmt: skip
+        return made
+
+    def boxes(self, motion: Array) -> tuple[Array, Array]:
+        """See PoseStage."""
+        frame = np.array([pybullet.getMatrixFromQuaternion(q) for q in motion["quaternion_xyzw"].tolist()])
+        frame = frame.reshape(-1, 3, 3)
+        middle = motion["position_m"] + np.einsum("bij,bj->bi", frame, self.middle_m)
+        half = np.einsum("bij,bj->bi", np.abs(frame), self.half_m)
+        return middle - half, middle + half
+
+    def rows(self, body_id: Array) -> Array:
+        """See PoseStage."""
+        return np.array([self.row_of[body] for body in body_id.tolist()], np.int64)
+
+    def hold(self, holds: bool) -> None:
+        """Let who is driven stand against every force, as a hand does, or have its mass again."""
+        if holds == self._holds:
+            return
+        self._holds = holds
+        for body, made in zip(self.bodies, self.ids, strict=True):
+            if body.driven and body.mass_kg > 0:
+                inertia = [0.0] * 3 if holds else body.inertia_kg_m2.tolist()
+                pybullet.changeDynamics(
+                    made, -1, mass=0 if holds else body.mass_kg, localInertiaDiagonal=inertia,
+                    physicsClientId=self.client_id,
+                )  # fmt: skip
+
+    def _set(self, row: int, motion: Any) -> None:
+        body, cid = self.ids[row], self.client_id
+        pybullet.resetBasePositionAndOrientation(
+            body, motion["position_m"].tolist(), motion["quaternion_xyzw"].tolist(), physicsClientId=cid
+        )
+        pybullet.resetBaseVelocity(
+            body, motion["velocity_m_s"].tolist(), motion["spin_rad_s"].tolist(), physicsClientId=cid
+        )
+
+    def closest(self, motion: Array, pairs: Sequence[tuple[int, int]], reach_m: float) -> Array:
+        """See PoseStage."""
+        for row in sorted({row for pair in pairs for row in pair}):
+            self._set(row, motion[row])
+        found: list[Array] = []
+        for a, b in pairs:
+            found += self._pair(motion, a, b, reach_m)
+        return np.concatenate(found) if found else NO_RAW
+
+    def _nearest(self, a: int, b: int, reach_m: float) -> list[tuple[Any, ...]]:
+        return list(pybullet.getClosestPoints(self.ids[a], self.ids[b], reach_m, physicsClientId=self.client_id))
+
+    def _pair(self, motion: Array, a: int, b: int, reach_m: float) -> list[Array]:
+        points = self._nearest(a, b, reach_m)
+        if not points:
+            return []
+        rows = [_raw(self.ids[a], self.ids[b], one[5], one[6], one[7], one[8]) for one in points]
+        if self.round[a] or self.round[b]:
+            return rows
+        # the corners: from poses tilted to four sides, carried back; the smaller one is tilted
+        low = a if self.extent_m[a] <= self.extent_m[b] else b
+        normal = np.array(points[0][7])
+        side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+        side /= np.linalg.norm(side)
+        place, turn = motion[low]["position_m"], motion[low]["quaternion_xyzw"]
+        angle = TILT_M / self.extent_m[low]
+        for axis in (side, -side, np.cross(normal, side), -np.cross(normal, side)):
+            tilted = turned(turn[None], angle * axis[None])[0]
+            pybullet.resetBasePositionAndOrientation(
+                self.ids[low], place.tolist(), tilted.tolist(), physicsClientId=self.client_id
+            )
+            for one in self._nearest(a, b, reach_m + TILT_M):
+                at = [np.array(one[5]), np.array(one[6])]
+                mine = 0 if low == a else 1
+                at[mine] = place + turned_back(at[mine] - place, angle * axis)
+                gap = float((at[0] - at[1]) @ normal)
+                row = _raw(self.ids[a], self.ids[b], at[0], at[1], normal, gap)
+                if gap < reach_m and all(np.abs(row["point_a_m"] - r["point_a_m"]).max() > 1e-3 for r in rows):
+                    rows.append(row)
+        pybullet.resetBasePositionAndOrientation(
+            self.ids[low], place.tolist(), turn.tolist(), physicsClientId=self.client_id
+        )
+        return rows
+
+    def shoot(
+        self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
+    ) -> Shot:
+        """See PoseStage."""
+        cid, many = self.client_id, len(self.ids)
+        self.hold(True)
+        pybullet.setTimeStep(dt_s, physicsClientId=cid)
+        course = between(start, end, steps, dt_s)
+        motion, raws = np.zeros((steps + 1, many), MOTION), []
+        touching = np.zeros((many, many), bool)
+        for row in range(many):
+            self._set(row, start[row] if not self.held[row] else course[0, row])
+            if not self.held[row]:
+                pybullet.changeDynamics(self.ids[row], -1, restitution=float(restitution[row]), physicsClientId=cid)
+        moved = [row for row in range(many) if self.held[row] and start[row] != course[-1, row]]
+        motion[0] = np.where(self.held, course[0], start)
+        for step in range(steps):
+            for row in moved if step else ():
+                self._set(row, course[step, row])
+            pybullet.stepSimulation(physicsClientId=cid)
+            points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
+            for one in points:
+                if one[9] > 0:
+                    a, b = self.row_of[one[1]], self.row_of[one[2]]
+                    touching[a, b] = touching[b, a] = True
+            raws.append(raw)
+            if polled or step == steps - 1:
+                motion[step + 1] = course[step + 1]
+                for row in np.flatnonzero(~self.held).tolist():
+                    out = motion[step + 1, row]
+                    out["position_m"], out["quaternion_xyzw"] = pybullet.getBasePositionAndOrientation(
+                        self.ids[row], physicsClientId=cid
+                    )
+                    out["velocity_m_s"], out["spin_rad_s"] = pybullet.getBaseVelocity(
+                        self.ids[row], physicsClientId=cid
+                    )
+        return Shot(motion, tuple(raws), touching)
+
+
+def _compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
+    """A collision shape of one or several; several meshes go through files, of which PyBullet makes hulls."""
+    if len(shapes) == 1:
+        return int(pybullet.createCollisionShape(**shapes[0], physicsClientId=client_id))
+    with TemporaryDirectory() as folder:
+        names = [str(Path(folder, f"{number}.obj")) for number in range(len(shapes))]
+        for name, shape in zip(names, shapes, strict=True):
+            if "vertices" in shape:
+                Path(name).write_text(_wavefront(np.array(shape["vertices"])), "ascii")
+        made = pybullet.createCollisionShapeArray(
+            shapeTypes=[one["shapeType"] for one in shapes],
+            radii=[one.get("radius", 0.0) for one in shapes],
+            halfExtents=[one.get("halfExtents", [0, 0, 0]) for one in shapes],
+            lengths=[one.get("height", 0.0) for one in shapes],
+            fileNames=[name if "vertices" in one else "" for name, one in zip(names, shapes, strict=True)],
+            meshScales=[[1, 1, 1]] * len(shapes),
+            collisionFramePositions=[one["collisionFramePosition"] for one in shapes],
+            collisionFrameOrientations=[one["collisionFrameOrientation"] for one in shapes],
+            physicsClientId=client_id,
+        )
+    return int(made)
+
+
+def _wavefront(vertex: Array) -> str:
+    """A hull's corners as a mesh file; which faces they have does not matter to who takes their hull."""
+    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertex.tolist()]
+    return "\n".join([*corners, *(f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertex) - 1))]) + "\n"
+
+
+def _collision(shape: Shape, name: str) -> Iterator[dict[str, Any]]:
+    """What createCollisionShapeArray wants of a shape; of a mesh the convex hull of each of its connected parts."""
+    placed = {
+        "collisionFramePosition": shape.position_m.tolist(),
+        "collisionFrameOrientation": shape.quaternion_xyzw.tolist(),
+    }
+    size = shape.size_m.tolist()
+    if shape.kind == "sphere":
+        yield {"shapeType": pybullet.GEOM_SPHERE, "radius": size[0], **placed}
+    elif shape.kind == "box":
+        yield {"shapeType": pybullet.GEOM_BOX, "halfExtents": [x / 2 for x in size], **placed}
+    elif shape.kind in ("capsule", "cylinder"):
+        kind = pybullet.GEOM_CAPSULE if shape.kind == "capsule" else pybullet.GEOM_CYLINDER
+        yield {"shapeType": kind, "radius": size[0], "height": size[1], **placed}
+    elif shape.kind == "plane":
+        yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
+    else:
+        for vertex in _parts(shape):
+            try:
+                corner = hull(vertex)[0]
+            except MeshError as error:
+                raise AnimationError(f"body '{name}': its mesh is flat", "give it thickness") from error
+            yield {"shapeType": pybullet.GEOM_MESH, "vertices": corner.tolist(), **placed}
+
+
+def _parts(shape: Shape) -> list[Array]:
+    """Vertices (v, 3) of each connected part of a mesh."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    from sonic_bullet.geometry import welded
+
+    vertex, face = welded(shape.vertex_m, shape.face)
+    edge = np.concatenate([face[:, [0, 1]], face[:, [1, 2]]])
+    graph = coo_array((np.ones(len(edge)), (edge[:, 0], edge[:, 1])), shape=(len(vertex), len(vertex)))
+    count, label = connected_components(graph, directed=False)
+    parts = [vertex[label == i] for i in range(count) if (label == i).sum() >= 4]
+    return parts if 0 < len(parts) <= 64 else [vertex]
+
+
+def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) -> Array:
+    row = np.zeros(1, RAW)
+    row["body_a"], row["body_b"], row["link_a"], row["link_b"] = a, b, -1, -1
+    row["point_a_m"], row["point_b_m"], row["normal"], row["gap_m"] = point_a, point_b, normal, gap
+    return row
+
+
+def turned_back(vector: Array, rotation_rad: Array) -> Array:
+    """A vector (3,) turned by the opposite of a small rotation vector [Rodrigues' formula]."""
+    angle = float(np.linalg.norm(rotation_rad))
+    axis = -rotation_rad / max(angle, 1e-300)
+    return np.asarray(
+        vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1 - np.cos(angle))
+    )
+
+
+def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
+    """MOTION (steps + 1, b) on the straight way from a pose to another, with the speed of that way."""
+    course = np.zeros((steps + 1, len(start)), MOTION)
+    move = end["position_m"] - start["position_m"]
+    turn = rotation(start["quaternion_xyzw"], end["quaternion_xyzw"])
+    for step in range(steps + 1):
+        share = step / steps
+        course[step]["position_m"] = start["position_m"] + share * move
+        course[step]["quaternion_xyzw"] = turned(start["quaternion_xyzw"], share * turn)
+        course[step]["velocity_m_s"], course[step]["spin_rad_s"] = move / (steps * dt_s), turn / (steps * dt_s)
+    return course
+
+
+class AnimatedWorld(PyBulletWorld):
+    """The world of a stage, whose steps were found beforehand: MOTION (b,) at the start of each, RAW rows of it."""
+
+    def __init__(self, stage: AnimatedStage, steps: Sequence[tuple[Array, Array]], dt_s: float) -> None:
+        self._stage, self._found, self._at = stage, steps, 0
+        stage.hold(False)
+        super().__init__(stage.client, stage.client_id)
+        x, y, z = map(float, stage.gravity_m_s2)
+        self._settings = Settings(dt_s, 1, (x, y, z))
+        for body, made in zip(stage.bodies, stage.ids, strict=True):
+            self.call(made, -1, body.name)
+
+    def name_of(self, body: int, link: int = -1) -> str:
+        """The name that it has in the animation."""
+        return self._stage.bodies[self._stage.row_of[body]].name
+
+    def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
+        """The true geometry, not the hulls that collide."""
+        return self._stage.bodies[self._stage.row_of[body]].shapes
+
+    def listen(self, after: Any) -> bool:
+        """Nobody steps an animation but its listener."""
+        return False
+
+    def reset(self) -> None:
+        """An animation is played once."""
+        raise SceneError("an animation cannot begin anew", "score it again")
+
+    def after_step(self) -> Step:
+        """The next step; `stepped` is False behind the last."""
+        self.stepped = self._at < len(self._found)
+        if not self.stepped:
+            return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)
+        rows, raw = self._found[self._at]
+        self._at += 1
+        now = Motion(self._past.roster, rows)
+        self._memory.poll(raw, stepped=True)
+        step = self._usual(now, True) or self._unusual(now, True, None)
+        self._past = now
+        self.step_count += 1
+        return step

@@ -1,0 +1,62 @@
+"""A contact log's sound, body by body: the run time with the last sum left out.
+
+    ContactLog -> the same stages on the same tables -> hear, a row a body -> (bodies · channels, n)
+
+Contacts are those of the mix: a body that is struck by another sounds as it does there, and only what it sends itself
+is its stem. Pressure is linear in the sources [Pierce 1989, sec. 4-3], so the stems' sum is the mix, to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Array
+from sonic_bullet.render.presence import admit, release
+from sonic_bullet.render.synthesis_state import Setup, Witness, start
+from sonic_bullet.render.synthesizer import LOOK_EVERY, advance, drained
+
+if TYPE_CHECKING:
+    from sonic_bullet.records.contacts import Step
+
+
+def render_apart(
+    log: ContactLog,
+    *,
+    sr: int | None = None,
+    witness: Witness | None = None,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Iterator[tuple[Array, Array]]:
+    """Pieces of what `render_blocks` gives, before bodies are summed: (b,) their indices in the log, ascending, and
+    (b, channels, n) pascals. Who is not among them is silent meanwhile.
+
+    witness: is shown every step. progress, say, errors: as `render_log` has them.
+    """
+    from sonic_bullet.files import check_sr
+    from sonic_bullet.render import make_radiation_known, quenched_steps, together
+
+    log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
+    make_radiation_known(log, say)
+    setup = Setup(log.sr, log.sensors, log.seed, log.air, log.residual, apart=True)
+    state = start(setup)
+    state.witness = witness
+    quenches, done, looked, last = quenched_steps(log), 0, 0, None
+    steps: list[Step]
+    for steps in together(log.steps, quenches):
+        if done in quenches:
+            state.quenches = state.quenches | {done}
+        if steps[0].body is not state.present:
+            admit(setup, state, steps[0], log.bodies)
+        body, frame = state.body, advance(setup, state, steps)
+        yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])
+        done, last = done + len(steps), steps[-1]
+        if state.present is not state.body and done >= looked + LOOK_EVERY:
+            looked = done
+            release(state)
+        if progress is not None:
+            progress(done / len(log.steps))
+    body, frame = state.body, drained(setup, state, last)
+    yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])

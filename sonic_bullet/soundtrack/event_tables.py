@@ -1,0 +1,69 @@
+"""Events as tables for other programs: JSON and CSV, a row an impact, a roll or a slide that sounds, in order of time.
+
+Times in s, places in m, world frame; level in dB re 20 µPa at the first microphone. What is silent is not among them.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sonic_bullet.files import replacing
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.soundtrack.sound_events import SOUNDING, SoundEvent
+
+COLUMNS = (
+    "kind",
+    "start_s",
+    "end_s",
+    "arrival_s",
+    "body_a",
+    "link_a",
+    "name_a",
+    "body_b",
+    "link_b",
+    "name_b",
+    "x_m",
+    "y_m",
+    "z_m",
+    "impulse_n_s",
+    "speed_m_s",
+    "level_db",
+)
+
+
+def rows_of(events: Sequence[SoundEvent], log: ContactLog) -> list[dict[str, Any]]:
+    """Those that sound, by column."""
+    rows = []
+    for one in events:
+        if one.kind in SOUNDING and not one.reason:
+            a, b = log.bodies[one.low], log.bodies[one.high]
+            names = [body.name.encode("utf-8", "replace").decode() for body in (a, b)]
+            values = (
+                one.kind, one.start_s, one.end_s, one.arrival_s, a.body_id, a.link, names[0], b.body_id, b.link,
+                names[1], *one.place_m.tolist(), one.impulse_n_s, one.speed_m_s, one.level_db,
+            )  # fmt: skip
+            rows.append(dict(zip(COLUMNS, values, strict=True)))
+    return rows
+
+
+def write_events(path: str | os.PathLike[str], events: Sequence[SoundEvent], log: ContactLog) -> dict[str, int]:
+    """Write a .json or .csv, whole or not at all; how many there are of each kind. Raises FileError."""
+    rows = rows_of(events, log)
+    if Path(path).suffix.lower() == ".csv":
+        text = io.StringIO()
+        table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+        content = text.getvalue()
+    else:
+        content = json.dumps({"sounding": rows}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    with replacing(path) as file:
+        file.write(content.encode("utf-8", "replace"))
+    return dict(Counter(row["kind"] for row in rows))

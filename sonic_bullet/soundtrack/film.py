@@ -1,0 +1,155 @@
+"""A log as a film: its poses drawn, its sound beside them, on one clock (film_writer.py).
+
+ContactLog, KeptSound -> Staging (poses at k/fps) -> pictures, by two processes -> FilmWriter -> NAME.mp4
+    + events -> drawn into each picture (overlay.py)
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.levels import check_levels, gain_per_pa
+from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.listener.pictures import Camera, Standing, open_pictures
+from sonic_bullet.parallel import arrays_in_order
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import nearest
+from sonic_bullet.records.errors import AudioError, SceneError
+from sonic_bullet.soundtrack.film_writer import FilmWriter, check_film_output, check_size, samples_of
+from sonic_bullet.soundtrack.overlay import shown_at, with_contacts
+from sonic_bullet.soundtrack.sound_events import SoundEvent, touching_pairs
+from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of, staged
+
+
+@dataclass(frozen=True, slots=True)
+class FilmLook:
+    """How a film looks. size: pixels, even. eye_m, target_m: of the camera, None: chosen. follow: name of the body
+    that the camera moves with. shadows: a third slower.
+    """
+
+    fps: Fraction = Fraction(30)
+    size: tuple[int, int] = (1280, 720)
+    eye_m: tuple[float, float, float] | None = None
+    target_m: tuple[float, float, float] | None = None
+    follow: str | None = None
+    shadows: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FilmReport:
+    """What was made: pictures, samples and how loud they are."""
+
+    path: str
+    pictures: int
+    fps: Fraction
+    size: tuple[int, int]
+    samples: int
+    sr: int
+    channels: int
+    codec: str
+    gain_per_pa: float
+    clipped: int
+    notes: tuple[str, ...]
+
+
+def pictures_in(log: ContactLog, fps: Fraction, seconds: float | None = None) -> int:
+    """Pictures that a film of a log has: the last one begins before its end. Raises AudioError where it is asked for
+    longer than the log lasts, or has no step.
+    """
+    lasts = duration_of(log)
+    if not lasts:
+        raise AudioError("there is no physics step to film", "simulate the scene first")
+    if seconds is not None and seconds > float(lasts) + 1e-9:
+        raise AudioError(
+            f"a film of {seconds:g} s is longer than its sound, {float(lasts):.3f} s",
+            "give fewer seconds, or simulate for longer",
+        )
+    wanted = lasts if seconds is None else min(lasts, Fraction(seconds).limit_denominator(1_000_000))
+    return max(math.ceil(wanted * fps), 1)
+
+
+def make_film(
+    path: str | os.PathLike[str],
+    log: ContactLog,
+    sound: KeptSound,
+    sr: int,
+    *,
+    look: FilmLook | None = None,
+    seconds: float | None = None,
+    standing: Sequence[Standing] = (),
+    events: Sequence[SoundEvent] | None = None,
+    codec: str | None = None,
+    peak_dbfs: float | None = None,
+    lufs: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> FilmReport:
+    """A film of a log with its sound (channels, n) in pascals, whole or not at all; two processes draw.
+
+    standing: shapes of the scene's world, where it is there; events: drawn in, where they are given. codec: of the
+    sound, None: the container's usual one. progress: given the share done. Raises FileError, AudioError, SceneError;
+    stopped or failed under way, the error names the film that is finished so far.
+    """
+    look = FilmLook() if look is None else look
+    check_film_output(path, sr, sound.shape[0], codec)
+    check_size(look.size)
+    check_levels(peak_dbfs, lufs)
+    count = pictures_in(log, look.fps, seconds)
+    gain = gain_per_pa(sound, sr, peak_dbfs, lufs, 1.0)
+    staging = staged(log, look.fps, count, standing)
+    cameras = _cameras(log, staging, look)
+    touching = None if events is None else _touching(log, staging)
+    still = staging.still if len(cameras) == 1 else None
+    drawer = open_pictures(staging.figures, look.size, shadows=look.shadows, still=still)
+
+    def draw(k: int) -> Array:
+        camera = cameras[k] if len(cameras) > 1 else cameras[0]
+        made = drawer.picture(staging.position_m[k], staging.quaternion_xyzw[k], staging.shown[k], camera)
+        if events is None or touching is None:
+            return made
+        time_s = float(k / look.fps)
+        return with_contacts(made, shown_at(events, time_s), touching[k], log, time_s, camera)
+
+    width, height = look.size
+    try:
+        with FilmWriter(
+            path, sound, sr, fps=look.fps, size=look.size, codec=codec, gain_per_pa=gain, pictures=count
+        ) as film:
+            for picture in arrays_in_order(draw, count, (height, width, 3), np.uint8):
+                film.write(picture)
+                if progress is not None:
+                    progress(film.pictures / count)
+    finally:
+        drawer.close()
+    return FilmReport(
+        film.path, count, look.fps, look.size, samples_of(count, look.fps, sr), sr, sound.shape[0], film.codec, gain,
+        film.clipped, staging.notes,
+    )  # fmt: skip
+
+
+def _cameras(log: ContactLog, staging: Staging, look: FilmLook) -> list[Camera]:
+    """One camera, or one a picture where it goes with a body. Raises SceneError where there is no such body."""
+    first = chosen_camera(log, staging, look.eye_m, look.target_m)
+    if look.follow is None:
+        return [first]
+    names = [log.bodies[i].name if i >= 0 else "" for i in staging.body]
+    if look.follow not in names:
+        raise SceneError(f"no body called {look.follow!r} is drawn", nearest(look.follow, sorted({*names} - {""})))
+    path = staging.position_m[:, names.index(look.follow)]
+    off = first.eye_m - first.target_m
+    return [replace(first, eye_m=place + off, target_m=place) for place in path]
+
+
+def _touching(log: ContactLog, staging: Staging) -> list[dict[tuple[int, int], object]]:
+    """Where pairs touch, for each picture."""
+    found: list[dict[tuple[int, int], object]] = []
+    for number, step in enumerate(log.steps):
+        while len(found) < len(staging.step) and staging.step[len(found)] == number:
+            found.append(dict(touching_pairs(step)))
+    return found

@@ -1,0 +1,102 @@
+"""An animation by value: bodies, and where each is at each frame. Every reader makes one, every method of scoring takes
+one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sonic_bullet.listener.animated import AnimatedBody, rotation
+from sonic_bullet.listener.frames import MOTION
+from sonic_bullet.records import Array, frozen_array
+from sonic_bullet.records.arrays import store
+from sonic_bullet.records.coerce import as_kinds, as_number, shown
+from sonic_bullet.records.errors import AnimationError
+
+SLOWEST_FPS, FASTEST_FPS = 5.0, 10_000.0
+STILL_M, STILL_RAD = 1e-5, 1e-4
+"""What moves less from its first pose all the time does not move: a hundredth of a millimetre."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Animation:
+    """fps frames a second. position_m (t, b, 3), quaternion_xyzw (t, b, 4): body frames (centre of mass, principal
+    axes) in a right-handed world. gravity_m_s2 (3,). materials: by a body's name, a preset's name or file; who is not
+    in it is a silent partner.
+    """
+
+    fps: float
+    bodies: tuple[AnimatedBody, ...]
+    position_m: Array
+    quaternion_xyzw: Array
+    gravity_m_s2: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    materials: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        remedy = "give a frame rate from 5 to 10000"
+        fps = as_number(self.fps, "fps", remedy, least=SLOWEST_FPS, most=FASTEST_FPS, error=AnimationError)
+        bodies = as_kinds(self.bodies, AnimatedBody, "bodies", "give AnimatedBody", error=AnimationError)
+        place = frozen_array(self.position_m, float, (None, len(bodies), 3), "animation: position_m")
+        turn = np.array(
+            frozen_array(self.quaternion_xyzw, float, (len(place), len(bodies), 4), "animation: quaternion")
+        )
+        length = np.linalg.norm(turn, axis=2, keepdims=True)
+        if not bodies or len(place) < 3:
+            raise AnimationError(
+                f"{len(bodies)} bodies in {len(place)} frames", "an animation needs a body and three frames"
+            )
+        if (length < 1e-6).any():
+            raise AnimationError("an orientation of no length", "export quaternions (x, y, z, w)")
+        turn /= length
+        names = [one.name for one in bodies]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise AnimationError(f"two bodies are called {shown(twice)}", "give each its own name")
+        turn.setflags(write=False)
+        store(self, fps=fps, bodies=bodies, position_m=place, quaternion_xyzw=turn,
+              gravity_m_s2=frozen_array(self.gravity_m_s2, float, (3,), "animation: gravity_m_s2"))  # fmt: skip
+        if not self.moving.any():
+            raise AnimationError("nothing moves in the animation", "bake the simulation to keyframes, and export those")
+
+    def __len__(self) -> int:
+        return len(self.position_m)
+
+    @property
+    def moving(self) -> Array:
+        """(b,) who is ever elsewhere than in the first frame."""
+        away = np.abs(self.position_m - self.position_m[0]).max(axis=(0, 2)) > STILL_M
+        same = np.abs((self.quaternion_xyzw * self.quaternion_xyzw[0]).sum(axis=2)).min(axis=0)
+        return np.asarray(away | (2 * np.arccos(np.clip(same, 0, 1)) > STILL_RAD))
+
+    @property
+    def free(self) -> Array:
+        """(b,) who is moved by gravity and contacts alone."""
+        return np.array([one.mass_kg > 0 and not one.driven for one in self.bodies], bool)
+
+    def poses(self) -> Array:
+        """MOTION (t, b) of all frames, with the mean speeds since the frame before; in the first, those since a frame
+        before it that gravity alone would have led from. A semi-implicit integrator starts its step with just these:
+        x(n) = x(n-1) + v(n)·dt.
+        """
+        motion = np.zeros(self.position_m.shape[:2], MOTION)
+        motion["position_m"], motion["quaternion_xyzw"] = self.position_m, self.quaternion_xyzw
+        motion["velocity_m_s"][1:] = np.diff(self.position_m, axis=0) * self.fps
+        motion["spin_rad_s"][1:] = rotation(self.quaternion_xyzw[:-1], self.quaternion_xyzw[1:]) * self.fps
+        motion["velocity_m_s"][0] = motion["velocity_m_s"][1]
+        motion["velocity_m_s"][0][self.free] -= self.gravity_m_s2 / self.fps
+        motion["spin_rad_s"][0] = motion["spin_rad_s"][1]
+        return motion
+
+
+def matrices(quaternion: Array) -> Array:
+    """Rotation matrices (…, 3, 3) of unit quaternions (…, 4), x y z w [Kuipers 1999, sec. 5.15]."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

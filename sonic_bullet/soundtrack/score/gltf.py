@@ -1,0 +1,327 @@
+"""glTF 2.0 and GLB with node animations -> Export [Khronos, glTF 2.0 Specification, 2021; sections in brackets].
+
+    JSON, buffers (GLB chunk, data URI, file beside it) -> accessors [3.6.2]
+    nodes -> meshes that hang on them, samplers STEP, LINEAR, CUBICSPLINE [3.11, C.1-C.5] -> global transforms a frame
+
+What is read is rigid motion of meshes: a scale that stays is part of the mesh, one that changes, a skin or a morph is
+refused. y is up and a metre is 1 [3.4]; here z is up: (x, -z, y), as Blender had it before it exported. What a node's
+`extras` say (Blender: custom properties) of material, restitution, friction, mass_kg, driven counts as stated, and so
+do mass and isKinematic of KHR_physics_rigid_bodies.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from sonic_bullet.files.reading import reading
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.errors import AnimationError
+from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
+from sonic_bullet.soundtrack.score.keyframes import tipped, upright
+
+BYTES_MAX = 1 << 30
+FRAMES_MAX = 2_000_000
+USUAL_FPS = 30.0
+_REMEDY = "export it again as glTF 2.0 (.glb)"
+COMPONENT = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+STRETCH = 1e-3
+"""Share by which a scale may change, or the axes of a transform be oblique, and still be rounding."""
+
+
+def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
+    """The rigid bodies of a .gltf or .glb, each frame of its animations. fps: of the frames; None: that of its
+    keyframes. scale: of lengths. Raises FileError, AnimationError.
+    """
+    place = Path(path)
+    with reading(path, "glTF file", AnimationError, _REMEDY):
+        if place.stat().st_size > BYTES_MAX:
+            raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
+        file = _File.of(place)
+        channels = _channels(file)
+        if not channels:
+            raise AnimationError(
+                f"{path} holds no node animation", "bake the simulation to keyframes and export with animations"
+            )
+        times = [sampler.time_s for own in channels.values() for sampler in own.values()]
+        rate = fps if fps is not None else _rate(times)
+        first, last = min(t[0] for t in times), max(t[-1] for t in times)
+        count = int(np.floor((last - first) * rate + 1e-3)) + 1
+        if not 0 < count <= FRAMES_MAX:
+            raise AnimationError(f"{path} has {count} frames", "give another --fps")
+        at_s = first + np.arange(count) / rate
+        notes: list[str] = []
+        objects = tuple(_objects(file, channels, at_s, scale, notes))
+        return Export(rate, objects, np.array([0.0, 0.0, -9.81]), tuple(notes))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _File:
+    """The JSON tree, and the bytes of each buffer."""
+
+    tree: dict[str, Any]
+    buffer: tuple[bytes, ...]
+
+    @classmethod
+    def of(cls, path: Path) -> _File:
+        raw, chunk = path.read_bytes(), b""
+        if raw[:4] == b"glTF":  # [4.4]
+            version, length = struct.unpack_from("<II", raw, 4)
+            size, kind = struct.unpack_from("<I4s", raw, 12)
+            if version != 2 or kind != b"JSON" or length > len(raw):
+                raise AnimationError(f"{path} is no whole GLB of version 2", _REMEDY)
+            text, rest = raw[20 : 20 + size], 20 + size
+            if rest + 8 <= len(raw):
+                more, kind = struct.unpack_from("<I4s", raw, rest)
+                chunk = raw[rest + 8 : rest + 8 + more] if kind == b"BIN\0" else b""
+        else:
+            text = raw
+        tree = json.loads(text)
+        if not isinstance(tree, dict) or str(tree.get("asset", {}).get("version", ""))[:2] != "2.":
+            raise AnimationError(f"{path} is no glTF of version 2", _REMEDY)
+        needed = set(tree.get("extensionsRequired", ())) - {"KHR_mesh_quantization", "KHR_texture_transform"}
+        packed = sorted(x for x in needed if "draco" in x.lower() or "meshopt" in x.lower())
+        if packed:
+            raise AnimationError(f"{path} is compressed with {packed[0]}", "export it without compression")
+        return cls(tree, tuple(_buffer(one, chunk, path) for one in tree.get("buffers", ())))
+
+    def accessor(self, index: int) -> Array:
+        """(n, width) float, or integer where it is no normalised one."""
+        it = self.tree["accessors"][index]
+        kind, width, count = np.dtype(COMPONENT[it["componentType"]]), WIDTH[it["type"]], int(it["count"])
+        if "sparse" in it or "bufferView" not in it:
+            raise AnimationError("an accessor is sparse or empty", "export with full accessors")
+        view = self.tree["bufferViews"][it["bufferView"]]
+        data = self.buffer[view["buffer"]]
+        start = int(view.get("byteOffset", 0)) + int(it.get("byteOffset", 0))
+        row = kind.itemsize * width
+        stride = int(view.get("byteStride", row))
+        if start < 0 or stride < row or count < 1 or start + (count - 1) * stride + row > len(data):
+            raise AnimationError("an accessor claims more bytes than its buffer has", _REMEDY)
+        found = np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
+        if kind.kind == "f" or not it.get("normalized"):
+            return np.array(found, float if kind.kind == "f" else np.int64)
+        most = float(np.iinfo(kind).max)
+        return np.maximum(found.astype(float) / most, -1.0)  # [3.11]
+
+
+def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path) -> bytes:
+    uri = one.get("uri")
+    if uri is None:
+        data = chunk
+    elif uri.startswith("data:"):
+        data = base64.b64decode(uri.split(",", 1)[1])
+    else:
+        name = Path(unquote(uri))
+        if name.is_absolute() or ".." in name.parts:
+            raise AnimationError(f"buffer {shown(uri)} lies outside its folder", "keep it beside the .gltf")
+        data = (path.parent / name).read_bytes()
+    if len(data) < int(one.get("byteLength", 0)):
+        raise AnimationError("a buffer is shorter than it claims", _REMEDY)
+    return data
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sampler:
+    """Keys (k,) in s and values (k, w), or (3k, w) of a cubic spline: in-tangent, value, out-tangent of each."""
+
+    time_s: Array
+    value: Array
+    interpolation: str
+    turns: bool
+
+    def at(self, time_s: Array) -> Array:
+        """(t, w) at these times, held before the first and after the last key [C.1 … C.5]."""
+        key, x = self.time_s, np.clip(time_s, self.time_s[0], self.time_s[-1])
+        i = np.clip(np.searchsorted(key, x + 1e-6, side="right") - 1, 0, max(len(key) - 2, 0))
+        j = np.minimum(i + 1, len(key) - 1)
+        width = np.maximum(key[j] - key[i], 1e-12)
+        s = np.clip((x - key[i]) / width, 0, 1)[:, None]
+        if self.interpolation == "CUBICSPLINE":
+            knots = self.value.reshape(len(key), 3, -1)
+            a, b = knots[i], knots[j]
+            found = (
+                (2 * s**3 - 3 * s**2 + 1) * a[:, 1] + width[:, None] * (s**3 - 2 * s**2 + s) * a[:, 2]
+                + (3 * s**2 - 2 * s**3) * b[:, 1] + width[:, None] * (s**3 - s**2) * b[:, 0]
+            )  # fmt: skip
+        elif self.interpolation == "STEP":
+            found = np.where(s >= 1, self.value[j], self.value[i])
+        elif self.turns:
+            found = _slerp(self.value[i], self.value[j], s)
+        else:
+            found = self.value[i] + s * (self.value[j] - self.value[i])
+        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True) if self.turns else found)
+
+
+def _slerp(a: Array, b: Array, s: Array) -> Array:
+    """[C.4], Shoemake 1985."""
+    dot = (a * b).sum(axis=1, keepdims=True)
+    b, dot = np.where(dot < 0, -b, b), np.minimum(np.abs(dot), 1.0)
+    angle = np.arccos(dot)
+    small = angle < 1e-6
+    sine = np.where(small, 1.0, np.sin(angle))
+    return np.asarray(np.where(small, a + s * (b - a), (np.sin((1 - s) * angle) * a + np.sin(s * angle) * b) / sine))
+
+
+def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
+    """Samplers of each animated node, of all animations: what two of them say of one path, the first says."""
+    found: dict[int, dict[str, _Sampler]] = {}
+    for animation in file.tree.get("animations", ()):
+        for channel in animation.get("channels", ()):
+            node, path = channel["target"].get("node"), channel["target"]["path"]
+            if node is None or path not in REST or path in found.get(node, {}):
+                continue
+            sampler = animation["samplers"][channel["sampler"]]
+            time_s = file.accessor(sampler["input"])[:, 0].astype(float)
+            value = file.accessor(sampler["output"]).astype(float)
+            how = sampler.get("interpolation", "LINEAR")
+            if len(value) != len(time_s) * (3 if how == "CUBICSPLINE" else 1) or (np.diff(time_s) <= 0).any():
+                raise AnimationError("a sampler has not one value a key, or keys out of order", _REMEDY)
+            if not (np.isfinite(time_s).all() and np.isfinite(value).all()):
+                raise AnimationError("a sampler holds numbers that are none", _REMEDY)
+            found.setdefault(node, {})[path] = _Sampler(time_s, value, how, path == "rotation")
+    return found
+
+
+def _rate(times: list[Array]) -> float:
+    """Frames a second of baked keys: the median of their distances; `USUAL_FPS` where they are sparse."""
+    gaps = np.concatenate([np.diff(t) for t in times]) if times else np.zeros(0)
+    if len(gaps) < 8:
+        return USUAL_FPS
+    middle = float(np.median(gaps))
+    rate = 1 / middle
+    whole = round(rate) if abs(rate - round(rate)) < 0.02 * 1.001 else rate
+    return float(whole) if rate >= 10 else USUAL_FPS
+
+
+def _objects(
+    file: _File, channels: Mapping[int, Mapping[str, _Sampler]], at_s: Array, scale: float, notes: list[str]
+) -> Iterator[ExportedObject]:
+    nodes = file.tree.get("nodes", [])
+    parent = {child: i for i, node in enumerate(nodes) for child in node.get("children", ())}
+    known: dict[int, Array] = {}
+
+    def world(i: int, depth: int = 0) -> Array:
+        """(t, 4, 4) of a node."""
+        if depth > len(nodes):
+            raise AnimationError("its nodes hang on themselves", _REMEDY)
+        if i not in known:
+            own = _local(nodes[i], channels.get(i, {}), at_s)
+            known[i] = world(parent[i], depth + 1) @ own if i in parent else own
+        return known[i]
+
+    taken: set[str] = set()
+    for i, node in enumerate(nodes):
+        if "mesh" not in node:
+            continue
+        name = str(node.get("name") or f"node {i}")
+        while name in taken:
+            name += "'"
+        taken.add(name)
+        if "skin" in node:
+            notes.append(f"{name} is skinned, which is no rigid motion: it is left out")
+            continue
+        vertex, face = _mesh(file, file.tree["meshes"][node["mesh"]])
+        if not len(face):
+            notes.append(f"{name} has no triangles: it is left out")
+            continue
+        matrix = world(i)
+        stretch, place, turn = _rigid(name, matrix)
+        yield ExportedObject(
+            name,
+            upright(place * scale, "y"),
+            tipped(turn),
+            (vertex @ stretch.T * scale, face),
+            stated=_stated(name, node),
+        )
+
+
+def _local(node: Mapping[str, Any], own: Mapping[str, _Sampler], at_s: Array) -> Array:
+    """(t, 4, 4) of a node in its parent [3.5.3]."""
+    from scipy.spatial.transform import Rotation
+
+    if "matrix" in node and not own:
+        return np.broadcast_to(np.array(node["matrix"], float).reshape(4, 4).T, (len(at_s), 4, 4))
+    part = {
+        path: own[path].at(at_s)
+        if path in own
+        else np.broadcast_to(np.array(node.get(path, rest), float), (len(at_s), len(rest)))
+        for path, rest in REST.items()
+    }
+    made = np.zeros((len(at_s), 4, 4))
+    made[:, :3, :3] = Rotation.from_quat(part["rotation"]).as_matrix() * part["scale"][:, None, :]
+    made[:, :3, 3], made[:, 3, 3] = part["translation"], 1.0
+    return made
+
+
+def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
+    """What stays of a transform (t, 4, 4), (3, 3), and what moves, as positions (t, 3) and turns (t, 4): M = R S with
+    S that of the first frame [polar decomposition, Shoemake & Duff 1992].
+    """
+    from scipy.linalg import polar
+    from scipy.spatial.transform import Rotation
+
+    stretch = polar(matrix[0, :3, :3])[1]
+    if not np.linalg.det(stretch) > 1e-18:
+        raise AnimationError(f"{shown(name)} has a scale of zero", "apply the scale before the export")
+    frame = matrix[:, :3, :3] @ np.linalg.inv(stretch)
+    if np.linalg.det(frame[0]) < 0:  # mirrored: the mirror belongs to the mesh
+        stretch, frame = -stretch, -frame
+    wrong = np.abs(np.einsum("tij,tik->tjk", frame, frame) - np.eye(3)).max(axis=(1, 2))
+    if wrong.max() > 2 * STRETCH:
+        raise AnimationError(
+            f"{shown(name)} changes its size at frame {int(wrong.argmax())}", "animate position and rotation alone"
+        )
+    return stretch, matrix[:, :3, 3].copy(), Rotation.from_matrix(frame).as_quat()
+
+
+def _mesh(file: _File, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Vertices (v, 3) and triangles (f, 3) of all primitives of a mesh that are triangles [3.7.2]."""
+    vertices, faces, at = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
+    for part in mesh.get("primitives", ()):
+        if part.get("mode", 4) != 4:
+            continue
+        vertex = file.accessor(part["attributes"]["POSITION"]).astype(float)
+        index = file.accessor(part["indices"])[:, 0] if "indices" in part else np.arange(len(vertex))
+        face = index.astype(np.int64)[: len(index) // 3 * 3].reshape(-1, 3)
+        if len(face) and (face.min() < 0 or face.max() >= len(vertex)):
+            raise AnimationError("a face names no vertex", _REMEDY)
+        vertices.append(vertex)
+        faces.append(face + at)
+        at += len(vertex)
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def _stated(name: str, node: Mapping[str, Any]) -> Rule:
+    """What a node says of itself; what is no number or text there is passed over."""
+    extras: Mapping[str, Any] = node["extras"] if isinstance(node.get("extras"), dict) else {}
+    body = (node.get("extensions") or {}).get("KHR_physics_rigid_bodies") or {}
+    motion = body.get("motion") or {}
+
+    def number(value: object) -> float | None:
+        real = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return float(value) if real and 0 <= value < 1e6 else None  # type: ignore[arg-type,operator]
+
+    mass = number(extras.get("mass_kg"))
+    driven = extras.get("driven", motion.get("isKinematic"))
+    material = extras.get("material")
+    return Rule(
+        name,
+        material if isinstance(material, str) else None,
+        number(extras.get("restitution")),
+        number(extras.get("friction")),
+        number(motion.get("mass")) if mass is None else mass,
+        bool(driven) if isinstance(driven, (bool, int)) else None,
+    )

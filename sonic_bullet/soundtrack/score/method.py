@@ -1,0 +1,38 @@
+"""How the contacts of an animation are found, and the steps that the run time is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil
+
+from sonic_bullet.listener.animated import PoseStage
+from sonic_bullet.records import Array
+from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
+from sonic_bullet.soundtrack.score.shooting import Shooting
+
+FIT_FROM_FPS = 119.0
+STEP_HZ = 240.0
+
+
+def substeps_of(fps: float) -> int:
+    """Steps to a frame."""
+    return 1 if fps >= FIT_FROM_FPS else ceil(STEP_HZ / fps - 1e-9)
+
+
+def find_steps(
+    animation: Animation,
+    stage: PoseStage,
+    found: list[tuple[Array, Array]],
+    progress: Callable[[float], None] | None = None,
+    *,
+    hidden_m_s: float = 0.0,
+) -> None:
+    """Append MOTION (b,) at the start of each step with its loaded RAW rows: stopped, it leaves those so far.
+
+    hidden_m_s: the change of speed from frame to frame that is not told from noise in the poses.
+    """
+    if animation.fps >= FIT_FROM_FPS:
+        fit_steps(animation, stage, found, progress, hidden_m_s=hidden_m_s)
+    else:
+        Shooting(animation, stage, substeps_of(animation.fps)).find_steps(found, progress)

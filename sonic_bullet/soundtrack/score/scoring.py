@@ -1,0 +1,214 @@
+"""From a file of poses to a sound and a contact log.
+
+.glb .gltf .json .npz -> Export -> Animation -> checks -> steps (method.py) -> AnimatedWorld -> Listener -> RenderResult
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files import check_sr
+from sonic_bullet.listener.animated import AnimatedBody
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.coerce import as_number, as_path, shown
+from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
+from sonic_bullet.render import silence_notes
+from sonic_bullet.scene import RenderResult, render_scene
+from sonic_bullet.session import Listener, attach
+from sonic_bullet.session.arguments import MicrophoneLike
+from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.export import Export, Rule, assembled
+from sonic_bullet.soundtrack.score.flight import FALL_RANGE, alone, driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
+from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
+
+ENDINGS = (".glb", ".gltf", ".json", ".npz")
+MICROPHONE = (0.0, -1.0, 0.5)
+DEEP_M = 0.01
+"""How deep poses may overlap at a frame and still be one touch of two bodies."""
+
+
+def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
+    """What a file of poses says. fps: frames a second in place of its own; scale: of its lengths, 0.01 for centimetres.
+
+    Raises FileError, AnimationError.
+    """
+    place = Path(as_path(path, "path", "name an animation, such as take1.glb"))
+    if place.suffix.lower() not in ENDINGS:
+        raise AnimationError(f"{place} is no animation by its name", f"give one that ends in {', '.join(ENDINGS)}")
+    if not place.is_file():
+        raise FileError(f"cannot read {place}: no such file", "give an animation")
+    if fps is not None:
+        fps = as_number(fps, "fps", "give frames a second, 5 to 10000", least=5, most=1e4, error=AnimationError)
+    scale = as_number(scale, "scale", "give a number above 0", above=0, error=AnimationError)
+    if place.suffix.lower() in (".glb", ".gltf"):
+        from sonic_bullet.soundtrack.score.gltf import read_gltf
+
+        return read_gltf(place, fps, scale)
+    from sonic_bullet.soundtrack.score.keyframes import read_keyframes
+
+    return read_keyframes(place, fps, scale)
+
+
+def score_animation(
+    animation: str | os.PathLike[str] | Animation,
+    *,
+    rules: Sequence[Rule] = (),
+    material: str = "plastic",
+    fps: float | None = None,
+    scale: float = 1.0,
+    sr: int = 48_000,
+    seed: int = 0,
+    microphones: MicrophoneLike = MICROPHONE,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> RenderResult:
+    """The sound of a baked animation, its contact log, and notes a user should read.
+
+    rules: what bodies are made of, by name, the first that says something wins; material: of what moves and has none.
+    Raises SonicBulletError; where it was interrupted under way, the exception carries what was scored so far as
+    ``partial``.
+    """
+    sr = check_sr(sr)
+    notes: tuple[str, ...] = ()
+    if not isinstance(animation, Animation):
+        animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
+    notes += _check_fall(animation)
+    from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
+
+    say = say or (lambda text: None)
+    half = (lambda share: progress(0.7 * share)) if progress is not None else None
+    with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
+        apart = alone(animation, stage)
+        driven = driven_bodies(animation, apart)
+        if driven.any():
+            bodies = tuple(
+                replace(x, driven=x.driven or bool(d)) for x, d in zip(animation.bodies, driven, strict=True)
+            )
+            animation = replace(animation, bodies=bodies)
+            stage.bodies = bodies
+            stage.held |= driven
+        noise_m = pose_noise_m(animation, apart)
+        say("who touches whom")
+        steps: list[tuple[Array, Array]] = []
+        stopped: KeyboardInterrupt | None = None
+        try:
+            find_steps(animation, stage, steps, half, hidden_m_s=hidden_n_s(1.0, noise_m or 0.0, animation.fps))
+        except KeyboardInterrupt as error:  # those so far are played and kept
+            stopped = error
+        dt_s = 1 / animation.fps / substeps_of(animation.fps)
+        notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m) + _deep_notes(steps)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)
+            listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=seed, microphone=microphones)
+            ids = dict(zip((one.name for one in animation.bodies), stage.ids, strict=True))
+            listener.add_all({ids[name]: made for name, made in animation.materials.items()}, progress=say)
+            try:
+                for number in range(len(steps)):
+                    listener.step()
+                    if progress is not None and number % 16 == 0:
+                        progress(0.7 + 0.3 * number / len(steps))
+            except (SonicBulletError, KeyboardInterrupt) as error:
+                error.partial = _result(listener, notes)  # type: ignore[union-attr]
+                raise
+        if stopped is not None:
+            stopped.partial = _result(listener, notes)  # type: ignore[attr-defined]
+            raise stopped
+        return _result(listener, notes)
+
+
+def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = None, **options: Any) -> RenderResult:
+    """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
+
+    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored.
+    """
+    from sonic_bullet.render import render_kept
+    from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
+
+    shapes: dict[tuple[int, int], tuple[Shape, ...]] = {}
+
+    def look(listener: Listener) -> None:
+        for body in listener.world.living:
+            with suppress(MeshError):
+                shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
+
+    half = (lambda share: progress(0.5 * share)) if progress is not None else None
+    rest = (lambda share: progress(0.5 + 0.5 * share)) if progress is not None else None
+    result = render_scene(path, progress=half, at_end=look, **options)
+    moves = moves_of(result.log)
+    if not any(one.drives for one in moves):
+        raise AnimationError(f"{path} drives no body by hand", "render it: contacts are simulated")
+    known = {
+        i: shapes[body.body_id, body.link]
+        for i, body in enumerate(result.log.bodies)
+        if (body.body_id, body.link) in shapes
+    }
+    log = scored_by_hand(result.log, known, moves)
+    sound = render_kept(log, progress=rest)
+    notes = tuple(note for note in result.notes if note not in silence_notes(result.sound, result.log))
+    return RenderResult(sound, log, result.sr, (*notes, *move_notes(log, moves), *silence_notes(sound, log)))
+
+
+def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:
+    sound, log = listener.kept_sound(), listener.contacts
+    return RenderResult(sound, log, listener.sr, (*notes, *listener.notes, *silence_notes(sound, log)))
+
+
+def _check_fall(animation: Animation) -> tuple[str, ...]:
+    """Raise AnimationError where bodies fall as if a metre were something else."""
+    found, expected = fall_m_s2(animation), float(np.linalg.norm(animation.gravity_m_s2))
+    if found is None or expected == 0:
+        return ()
+    ratio = found / expected
+    if not FALL_RANGE[0] < ratio < FALL_RANGE[1]:
+        factor = {2: "0.01, centimetres", 3: "0.001, millimetres"}.get(round(np.log10(ratio)), f"{1 / ratio:.3g}")
+        raise AnimationError(
+            f"bodies fall with {found:.4g} m/s² in this animation, gravity is {expected:.3g}",
+            f"give --scale {factor}, or the true --fps",
+        )
+    if abs(ratio - 1) > 0.1:
+        return (f"bodies fall with {found:.3g} m/s², gravity is {expected:.3g}: slow motion, or another scale",)
+    return ()
+
+
+def _driven_notes(bodies: Sequence[AnimatedBody]) -> tuple[str, ...]:
+    names = [shown(one.name) for one in bodies if one.driven]
+    return (f"{', '.join(names[:8])} moved by hand: what it pushes is heard, not what pushes it",) if names else ()
+
+
+def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
+    """What noise in the poses hides, where it is more than a light touch."""
+    if noise_m is None:
+        return ()
+    hidden = [(hidden_n_s(one.mass_kg, noise_m, animation.fps), one.name) for one in animation.bodies if one.mass_kg]
+    worst = max(hidden, default=(0.0, ""))
+    speed = worst[0] / max((one.mass_kg for one in animation.bodies if one.name == worst[1]), default=1.0)
+    if speed < 0.02:
+        return ()
+    return (
+        f"poses are good to {noise_m * 1e6:.3g} µm: impacts below {speed:.2g} m/s ({worst[0] * 1e3:.2g} mN s of "
+        f"{shown(worst[1])}) are hidden in that and not played",
+    )
+
+
+def _deep_notes(steps: Sequence[tuple[Array, Array]]) -> tuple[str, ...]:
+    deepest = -min((float(raw["gap_m"].min()) for _, raw in steps if len(raw)), default=0.0)
+    if deepest < DEEP_M:
+        return ()
+    return (f"bodies overlap by up to {deepest * 1e3:.0f} mm at frames: their meshes, or the scale, may be wrong",)
+
+
+def rules_of(table: str | os.PathLike[str] | None) -> tuple[Rule, ...]:
+    """The rules of a table's file, none without one. Raises FileError, AnimationError."""
+    if table is None:
+        return ()
+    from sonic_bullet.soundtrack.score.keyframes import read_rules
+
+    return read_rules(as_path(table, "table", "name a JSON table of materials"))

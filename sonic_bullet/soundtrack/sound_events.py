@@ -1,0 +1,284 @@
+"""When what sounds, and why: impacts, rolling and sliding as the run time takes them, and contacts that stay silent.
+
+    ContactLog -> render_apart, step by step -> EventWitness: PULSE (strikes that are accepted), drives (friction), PAIR
+        -> one impact of all pulses that a strike was told in; steps of one kind -> one span -> SoundEvent
+        + stems -> level at the first microphone
+
+Nothing is judged here a second time: an impact is a pulse that the run time plays (render.strike_pulses), a roll or a
+slide a pair whose surface voice makes a force (render.friction). Which of both is by slip: a contact that slips faster
+than it must to be heard slides. What carries load and does neither is support; a load that leaps and is not accepted
+is a strike without a cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.riff.wave_chunks import Cue
+from sonic_bullet.records import Array, Microphone
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
+from sonic_bullet.render.friction import SWEEP_FLOOR_M_S
+from sonic_bullet.render.synthesis_state import State
+from sonic_bullet.soundtrack.stems import Stem, pair_sound
+from sonic_bullet.synth.fractional_delay import AHEAD
+from sonic_bullet.synth.strikes import NOW, SPAN
+
+IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED = "impact", "roll", "slide", "support", "uncaused strike"
+SOUNDING = (IMPACT, ROLL, SLIDE)
+LASTING = (ROLL, SLIDE, SUPPORT)
+LEVEL_S = 0.05
+"""How long after an impact arrives its peak is looked for: the ear's integration time for loudness is of that order,
+and the latest mode's first swing is over."""
+CARRIES = "it carries weight: nothing strikes, and no surface sweeps past"
+NO_CAUSE = "nothing approached faster than gravity brings it while it rests"
+NO_VOICE = "neither body has modes, nor moves freely"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SoundEvent:
+    """A contact of two bodies, from start_s to end_s (of an impact the start of its last pulse), physics time.
+
+    low, high: indices into the log's bodies. place_m (3,): world frame, where it begins. impulse_n_s: of an impact the
+    magnitude that the run time plays, else the load's time integral. speed_m_s: of an impact the approach, of a slide
+    the slip, of a roll the sweep, means by load. arrival_s: when its first sound is at the first microphone. level_db:
+    re 20 µPa there, of both bodies together: the peak within `LEVEL_S` of an impact, the rms of a roll or slide; None
+    where nothing of it is in the sound, or it is no pressure. reason: why it is silent, empty where it sounds.
+    """
+
+    kind: str
+    start_s: float
+    end_s: float
+    low: int
+    high: int
+    place_m: Array
+    impulse_n_s: float
+    speed_m_s: float
+    arrival_s: float
+    level_db: float | None = None
+    reason: str = ""
+
+
+class _Touch(NamedTuple):
+    """Where a pair touches in a step (world), and how fast."""
+
+    place_m: tuple[float, float, float]
+    slip_m_s: float
+    sweep_m_s: float
+    approach_m_s: float
+
+
+_NOWHERE = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+
+
+class _Moment(NamedTuple):
+    """A pair in a step, or a pulse of it."""
+
+    low: int
+    high: int
+    step: int
+    start_s: float
+    end_s: float
+    kind: str
+    touch: _Touch
+    impulse_n_s: float
+    speed_m_s: float
+    reason: str = ""
+
+
+class EventWitness:
+    """Sees every step of a log's run; `events` are what it saw."""
+
+    def __init__(self, log: ContactLog) -> None:
+        self._log, self._steps = log, iter(log.steps)
+        self._known: dict[int, Mapping[tuple[int, int], _Touch]] = {}
+        self._seen: list[_Moment] = []
+        self._struck: dict[tuple[int, int], int] = {}
+
+    def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:
+        """Take in the pulses and drives of step ``number``, and which pairs carry load without them."""
+        here, there = self._touching(number), self._touching(number + 1)
+        begin_s, after_s = float(step["begin_s"]), float(step["after_s"])
+        for pulse in state.scratch.pulse[:found]:
+            low, high = (int(state.body[i]) for i in pulse["body"])
+            ahead = int(pulse["ahead"])
+            of, start_s = (there, after_s) if ahead else (here, begin_s)
+            start_s += float(pulse["start_s"])
+            touch = of.get((low, high)) or here.get((low, high)) or _NOWHERE
+            self._struck[low, high] = number + ahead
+            impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
+            self._seen.append(
+                _Moment(low, high, number + ahead, start_s, start_s, IMPACT, touch, impulse, max(touch.approach_m_s, 0))
+            )
+        active = state.pairs.active[: state.pairs.count[0]]
+        pair, driven = state.pairs.pair[active], np.isin(active, state.scratch.slot[:drives])
+        force, before, used = pair["force_n"][:, NOW], pair["force_n"][:, NOW - 1], pair["struck_n"][:, NOW]
+        leaps, carries = (force > before) & (used > 0), (pair["support_n"][:, 1] > 0) & (force > 0)
+        table = state.table.bodies
+        mute = (table["modes"] + table["rigid"] == 0)[pair["body"]].all(axis=1)
+        bodies = state.body[pair["body"]].tolist()
+        for i in np.flatnonzero(driven | leaps | carries).tolist():
+            who = bodies[i][0], bodies[i][1]
+            touch = there.get(who) or here.get(who) or _NOWHERE
+            load, speed = float(force[i]) * (after_s - begin_s), touch.sweep_m_s
+            if driven[i]:
+                slides = touch.slip_m_s > max(SWEEP_FLOOR_M_S, 0.5 * speed)
+                kind, speed, reason = (SLIDE, touch.slip_m_s, "") if slides else (ROLL, speed, "")
+            elif leaps[i] and number - self._struck.get(who, -SPAN) >= SPAN:
+                kind, speed, reason = UNCAUSED, max(touch.approach_m_s, 0), NO_CAUSE
+            elif carries[i]:
+                kind, reason = SUPPORT, CARRIES
+            else:
+                continue
+            reason = NO_VOICE if mute[i] else reason
+            self._seen.append(_Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason))
+
+    def _touching(self, number: int) -> Mapping[tuple[int, int], _Touch]:
+        """The pairs that touch in a step of the log; behind its last nobody does."""
+        while number not in self._known:
+            step, at = next(self._steps, None), max(self._known, default=-1) + 1
+            self._known = {k: v for k, v in self._known.items() if k >= at - SPAN} | {at: touching_pairs(step)}
+        return self._known[number]
+
+    def events(self, stems: Sequence[Stem], sr: int) -> tuple[SoundEvent, ...]:
+        """All of them in the order of their times, with their levels."""
+        order = sorted(self._seen, key=lambda one: (one.low, one.high, one.step, one.start_s))
+        found: list[SoundEvent] = []
+        for _, mine in groupby(order, key=lambda one: one[:2]):
+            moments = list(mine)
+            for kind, apart in ((IMPACT, 1), (UNCAUSED, SPAN)):
+                found += [self._impact(group) for group in _strikes([x for x in moments if x.kind == kind], apart)]
+            found += [self._span(group) for group in _spans([x for x in moments if x.kind in LASTING])]
+        by_index = {stem.index: stem for stem in stems}
+        pressure = bool(self._log.sensors) and isinstance(self._log.sensors[0], Microphone)
+        return tuple(
+            replace(one, level_db=_level_db(one, by_index, sr) if pressure and not one.reason else None)
+            for one in sorted(found, key=lambda one: (one.start_s, one.low, one.high, one.kind))
+        )
+
+    def _impact(self, pulses: list[_Moment]) -> SoundEvent:
+        first = pulses[0]
+        impulse = sum(one.impulse_n_s for one in pulses)
+        return self._event(first, pulses[-1].end_s, impulse, max(one.speed_m_s for one in pulses))
+
+    def _span(self, moments: list[_Moment]) -> SoundEvent:
+        load = np.array([one.impulse_n_s for one in moments])
+        speed = float(np.average([one.speed_m_s for one in moments], weights=load + 1e-300))
+        return self._event(moments[0], moments[-1].end_s, float(load.sum()), speed)
+
+    def _event(self, first: _Moment, end_s: float, impulse_n_s: float, speed_m_s: float) -> SoundEvent:
+        log, late_s, place_m = self._log, 0.0, np.array(first.touch.place_m)
+        if log.sensors and isinstance(log.sensors[0], Microphone):
+            away = float(np.linalg.norm(place_m - log.sensors[0].position_m))
+            late_s = max(away / log.air.sound_speed_m_s, AHEAD / log.sr)
+        return SoundEvent(
+            first.kind, first.start_s, end_s, first.low, first.high, place_m, impulse_n_s, speed_m_s,
+            first.start_s + late_s, None, first.reason,
+        )  # fmt: skip
+
+
+def touching_pairs(step: Step | None) -> Mapping[tuple[int, int], _Touch]:
+    """Each pair's contacts of a step as one: means by load."""
+    if step is None or not len(step.contacts.row):
+        return {}
+    row = step.contacts.row
+    load = np.abs(np.einsum("ki,ki->k", row["impulse_n_s"], row["normal"])) + 1e-300
+    at = np.searchsorted(step.body, row["a"])
+    place = step.position_m[at] + _turned(step.quaternion_xyzw[at], row["point_a_m"])
+    slip, sweep = np.linalg.norm(row["slip_m_s"], axis=1), row["sweep_m_s"].max(axis=1)
+    pair, which = np.unique(np.sort(np.stack([row["a"], row["b"]], 1), axis=1), axis=0, return_inverse=True)
+    total = np.bincount(which.ravel(), load)
+    x, y, z, slip, sweep = (
+        (np.bincount(which.ravel(), load * value) / total).tolist() for value in (*place.T, slip, sweep)
+    )
+    approach = np.full(len(pair), -np.inf)
+    np.maximum.at(approach, which.ravel(), row["approach_m_s"])
+    return {
+        (low, high): _Touch((x[i], y[i], z[i]), slip[i], sweep[i], float(approach[i]))
+        for i, (low, high) in enumerate(pair.tolist())
+    }
+
+
+def _turned(quaternion: Array, vector: Array) -> Array:
+    """Vectors (k, 3) turned by unit quaternions (k, 4), x y z w: v + 2 w (q × v) + 2 q × (q × v)."""
+    axis, real = quaternion[:, :3], quaternion[:, 3:]
+    across = np.cross(axis, vector)
+    return np.asarray(vector + 2 * (real * across + np.cross(axis, across)))
+
+
+def _strikes(pulses: list[_Moment], apart: int) -> list[list[_Moment]]:
+    """Pulses of one pair, those of one strike together: what a strike lacks when it is found follows a step later.
+    apart: steps within which one belongs to the one before.
+    """
+    groups: list[list[_Moment]] = []
+    for one in pulses:
+        if groups and one.step - groups[-1][-1].step <= apart:
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    return groups
+
+
+def _spans(moments: list[_Moment]) -> list[list[_Moment]]:
+    """Steps of one pair as spans of one kind; a kind that lasts less than `SPAN` steps, as manifolds flicker, belongs
+    to what was before it, and a gap of as much ends none.
+    """
+    runs: list[list[_Moment]] = []
+    for one in moments:
+        if runs and runs[-1][-1].kind == one.kind and one.step - runs[-1][-1].step <= SPAN:
+            runs[-1].append(one)
+        else:
+            runs.append([one])
+    spans: list[list[_Moment]] = []
+    for run in runs:
+        last = spans[-1] if spans else None
+        if last is not None and run[0].step - last[-1].step <= SPAN and (
+            len(run) < SPAN or last[0].kind == run[0].kind
+        ):  # fmt: skip
+            last.extend(run)
+        else:
+            spans.append(run)
+    return spans
+
+
+def _level_db(event: SoundEvent, stems: Mapping[int, Stem], sr: int) -> float | None:
+    """Peak of an impact, rms of a span, as the two bodies send it to the first microphone."""
+    late_s = event.arrival_s - event.start_s
+    stop_s = event.arrival_s + LEVEL_S if event.kind == IMPACT else event.end_s + late_s
+    sound = pair_sound(dict(stems), (event.low, event.high), int(event.arrival_s * sr), int(stop_s * sr) + 1)[0]
+    if not sound.any():
+        return None
+    level = float(np.abs(sound).max() if event.kind == IMPACT else np.sqrt(np.mean(sound**2)))
+    return 20 * float(np.log10(level / REFERENCE_PRESSURE_PA))
+
+
+def cues_of(
+    events: Sequence[SoundEvent], log: ContactLog, sr: int, frames: int, body: int | None = None
+) -> tuple[Cue, ...]:
+    """Cue points where events are heard, of one body or all; those that the sound is too short for are left out."""
+    return tuple(
+        Cue(
+            at,
+            0 if one.kind == IMPACT else round((one.end_s - one.start_s) * sr),
+            f"{one.kind} {name_pair(one, log)} {_size(one)}",
+        )
+        for one in events
+        if one.kind in SOUNDING and not one.reason and (body is None or body in (one.low, one.high))
+        if (at := round(one.arrival_s * sr)) < frames
+    )
+
+
+def name_pair(event: SoundEvent, log: ContactLog) -> str:
+    """Both bodies' names."""
+    return f"{log.bodies[event.low].name} - {log.bodies[event.high].name}"
+
+
+def _size(event: SoundEvent) -> str:
+    """In letters that every reader of RIFF knows."""
+    return f"{event.impulse_n_s * 1e3:.3g} mN s" if event.kind == IMPACT else f"{event.speed_m_s:.3g} m/s"

@@ -1,0 +1,111 @@
+"""Stems: a sound a body, of the same contacts as the mix, whose sum it is.
+
+    ContactLog -> render_apart -> (b, channels, n) -> a KeptSound a body -> NN-NAME.wav, all with the mix's gain
+
+A body without a model sends nothing and has no stem. The sum over all stems is the mix to rounding, of double numbers
+in memory and of 32-bit ones in files.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.files import AudioReport, cannot, write_audio
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.riff.wave_chunks import Cue
+from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
+from sonic_bullet.render.apart import render_apart
+from sonic_bullet.render.synthesis_state import Witness
+
+NAME_LENGTH = 60
+"""Characters of a body's name that its file keeps: 255 bytes hold them in any script, with number and ending."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stem:
+    """What one body of a log sends: its index there, the name that its file has, its sound (channels, n) in pascals."""
+
+    index: int
+    name: str
+    sound: KeptSound
+
+
+def render_stems(
+    log: ContactLog,
+    *,
+    sr: int | None = None,
+    witness: Witness | None = None,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> tuple[Stem, ...]:
+    """The sound of every body that can sound, all in one run; its sum is `render_log`'s. Beyond a few seconds it lies
+    in nameless temporary files.
+
+    Arguments, errors: as `render_apart` has them; AudioError where there is no microphone.
+    """
+    if not log.sensors:
+        raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
+    who = [index for index, body in enumerate(log.bodies) if body.model is not None]
+    spools = {index: SoundSpool(len(log.sensors)) for index in who}
+    for body, frame in render_apart(log, sr=sr, witness=witness, progress=progress, say=say):
+        there = dict(zip(body.tolist(), frame, strict=True))
+        nothing = np.zeros(frame.shape[1:])
+        for index, spool in spools.items():
+            spool.add(there.get(index, nothing))
+    return tuple(Stem(index, stem_name(index, log.bodies[index].name), spools[index].kept()) for index in who)
+
+
+def stem_name(index: int, name: str) -> str:
+    """A file's name, without ending, for a body's: its number in the log keeps two of one name apart, and what no file
+    system takes becomes a line.
+    """
+    plain = re.sub(r"[^\w-]+", "_", name.encode("utf-8", "replace").decode()).strip("_")
+    return f"{index:02d}-{plain[:NAME_LENGTH] or 'body'}"
+
+
+def write_stems(
+    folder: str | os.PathLike[str],
+    stems: Sequence[Stem],
+    sr: int,
+    *,
+    gain_per_pa: float = 1.0,
+    peak_dbfs: float | None = None,
+    cues: Callable[[int], Sequence[Cue]] | None = None,
+    time_reference: int = 0,
+) -> Iterator[AudioReport]:
+    """Write a float32 WAV a stem into a folder, made where it is missing, one after another; each is whole or not
+    there.
+
+    gain_per_pa: of all, so that they add up; peak_dbfs: each to a peak of its own instead, silent ones as they are.
+    cues: a stem's own, by its body's index. Raises FileError, AudioError.
+    """
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot("make the folder", folder, error) from error
+    for stem in stems:
+        own = peak_dbfs if peak_dbfs is not None and stem.sound.peaks().any() else None
+        yield write_audio(
+            place / f"{stem.name}.wav",
+            stem.sound,
+            sr,
+            peak_dbfs=own,
+            full_scale_pa=1 / gain_per_pa,
+            cues=None if cues is None else cues(stem.index),
+            time_reference=time_reference,
+        )
+
+
+def pair_sound(stems: dict[int, Stem], bodies: tuple[int, int], start: int, stop: int) -> Array:
+    """(channels, ≤ stop - start) what two bodies send together; of one channel and no sample where neither does."""
+    found = [stems[index].sound.read(max(start, 0), max(stop, 0)) for index in bodies if index in stems]
+    return np.sum(found, axis=0) if found else np.zeros((1, 0))

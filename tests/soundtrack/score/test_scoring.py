@@ -1,0 +1,57 @@
+"""From poses to a sound: what is stopped is kept, what is deep or noisy is said, equal poses give equal bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.export import assembled
+from sonic_bullet.soundtrack.score.scoring import score_animation
+from tests.made.animations import ball_animation, bounce_m, dropped, export_of
+
+
+@pytest.fixture(scope="module")
+def animation() -> Animation:
+    return assembled(export_of(dropped(60)), (), "wood")[0]
+
+
+def test_what_is_stopped_is_kept_as_far_as_it_was_found(animation: Animation) -> None:
+    stops = iter([True])
+
+    def stop(share: float) -> None:
+        if share > 0.35 and next(stops, False):
+            raise KeyboardInterrupt
+
+    whole = score_animation(animation, sr=8000)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        score_animation(animation, sr=8000, progress=stop)
+    part = caught.value.partial  # type: ignore[attr-defined]
+    assert 0.2 < part.log.duration_s < 0.5 * whole.log.duration_s + 0.05
+    sound = part.sound.samples()
+    assert np.array_equal(sound[:, :1200], whole.sound.samples()[:, :1200])  # 0.15 s, before what was found last
+
+
+def test_equal_poses_sound_equal(animation: Animation) -> None:
+    one, other = (score_animation(animation, sr=8000).sound.samples() for _ in range(2))
+    assert np.array_equal(one, other) and np.abs(one).max() > 0
+
+
+def test_bodies_that_overlap_are_said_and_not_thrown() -> None:
+    """A ball that sinks two centimetres into the floor and comes back as it came."""
+    height = bounce_m(np.arange(33) / 120, 0.15, 1.0) - 0.02
+    found = score_animation(replace(ball_animation(height, 120.0), materials={}), sr=8000)
+    assert any("overlap by up to 2" in note for note in found.notes)
+    pushed = sum(float(row["impulse_n_s"][2]) for step in found.log.steps for row in step.contacts.row)
+    assert abs(pushed) == pytest.approx(0.1 * 2 * np.sqrt(2 * 9.81 * 0.15), rel=0.02)
+
+
+def test_what_noise_hides_is_said() -> None:
+    time_s, rng = np.arange(200) / 240, np.random.default_rng(1)
+    still = ball_animation(9 - 9.81 * time_s**2 / 2, 240.0)
+    place = still.position_m.copy()
+    place[:, 1] += 2e-5 * rng.standard_normal((200, 3))
+    notes = score_animation(replace(still, position_m=place), sr=8000).notes
+    assert any("poses are good to 2" in note or "poses are good to 1" in note for note in notes)
