@@ -59,7 +59,7 @@ class _Body(msgspec.Struct):
     model: int | None
     dynamics: dict[str, float] = {}
     options: ModalOptions | None = None
-    mounting: str = "free"
+    mounting: str | float = "free"
 
 
 class _Change(msgspec.Struct):

@@ -22,6 +22,7 @@ from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records.mounting import Mounting, loss_factor, radiating_share
 from sonic_bullet.synth.bank import Translation, audible
 
 FASTEST_RIGID = 0.6
@@ -83,7 +84,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             None,
             0,
         )
-    keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr)
+    keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr, body.mounting)
     weight = np.zeros((1 + len(readers), len(omega)), complex)
     weight[0] = pressure
     for row, sensor in enumerate(readers, start=1):
@@ -134,12 +135,14 @@ class _Played(NamedTuple):
 
 
 @WhileAlive
-def _played(model: ModalModel, air: Air, sr: int) -> _Played:
-    """Once for all bodies that share a model (records are compared by identity)."""
+def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played:
+    """Once for all bodies that share a model and are held alike (records are compared by identity)."""
     pressure, extra = radiation_of(model, air)
+    pressure, extra = np.sqrt(radiating_share(mounting)) * pressure, radiating_share(mounting) * extra
     omega0_squared = model.omega0_squared_per_s2
     own = np.nan_to_num(model.decay_per_s)
     decay = own if model.includes_radiation else own + extra
+    decay = decay + loss_factor(mounting) / 2 * np.sqrt(omega0_squared)
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
     keep = audible(omega, decay, sr)
     shape = np.ascontiguousarray(model.shape[:, :, keep])

@@ -24,7 +24,6 @@ import numpy as np
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
-from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.machine.terminal import status
@@ -42,7 +41,7 @@ from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, check_names, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, check_names, oversize_notes, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:
@@ -141,6 +140,7 @@ class Listener:
         thickness_m: float | None = None,
         to_hz: float = 20_000.0,
         count: int | None = None,
+        mounting: str | float | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; returns the modal models of its links.
@@ -150,15 +150,16 @@ class Listener:
         the body frame, where the body's own collision shapes should not be used. model: modes computed before.
         roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
         of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
-        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress:
-        called now and then with which link's modes are being computed, how far that is, and that it is their radiation
-        next (seconds a link the first time, then the cache has both); without one, a terminal shows it. Warns
+        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. mounting:
+        "free", "placed" (what stands in a building; a body of mass 0 is so if nothing is said), "on floor" (one side
+        radiates) or the loss factor that its place adds. progress: called now and then with which link's modes are
+        being computed and that it is their radiation next; without one, a terminal shows it. Warns
         (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
         or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
-            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
+            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "mounting": mounting,
         }  # fmt: skip
         return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
@@ -188,16 +189,11 @@ class Listener:
                 self.world.call(one.body, link, name)
         for one, mine in zip(wanted, models, strict=True):
             how: dict[str, Any] = {"material": one.material, "options": one.options if one.model is None else None}
+            how |= {} if one.mounting is None else {"mounting": one.mounting}
             for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
                 self.world.add(one.body, link, model=model, shapes=shapes, **how)
-        for one, mine in zip(wanted, models, strict=True):
-            for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
-                if large := oversize(model.vertex_m, model.mass_kg):
-                    remedy = (
-                        "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-                    )
-                    said = f"body {one.body} link {link} ({name}) {large}; {remedy}"
-                    warnings.warn(said, SizeWarning, stacklevel=3)
+        for said in oversize_notes(wanted, models):
+            warnings.warn(said, SizeWarning, stacklevel=3)
         return [tuple(mine) for mine in models]
 
     def step(self) -> Array:
