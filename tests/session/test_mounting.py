@@ -75,7 +75,7 @@ def test_who_never_moves_is_placed_unless_said_otherwise(client: Any, tmp_path: 
 def test_what_is_no_mounting_is_refused_by_name(client: Any, wrong: Any) -> None:
     body = floor(client)
     listener = sb.attach(client)
-    with pytest.raises(SceneError, match="mounting is .*'placed', 'on floor' or a loss factor"):
+    with pytest.raises(SceneError, match=r"mounting is .*'placed', 'on floor' or a loss factor"):
         listener.add(body, material=STEEL, model=MODEL, mounting=wrong)
     with pytest.raises(RecordError, match="mounting is"):
         held(wrong)
