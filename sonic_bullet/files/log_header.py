@@ -100,6 +100,7 @@ class LogHeader(msgspec.Struct):
     versions: dict[str, str] = {}
     changes: list[_Change] = []
     residual: bool = True
+    supports: bool = False
 
 
 def material_key(material: Material) -> bytes:

@@ -48,8 +48,28 @@ HELD = np.dtype(
 )
 """What of a pair carries; beside its row of PAIR, in the same slot."""
 
-STAND = np.dtype([("stale", "i8"), ("wait_s", "f8")], align=True)
-"""How a body stands. stale: 1 where its poles are not those of its contacts; wait_s: until they may be made again."""
+STAND = np.dtype(
+    [
+        ("stale", "i8"),  # 1 where its poles are not those of its contacts
+        ("stale_s", "f8"),  # since when
+        ("wait_s", "f8"),  # until they may be made again
+        ("wanted", "i8"),  # 1: they are to be made before this step rings
+        ("points", "i8"),  # held points that its poles are of
+        ("steps", "i8"),  # steps that it rang on them, and of those, in how many some contact was beyond its law
+        ("lifted", "i8"),
+    ],
+    align=True,
+)
+"""How a body stands."""
+
+SHARE = 0.1
+"""Of simulated time that may go into new poles: a pile of a hundred boxes costs 40 % more then, and live sound is never
+late for it. Who waits longest is served first, what moves before what does not.
+"""
+SAVED_S = 0.1
+"""Most of it that is saved up for a moment in which many come to rest."""
+AGAIN_S = 0.02
+"""A body's poles stay at least so long, four blocks of the bank."""
 
 
 @njit(nogil=True, error_model="numpy")
@@ -128,44 +148,36 @@ def _smooth(one, rows, begin, end, share, near, follow):
             k = one.count
             one.count += 1
             one.load_n[k] = 0.0
-            for side in range(2):
-                for x in range(3):
-                    one.point_m[k, side, x] = rows[r].point_m[side, x]
+            one.point_m[k] = rows[r].point_m
         target[k] += load
         total += load
-        for side in range(2):
-            for x in range(3):
-                place[k, side, x] += load * rows[r].point_m[side, x]
-                outward[side, x] += load * rows[r].outward[side, x]
-    for side in range(2 if total > 0.0 else 0):
-        length = 0.0
-        for x in range(3):
-            outward[side, x] /= total
-            if old:
-                outward[side, x] = one.outward[side, x] + follow * (outward[side, x] - one.outward[side, x])
-            length += outward[side, x] ** 2
-        for x in range(3):
-            one.outward[side, x] = outward[side, x] / max(np.sqrt(length), 1e-300)
+        place[k] += load * rows[r].point_m
+        outward += load * rows[r].outward
+    if total > 0.0:
+        _lean(one, outward, follow if old else 1.0)
     whole = 0.0
     for k in range(one.count):
         one.load_n[k] += follow * (target[k] - one.load_n[k])
         whole += one.load_n[k]
-        if target[k] > 0.0:
-            for side in range(2):
-                for x in range(3):
-                    # what a row adds to the load it brings its place with: the moment is smoothed as the load is
-                    mean = place[k, side, x] / target[k]
-                    moved = follow * target[k] / one.load_n[k] * (mean - one.point_m[k, side, x])
-                    one.point_m[k, side, x] += moved
+        if target[k] > 0.0:  # what it adds to the load it brings its place with: the moment is smoothed as the load is
+            share = follow * target[k] / one.load_n[k]
+            one.point_m[k] += share * (place[k] / target[k] - one.point_m[k])
     kept = 0
     for k in range(one.count):
         if one.load_n[k] >= LEAST * whole or target[k] > 0.0:
             one.load_n[kept] = one.load_n[k]
-            for side in range(2):
-                for x in range(3):
-                    one.point_m[kept, side, x] = one.point_m[k, side, x]
+            one.point_m[kept] = one.point_m[k]
             kept += 1
     one.count = kept
+
+
+@njit(nogil=True, error_model="numpy")
+def _lean(one, outward, follow):
+    """The pair's normals follow those of a step, weighted (2, 3)."""
+    for side in range(2):
+        length = np.sqrt((outward[side] ** 2).sum())
+        mean = one.outward[side] + follow * (outward[side] / max(length, 1e-300) - one.outward[side])
+        one.outward[side] = mean / max(np.sqrt((mean**2).sum()), 1e-300)
 
 
 @njit(nogil=True, error_model="numpy")
@@ -183,3 +195,85 @@ def _differs(one, near):
         if np.sqrt(square) > near:
             return True
     return False
+
+
+@njit(nogil=True, error_model="numpy")
+def price_s(modes, points):
+    """What new poles cost, in s of a processor of 2025, by what they are made of: the same on every machine."""
+    return 2e-4 + 1e-7 * (modes + 6) ** 2 * (3 * points)
+
+
+@njit(nogil=True, error_model="numpy")
+def choose_bodies(
+    pairs, active, count, held, stand, bodies, ringing, pulses, found, drive_body, drives, dt_s, credit_s
+):
+    """Mark as wanted those whose poles are to be made before this step rings; their number. credit_s (1,): what is
+    left of the time for it. Silent bodies wait: nothing of them is heard.
+    """
+    credit_s[0] = min(credit_s[0] + SHARE * dt_s, SAVED_S)
+    some = False
+    for b in range(len(stand)):
+        one = stand[b]
+        one.wait_s = max(one.wait_s - dt_s, 0.0)
+        if one.stale:
+            one.stale_s += dt_s
+            some = some or (one.wait_s == 0.0 and bodies[b].modes > 0)
+    if not some or credit_s[0] <= 0.0:
+        return 0
+    sounds, points = np.zeros(len(stand), np.int64), np.zeros(len(stand), np.int64)
+    for side in range(2):
+        for i in range(found):
+            sounds[pulses[i].body[side]] = 1
+        for i in range(drives):
+            sounds[drive_body[i, side]] = 1
+        for i in range(count):
+            points[pairs[active[i]].body[side]] += held[active[i]].count
+    for b in range(len(stand)):
+        now = ringing[b]
+        sounds[b] |= now.ringing | now.driven | now.tiled | (now.strike >= 0)
+        sounds[b] &= stand[b].stale & (stand[b].wait_s == 0.0) & (bodies[b].modes > 0)
+    wanted = 0
+    while credit_s[0] > 0.0:
+        best = _longest_stale(stand, bodies, sounds)
+        if best < 0:
+            break
+        one = stand[best]
+        sounds[best] = one.stale = 0
+        one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, AGAIN_S, points[best]
+        credit_s[0] -= price_s(bodies[best].modes, points[best])
+        wanted += 1
+    return wanted
+
+
+@njit(nogil=True, error_model="numpy")
+def _longest_stale(stand, bodies, waits):
+    """Who of those that wait comes first: of those that move, the one stale longest, then of those that do not; -1 for
+    nobody.
+    """
+    best = -1
+    for b in range(len(stand)):
+        if waits[b]:
+            if best < 0:
+                best = b
+                continue
+            fixed, best_fixed = bodies[b].mass_kg <= 0.0, bodies[best].mass_kg <= 0.0
+            if (best_fixed and not fixed) or (fixed == best_fixed and stand[b].stale_s > stand[best].stale_s):
+                best = b
+    return best
+
+
+@njit(nogil=True, error_model="numpy")
+def count_lifted(stand, bank_body, ringing, law, z, driven):
+    """Count the steps in which what rings would lift a body off: Σ_k lift_k |z_k| > 1, law[6]: lift, newtons per unit
+    of z over the load, at the point that lifts first.
+    """
+    modes = law.shape[1]
+    for b in range(len(stand)):
+        if stand[b].points and (ringing[b].ringing or ringing[b].driven):
+            total = 0.0
+            for m in range(bank_body[b].start, bank_body[b].stop):
+                if law[6, m] > 0.0:
+                    x, y = z[m] + driven[m], z[modes + m] + driven[modes + m]
+                    total += law[6, m] * np.sqrt(x * x + y * y)
+            stand[b].steps += 1
+            stand[b].lifted += total > 1.0

@@ -97,6 +97,7 @@ def subset(state: State, keep: Array) -> None:
     follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in state.voices]
     state.table = state.table.subset(keep, list(zip(state.resonators, follows, strict=True)))
     state.bank, state.ringing = bank.subset(state.bank, state.ringing, keep)
+    state.stand = state.stand[keep]
     state.travelling = path.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
     state.pairs.subset(number)

@@ -77,6 +77,7 @@ class Listener:
         sensors: tuple[Sensor, ...],
         seed: int,
         air: Air,
+        supports: bool = True,
         keep_log: bool = True,
         keep_sound: bool = True,
     ) -> None:
@@ -86,7 +87,9 @@ class Listener:
         self.world = client if isinstance(client, World) else _opened(client)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
-        self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air, keep=keep)
+        self.supports = held = as_flag(supports, "supports")
+        how: dict[str, Any] = {"sr": self.sr, "sensors": self.sensors, "seed": self.seed, "air": self.air}
+        self._synth = Synthesizer(**how, supports=held, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
         self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
@@ -287,6 +290,7 @@ class Listener:
             simulator.engine,
             {**package_versions(), **simulator.versions},
             simulator.changes,
+            supports=self.supports,
         )
 
     @property

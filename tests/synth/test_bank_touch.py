@@ -50,7 +50,8 @@ def played(cuts: Array, bent: bool = False) -> Array:
 
 def change(rng: np.random.Generator, bank: Bank, state: BankState, sets: list[ModeSet]) -> None:
     for b, one in enumerate(sets):
-        set_poles(bank, state, b, one.omega_rad_s * rng.uniform(0.98, 1.02), one.decay_per_s + rng.uniform(0, 300))
+        turn, more = rng.uniform(0.98, 1.02), rng.uniform(0, 300)
+        set_poles(bank, state, b, (1j * one.omega_rad_s * turn - one.decay_per_s - more) / SR)
         others = [c for c in range(3) if c != b and rng.random() < 0.7]
         m = SIZES[b]
         set_passes(bank, state, b, {c: rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)) for c in others})
@@ -71,7 +72,7 @@ def test_a_mode_whose_pole_changes_goes_on_with_the_other_from_the_next_block() 
         *empty_bank(SR, passes=PASSES), [ModeSet(np.array([3000.0]), np.array([4.0]), np.ones((1, 1)))]
     )
     y = advance(bank, state, 1000, [Strike(0, 0.0, 1e-12, np.array([1.0]))])[0, 0]
-    set_poles(bank, state, 0, np.array([3010.0]), np.array([90.0]))
+    set_poles(bank, state, 0, np.array([-90 + 3010j]) / SR)
     y = np.concatenate([y, advance(bank, state, 3000)[0, 0]])
     turn, later = np.exp(np.array([-4 + 3000j, -90 + 3010j]) / SR)
     n = np.arange(4000)
@@ -101,7 +102,7 @@ def test_quenched_they_are_silent_and_touch_on() -> None:
     rng = np.random.default_rng(3)
     bank, state, sets = bodies(rng)
     set_passes(bank, state, 0, {2: rng.normal(size=(2, 20)) + 0j})
-    set_poles(bank, state, 0, sets[0].omega_rad_s, sets[0].decay_per_s + 100)
+    set_poles(bank, state, 0, (1j * sets[0].omega_rad_s - sets[0].decay_per_s - 100) / SR)
     hit = rng.normal(size=20)
     fresh = state.copy()
     first = advance(bank, fresh, 800, [Strike(0, 0.0, 1e-4, hit)])

@@ -205,9 +205,9 @@ def _drive(
             drive.run(driven, pole, modes, lo, lanes, heard, 2 * at_w * modes + lo, push, pushes, count, partial, keep)
         if j >= 0 or observed[w, b]:
             drive.across(partial, count, total)
-            if ringing[b].tiled:
-                for k in range(count):
-                    total[k] += sound[w, b, place + k] if j < 0 else pass_sound[w - sets, b, place + k]
+            free = sound[w, b] if j < 0 else pass_sound[w - sets, b]
+            for k in range(count if ringing[b].tiled else 0):
+                total[k] += free[place + k]
             if j < 0:
                 _copy_flushed(total, source[w, b, i : i + count])
             else:

@@ -83,7 +83,7 @@ class Bank:
 class BankState:
     """What the bank remembers. at: the next sample. z, driven (2·m,): free state at the next block's start, and what
     was driven since this block's. sound (W, b, 256): the block's free ringing. pole, block (2·m,): e^s and e^{256 s},
-    bent by level where a body is. law (6, m): the bank's, with poles as they are now; coming (7, m): see `poles`.
+    bent by level where a body is. law (7, m): the bank's, with poles as they are now; coming (8, m): see `poles`.
     passes (b, J) PASS, pass_weight (J·W, 2·m), pass_sound (J·W, b, 256): see `passing`. ringing (b,) RINGING; strikes
     (pool,) STRIKE, rows (pool, 8, columns) their phasors, free (pool + 1,): how many rows are free, and which.
     """
@@ -167,7 +167,7 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0) -> t
     silent, none = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
     rows, free = np.zeros((0, 8, PAIR)), np.zeros(1, np.int64)
     state = BankState(
-        int(at), z, driven, silent, pole, block, np.zeros((6, 0)), np.zeros((7, 0)), np.zeros((0, passes), PASS),
+        int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)), np.zeros((0, passes), PASS),
         np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)), np.zeros(0, RINGING), none,
         rows, free,
     )  # fmt: skip
@@ -228,8 +228,8 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         sound=np.concatenate([state.sound, np.zeros((sets, len(bodies), BLOCK))], axis=1),
         pole=_joined(state.pole, pole),
         block=_joined(state.block, block),
-        law=np.concatenate([state.law, law], axis=1),
-        coming=np.concatenate([state.coming, np.zeros((7, total))], axis=1),
+        law=np.concatenate([state.law, np.vstack([law, np.zeros(total)])], axis=1),
+        coming=np.concatenate([state.coming, np.zeros((8, total))], axis=1),
         passes=np.concatenate([state.passes, np.zeros((len(bodies), state.passes.shape[1]), PASS)]),
         pass_weight=np.stack([_joined(one, silent) for one in state.pass_weight]).reshape(len(state.pass_weight), -1)
         if len(state.pass_weight)

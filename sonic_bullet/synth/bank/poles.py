@@ -1,6 +1,6 @@
 """Poles that change: of bodies whose contacts do (take_coming), of modes that depend on their level (bend_poles).
 
-    coming (7, m): d and ω a sample, d/ω, e^s and e^{256 s} -> law, pole, block at the next block's start
+    coming (8, m): d and ω a sample, d/ω, e^s and e^{256 s}, lift -> law, pole, block at the next block's start
 
 Block starts lie on the grid of absolute time: any cutting of calls gives the same bits. ½|z|² is a mode's energy
 whatever its pole is, and z goes on as it is: no change of poles adds energy, and none is heard as a jump.
@@ -31,6 +31,7 @@ def take_coming(b, start, stop, ringing, law, pole, block, coming):  # pragma: n
             law[0, m], law[1, m], law[2, m] = coming[0, m], coming[1, m], coming[2, m]
             pole[m], pole[modes + m] = coming[3, m], coming[4, m]
             block[m], block[modes + m] = coming[5, m], coming[6, m]
+            law[6, m] = coming[7, m]
 
 
 @uncounted
@@ -61,15 +62,18 @@ def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no co
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
 
 
-def set_poles(bank: Bank, state: BankState, b: int, omega_rad_s: Array, decay_per_s: Array) -> None:
-    """Other poles (m,) for body b's modes: from the next block's start, at once where nothing of it sounds."""
+def set_poles(bank: Bank, state: BankState, b: int, step: Array, lift: Array | None = None) -> None:
+    """Other poles (m,), s = (-d + iω)/sr, for body b's modes: from the next block's start, at once where nothing of it
+    sounds. lift (m,): share of a contact's load that a mode's velocity of 1 lifts; None: none.
+    """
     start, stop, m = (int(bank.body[b][name]) for name in ("start", "stop", "columns"))
     lanes = slice(start, start + m)
-    s = (-decay_per_s + 1j * omega_rad_s) / bank.sr
-    pole, block = np.exp(s), np.exp(BLOCK * s)
-    rows = s.real, s.imag, decay_per_s / omega_rad_s, pole.real, pole.imag, block.real, block.imag
-    state.coming[:, lanes] = rows
-    state.coming[:, start + m : stop] = 0.0
+    pole, block = np.exp(step), np.exp(BLOCK * step)
+    own = bank.law[:3, lanes]
+    quadrature = np.where((step.real == own[0]) & (step.imag == own[1]), own[2], -step.real / step.imag)
+    state.coming[:, start:stop] = 0.0
+    state.coming[:7, lanes] = step.real, step.imag, quadrature, pole.real, pole.imag, block.real, block.imag
+    state.coming[7, lanes] = 0.0 if lift is None else lift
     now = state.ringing[b]
     now["fresh"] = 1
     if not (now["ringing"] or now["driven"] or now["tiled"] or now["strike"] >= 0):
