@@ -85,7 +85,9 @@ def floor_power_w(material: Material, thickness_m: float, loss: float) -> Array:
         force = 2 * HAMMER_KG * v * RATE_HZ * pulse_spectrum(f * tau, flat=bool(flat))
         # a mass that the plate takes along: F/(1 + iωmY) [ibid., sec. 4.3.2]
         force = force / np.abs(1 + 2j * np.pi * f * HAMMER_KG * mobility)
-        sigma = np.where(f > 1.2 * critical, 1 / np.sqrt(np.maximum(1 - critical / f, 0.1)), np.minimum(f / critical, 1))
+        sigma = np.where(
+            f > 1.2 * critical, 1 / np.sqrt(np.maximum(1 - critical / f, 0.1)), np.minimum(f / critical, 1)
+        )
         taken = 0.5 * force**2 * mobility * lines
         power.append(np.mean(taken * RHO_C * sigma / (2 * np.pi * f * loss * surface)))
     return np.array(power)

@@ -143,6 +143,7 @@ class Listener:
         thickness_m: float | None = None,
         to_hz: float = 20_000.0,
         count: int | None = None,
+        accuracy: float = 0.01,
         mounting: str | float | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
@@ -153,16 +154,17 @@ class Listener:
         the body frame, where the body's own collision shapes should not be used. model: modes computed before.
         roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
         of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
-        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. mounting:
-        "free", "placed" (what stands in a building; a body of mass 0 is so if nothing is said), "on floor" (one side
-        radiates) or the loss factor that its place adds. progress: called now and then with which link's modes are
-        being computed and that it is their radiation next; without one, a terminal shows it. Warns
-        (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
+        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
+        relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
+        building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
+        progress: called now and then with which link's modes are computed, how far that is, and that it is their
+        radiation next (both are cached); without one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
         or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
-            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "mounting": mounting,
+            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
+            "mounting": mounting,
         }  # fmt: skip
         return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from sonic_bullet.modal import analyse, read_mesh
-from sonic_bullet.modal.meshing import shape_meshes as shapes
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import MeshError, ModalError
 
@@ -35,15 +34,9 @@ def test_ratios_of_the_independent_solver(case: str, shared_path: Path) -> None:
 
 
 @pytest.mark.timeout(600)  # of wall time, which a busy machine multiplies
-def test_twenty_of_the_thousand_have_modes_or_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarse: a wide envelope and two passes, or the twenty would take two minutes (`benchmarks/modal_sweep.py` does it
-    all with the defaults).
-    """
+def test_twenty_of_the_thousand_have_modes_or_a_name() -> None:
     import pybullet_data
 
-    monkeypatch.setattr(shapes, "MOST_PASSES", shapes.LUMP_PASSES)
-    monkeypatch.setattr(shapes, "ENVELOPE", (0.3, 0.02))
-    monkeypatch.setattr(shapes, "FILL_LIMITS_S", (6.0,))
     plastic = Material.isotropic("plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0)
     root = Path(pybullet_data.getDataPath()) / "random_urdfs"
     asked = range(0, 1000, 50)

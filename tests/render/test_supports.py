@@ -89,5 +89,5 @@ def test_what_is_quenched_is_silent_on_both_sides(client: Any) -> None:
     for _ in range(60):
         client.stepSimulation()
     at = int(0.4 * 48_000)
-    tail = listener.sound()[:, at + 8:]
+    tail = listener.sound()[:, at + 8 :]
     assert np.abs(tail).max() < 1e-3 * np.abs(listener.sound()).max()
