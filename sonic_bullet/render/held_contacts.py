@@ -200,7 +200,7 @@ def _differs(one, near):
 @njit(nogil=True, error_model="numpy")
 def price_s(modes, points):
     """What new poles cost, in s of a processor of 2025, by what they are made of: the same on every machine."""
-    return 2e-4 + 1e-7 * (modes + 6) ** 2 * (3 * points)
+    return 5e-4 + 1.5e-4 * points + 2e-7 * (modes + 6) ** 2
 
 
 @njit(nogil=True, error_model="numpy")

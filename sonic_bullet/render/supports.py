@@ -1,7 +1,7 @@
 """What bodies stand on acts on their modes: other poles while they touch, and what passes on to whom they touch.
 
     HELD of a body's pairs -> touches: places on both bodies, springs of the regions that touch     (support)
-        -> in_place -> poles, what passes to each partner, when it lifts -> the bank, from its next block on
+        -> first_order -> poles, what passes to each partner, when it lifts -> the bank, from its next block on
 
 The driver says who (`held_contacts.choose_bodies`): whose contacts are others than those its poles were made for, and
 who is heard. The modes of each body stay its own, with its poles; what little the touches turn them into each other is
@@ -12,6 +12,8 @@ poles know its partners as they are when nothing touches these.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,28 +22,47 @@ from sonic_bullet.records import Array
 from sonic_bullet.render.contact_place import CREASE_COS, FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.render.strike_pulses import STRUCK_FLAT
 from sonic_bullet.render.synthesis_state import State
-from sonic_bullet.support import ContactSide, ContactSpring, InPlace, Moving, Place, Region, Touch, contact_spring
-from sonic_bullet.support import in_place as in_place_of
+from sonic_bullet.support import (
+    ContactSide,
+    ContactSpring,
+    InPlace,
+    Moving,
+    Place,
+    Region,
+    Touch,
+    contact_spring,
+    first_order,
+)
 from sonic_bullet.synth import bank
 from sonic_bullet.synth.strikes import SPAN
 
-RIGID = ContactSide(np.inf, 0.3, 0.0, 0.0)
-"""Of a partner of which nobody said what it is made of."""
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
 ON = 0.02
 """Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
 NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
-HEARD = 0.01
-"""Of a body's own loudest weight: what passes on with less, 40 dB below, is left out."""
+HEARD = 0.1
+"""Of a body's own loudest weight: what passes on with less, 1 % of its power, is left out."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
 
 
+@cache
+def _blas() -> ThreadpoolController:
+    """On matrices of a hundred more threads take seconds, and give other bits on other machines."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
 def settle(state: State, number: int) -> None:
     """New poles for the bodies that the driver wants, before step ``number`` rings."""
-    for b in np.flatnonzero(state.stand["wanted"]).tolist():
-        state.stand["wanted"][b] = 0
-        _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
+    with _blas().limit(limits=1, user_api="blas"):
+        for b in np.flatnonzero(state.stand["wanted"]).tolist():
+            state.stand["wanted"][b] = 0
+            _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
 
 
 def _stand(state: State, b: int, quaternion: Array) -> None:
@@ -52,7 +73,7 @@ def _stand(state: State, b: int, quaternion: Array) -> None:
         bank.set_poles(state.bank, state.ringing, b, free)
         bank.set_passes(state.bank, state.ringing, b, {})
         return
-    placed = in_place_of(_moving(state, b), [_moving(state, p) for p in partners], touches)
+    placed = first_order(state.resonators[b].moving, [state.resonators[p].moving for p in partners], touches)
     new = _audible((-placed.decay_per_s + 1j * placed.omega_rad_s) / state.bank.sr, free[:m])
     voice = state.voices[b]
     if voice is not None:
@@ -67,7 +88,8 @@ def _lanes(state: State, b: int) -> Array:
     """s a sample (m + lines,) of a body that nothing touches."""
     row = state.bank.body[b]
     lanes = slice(int(row["start"]), int(row["start"] + row["columns"]))
-    return np.asarray(state.bank.law[0, lanes] + 1j * state.bank.law[1, lanes])
+    step: Array = state.bank.law[0, lanes] + 1j * state.bank.law[1, lanes]
+    return step
 
 
 def _audible(new: Array, free: Array) -> Array:
@@ -87,16 +109,6 @@ def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns:
             yield p, weight
 
 
-def _moving(state: State, b: int) -> Moving:
-    one = state.resonators[b]
-    return Moving(one.omega_rad_s, one.decay_per_s, one.body.mass_kg, one.body.inertia_kg_m2)
-
-
-def _side(state: State, b: int) -> ContactSide:
-    material = state.resonators[b].body.material
-    return RIGID if material is None else ContactSide.of(material)
-
-
 def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array]:
     """Partners of a body, its touches, and the load on each (c,)."""
     partners: list[int] = []
@@ -110,7 +122,7 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
         other = both[1 - side]
         if other not in partners:
             partners.append(other)
-        places = [_places(state, both[s], held, s, _axes(held, s, quaternion[both])) for s in (0, 1)]
+        places = [_places(state, both[s], held, s, axes) for s, axes in enumerate(_axes(held, quaternion[both]))]
         curvature = sum(c for _, c, _ in places)
         load = held["load_n"][: held["count"]]
         for i, spring in enumerate(_springs(state, both, held, curvature, load)):
@@ -119,15 +131,30 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
     return partners, touches, np.array(loads)
 
 
-def _axes(held: Array, side: int, quaternion: Array) -> Array:
-    """Normal and two tangents (3, 3) as rows in a side's frame, the same directions for both sides (2, 4)."""
-    from scipy.spatial.transform import Rotation
+def _axes(held: Array, quaternion: Array) -> Array:
+    """Normal and two tangents (2, 3, 3) as rows in either side's frame, the same directions for both. quaternion (2,
+    4).
+    """
+    turn = [_rotation(one) for one in quaternion]
+    normal = turn[0] @ held["outward"][0]
+    x, y, z = normal.tolist()
+    across = np.array([0.0, z, -y] if abs(x) < 0.6 else [-z, 0.0, x])
+    across /= np.sqrt(across @ across)
+    u, v, w = across.tolist()
+    axes = np.array([normal, across, [y * w - z * v, z * u - x * w, x * v - y * u]])
+    return np.stack([axes @ one for one in turn])
 
-    turn = Rotation.from_quat(quaternion)
-    normal = turn[0].apply(held["outward"][0])
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across /= np.linalg.norm(across)
-    return np.asarray(turn[side].inv().apply(np.stack([normal, across, np.cross(normal, across)])))
+
+def _rotation(quaternion: Array) -> Array:
+    """(3, 3) from a body's frame into space."""
+    x, y, z, w = quaternion.tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[list[Place], Array, Array]:
@@ -152,7 +179,7 @@ def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[
 
 def _springs(state: State, both: list[int], held: Array, curvature: Array, load: Array) -> Iterator[ContactSpring]:
     """The spring of each of a pair's points: of its part of one region, or of a region of its own."""
-    sides = _side(state, both[0]), _side(state, both[1])
+    sides = state.resonators[both[0]].side, state.resonators[both[1]].side
     sizes = [float(row["size_m"]) for row in state.table.bodies[both] if row["volume_m3"] > 0]
     size = min(sizes, default=SIZELESS_M)
     region = _one_region(state, both, held, curvature, size) if len(load) > 1 else None

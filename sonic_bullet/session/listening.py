@@ -158,8 +158,9 @@ class Listener:
         relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
         progress: called now and then with which link's modes are computed, how far that is, and that it is their
-        radiation next (both are cached); without one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
-        or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
+        radiation next (both are cached); without one, a terminal shows it. Warns (`errors.SizeWarning`) of a link
+        larger than anything that is struck to sound. Raises SceneError (unknown body or link, a name that another
+        has), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,

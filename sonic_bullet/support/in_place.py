@@ -112,12 +112,13 @@ def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch])
             np.stack([body.decay_per_s, np.zeros(m), np.zeros(m)], axis=1),
             np.ones(m, bool),
         )
-    x = _gathered(body, partners, touches)
+    x = gathered(body, partners, touches)
     pole, q, stands = _poles(x, *_start(x, m))
     return _described(x, m, partners, pole, q, stands)
 
 
-def _gathered(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> _Touched:
+def gathered(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], squares: bool = True) -> _Touched:
+    """All that touches, in one table; squares: with φφᵀ of each motion, which Newton needs."""
     sizes = [len(p.omega_rad_s) + 6 for p in partners]
     begin = np.cumsum([0, *sizes])
     other = np.zeros((3 * len(touches), int(begin[-1])))
@@ -138,8 +139,8 @@ def _gathered(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]
         np.concatenate([p.decay for p in partners]),
         plate.ravel(),
         half_space.ravel(),
-        _squares(own),
-        _squares(other),
+        _squares(own if squares else own[:0]),
+        _squares(other if squares else other[:0]),
     )
 
 
