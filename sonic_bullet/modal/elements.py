@@ -45,6 +45,7 @@ ALIKE, LARGER = 1.2, 3
 one is tried: creases keep elements small."""
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 15 s of processor and 1.2 GB at most. An edge_m allows more."""
+LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
 TRIES = 2
 OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
@@ -287,6 +288,8 @@ def filled(
     made = Elements(at_size(edge, False), length_m, clamp, degree, thin, edge, None if given else at_size)
     if given is None:
         made = made.within(MOST_UNKNOWNS[thin])
+    if made.degree == 3 and made._unknowns > LIMIT:  # the surface's detail, or a lattice's, wants so many elements
+        made = replace(made, degree=2)
     made.held(lagrange.field(made.solid, 2))
     return made
 

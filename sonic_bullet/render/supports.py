@@ -23,10 +23,8 @@ from sonic_bullet.render.contact_place import CREASE_COS, FLAT_CURVATURE, SIZELE
 from sonic_bullet.render.strike_pulses import STRUCK_FLAT
 from sonic_bullet.render.synthesis_state import State
 from sonic_bullet.support import (
-    ContactSide,
     ContactSpring,
     InPlace,
-    Moving,
     Place,
     Region,
     Touch,

@@ -1,7 +1,7 @@
 """`attach`: a listener on a PyBullet client that turns each physics step into a frame of sound.
 
 listening: the `Listener` | wanted_bodies: what `add` was asked for, and its modes | arguments: what people give
-keeping: what is kept of a run | scene_file: kinds of scene files, their code run
+keeping: what is kept of a run | scene_file: kinds of scene files, their code run | directed: runs made otherwise
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import Any
 
 from sonic_bullet.records import Air
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.directed import direction
 from sonic_bullet.session.listening import Listener
 
 __all__ = ["Listener", "attach"]
@@ -40,13 +41,11 @@ def attach(
     Raises SceneError for a client that is not connected, AudioError for a bad rate, RecordError for a microphone or a
     seed that is none.
     """
-    return Listener(
-        client,
-        sr=sr,
-        sensors=as_sensors(microphone),
-        seed=seed,
-        air=Air() if air is None else air,
-        supports=supports,
-        keep_log=keep_log,
-        keep_sound=keep_sound,
-    )
+    how: dict[str, Any] = {"sensors": as_sensors(microphone), "seed": seed, "air": Air() if air is None else air}
+    director = direction()
+    if director is not None:
+        how = director.attached(how)
+    made = Listener(client, sr=sr, **how, supports=supports, keep_log=keep_log, keep_sound=keep_sound)
+    if director is not None:
+        director.listens(made)
+    return made

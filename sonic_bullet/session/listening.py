@@ -40,8 +40,9 @@ from sonic_bullet.records.coerce import (
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import as_sensors
+from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, check_names, oversize_notes, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, checked, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:
@@ -60,8 +61,7 @@ def _wanted(world: World, who: Any, how: Any) -> WantedBody:
 
 def _keywords(call: Callable[..., Any]) -> list[str]:
     """Names of the arguments that are given by name alone."""
-    given = inspect.signature(call).parameters.values()
-    return [one.name for one in given if one.kind is one.KEYWORD_ONLY]
+    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
 
 
 class Listener:
@@ -87,9 +87,9 @@ class Listener:
         self.world = client if isinstance(client, World) else _opened(client)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
-        self.supports = held = as_flag(supports, "supports")
         how: dict[str, Any] = {"sr": self.sr, "sensors": self.sensors, "seed": self.seed, "air": self.air}
-        self._synth = Synthesizer(**how, supports=held, keep=keep)
+        how["supports"] = self.supports = as_flag(supports, "supports")
+        self._synth = Synthesizer(**how, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
         self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
@@ -157,17 +157,16 @@ class Listener:
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
         relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
-        progress: called now and then with which link's modes are computed, how far that is, and that it is their
-        radiation next (both are cached); without one, a terminal shows it. Warns (`errors.SizeWarning`) of a link
-        larger than anything that is struck to sound. Raises SceneError (unknown body or link, a name that another
-        has), MaterialError, MeshError, ModalError naming body and link, RecordError.
+        progress: called now and then with which link's modes or radiation are computed and how far that is; without
+        one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
             "mounting": mounting,
         }  # fmt: skip
-        return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
+        return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
@@ -179,14 +178,14 @@ class Listener:
         """
         if not isinstance(cast, Mapping):
             raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
-        return self._added([_wanted(self.world, who, how) for who, how in cast.items()], progress)
+        return self._added([_wanted(self.world, *entry) for entry in cast.items() if not absent(entry[0])], progress)
 
     def _added(
         self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None
     ) -> list[tuple[ModalModel, ...]]:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
-        check_names(self.world, wanted)
+        wanted = checked(self.world, wanted)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
             models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))

@@ -32,6 +32,7 @@ from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
+from sonic_bullet.session.directed import direction
 
 Say = Callable[[str], None]
 
@@ -39,7 +40,8 @@ Say = Callable[[str], None]
 @dataclass(frozen=True, slots=True, eq=False)
 class WantedBody:
     """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given.
-    names: what they shall be called, none: as the simulator calls them. mounting: None: as is usual.
+    names: what they shall be called, none: as the simulator calls them. own_shapes: the shapes were given, not asked
+    of the world. mounting: None: as is usual.
     """
 
     body: int
@@ -49,6 +51,7 @@ class WantedBody:
     options: ModalOptions
     model: ModalModel | None
     names: tuple[str, ...] = ()
+    own_shapes: bool = False
     mounting: Mounting | None = None
 
 
@@ -84,7 +87,7 @@ def wanted_body(
         with _naming(label, len(links)):
             parts.append((label, world.shapes_of(number, one) if given is None else given))
     held = None if mounting is None else as_mounting(mounting, error=SceneError)
-    return WantedBody(number, links, tuple(parts), made, asked, model, names, held)
+    return WantedBody(number, links, tuple(parts), made, asked, model, names, given is not None, held)
 
 
 def _names(world: World, body: int, links: Sequence[int], name: str, every: bool) -> Iterator[str]:
@@ -93,14 +96,20 @@ def _names(world: World, body: int, links: Sequence[int], name: str, every: bool
         yield f"{name}/{world.link_name(body, link)}" if every and link >= 0 else name
 
 
-def check_names(world: World, wanted: Sequence[WantedBody]) -> None:
-    """Raise SceneError where a name that is given is another living link's, or given twice."""
+def checked(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+    """Who is to be added: those, or whoever directs this run says instead. Raises SceneError where a name that is given
+    is another living link's, or given twice.
+    """
+    director = direction()
+    if director is not None:
+        wanted = director.added(world, wanted)
     bearer = {body.name: (body.body_id, body.link) for body in world.living}
     for one in wanted:
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
             body, other = bearer.setdefault(name, (one.body, link))
             if (body, other) != (one.body, link):
                 raise SceneError(f"the name {shown(name)} is that of body {body}{link_words(other)}", "give another")
+    return wanted
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, curved_sizes, dof_budg
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
 from sonic_bullet.modal.meshing.surfaces import Skin
-from sonic_bullet.modal.meshing.tetrahedra import tetrahedra
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError, tetrahedra
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
@@ -73,6 +73,9 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, latt
     for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
         try:
             return _by_netgen(skin, tried, size, say)
+        except EndlessError as error:
+            refused = error
+            break
         except MeshError as error:
             refused = error
     assert refused is not None

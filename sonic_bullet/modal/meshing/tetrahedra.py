@@ -12,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet import geometry
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-GUARD_S = 120
-"""Of processor time, after which a child counts as hung: the finest mesh allowed takes a sixth of it."""
+GUARD_S, GUARD_S_PER_TET = 20, 0.01
+"""Of processor time, after which a child counts as hung: thirty times what meshes take."""
 BUSY = 20.0
 """Wall time per processor time that a child may take on a busy machine before it counts as hung."""
 MEMORY_LIMIT_BYTES = 2 * 1024**3
@@ -35,7 +36,7 @@ def tetrahedra(
     point_m: Array | None = None,
     size_m: Array | None = None,
     *,
-    guard_s: int = GUARD_S,
+    guard_s: int | None = None,
 ) -> tuple[Array, Array]:
     """Corners (n, 3) and tetrahedra (t, 4) filling a closed surface vertex_m (v, 3), face (f, 3).
 
@@ -53,7 +54,9 @@ def tetrahedra(
         "point": (point_m - centre) / unit_m,
         "size": size_m / unit_m,
     }
-    result = in_child("_netgen.py", given, guard_s)
+    volume, area = geometry.volume_m3(vertex_m, face), geometry.face_areas_m2(vertex_m, face).sum()
+    tets = float(9 * abs(volume) / edge_m**3 + 2 * area / edge_m**2)
+    result = in_child("_netgen.py", given, guard_s or int(GUARD_S + GUARD_S_PER_TET * min(tets, 1e4)))
     if len(result["tet"]) == 0:
         raise MeshError("mesh encloses no volume", "give thickness_m to make a sheet solid, or close the surface")
     return result["node"] * unit_m + centre, result["tet"]
