@@ -42,7 +42,7 @@ from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
 from sonic_bullet.session.arguments import as_sensors
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, checked, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, checked, oversize_notes, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:

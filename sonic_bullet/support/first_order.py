@@ -2,7 +2,7 @@
 
     (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, −Φ_r)      the body's modes and rigid motions, its light partners' rigid motions
     F = Re(K) B q,  κ = Fᵀ Re(K)⁻¹ F               forces at the touches, and the part of ω² that is the springs' own
-    F = Re(K) B q,  κ = Fᵀ Re(K)⁻¹ F               forces at the touches, and the part of ω² that is the springs
+    x = Fᵀ (1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)) F,  s = jω        what else gives way, along those forces
     s² + 2 s qᵀDq + ω² − κx/(κ + x) = 0
 
 κx/(κ + x) is both in series, so that it stays below κ where a partner is soft, at its resonance say, and its imaginary
