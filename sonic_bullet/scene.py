@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -50,13 +50,14 @@ Say = Callable[[str], None]
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderResult:
     """sound (channels, n) in pascals, which need not lie in memory, the log it comes from, and notes a user should
-    read.
+    read. lifted: see `Listener.lifted`.
     """
 
     sound: KeptSound
     log: ContactLog
     sr: int
     notes: tuple[str, ...] = ()
+    lifted: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def samples(self) -> Array:
@@ -243,10 +244,10 @@ class _Stage:
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
             sound = listener.kept_sound()
-            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
+            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
         sound = render_kept(log)
-        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
+        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

@@ -317,6 +317,7 @@ def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple
         "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in result.log.events],
         "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in result.log.changes],
         "supports": result.log.supports,
+        "lifted": None if isinstance(result, _Replay) else {name: list(of) for name, of in result.lifted.items()},
         "engine": dict(result.log.engine),
         "versions": dict(result.log.versions),
         "notes": list(notes),

@@ -187,6 +187,7 @@ class State:
     the step taken in last (the others are gone, and ring on where they were); newest: the highest so far. quenches:
     steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
     stand (b,) STAND: how bodies stand on others; credit_s (1,): time left for new poles, (0,) where nothing supports.
+    lifted: of bodies that left the tables, by name, the steps that they rang on contacts, and those beyond these' law.
     """
 
     window: Window
@@ -212,6 +213,7 @@ class State:
     has_residual: bool = False
     stand: Array = field(default_factory=lambda: np.zeros(0, STAND))
     credit_s: Array = field(default_factory=lambda: np.zeros(0))
+    lifted: dict[str, tuple[int, int]] = field(default_factory=dict)
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -254,6 +256,7 @@ class State:
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.stand.copy(), self.credit_s.copy(),
+            dict(self.lifted),
         )  # fmt: skip
 
 

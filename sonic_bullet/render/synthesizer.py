@@ -21,7 +21,7 @@ from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
-from sonic_bullet.render.presence import Records, admit, in_tables, release
+from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.supports import settle
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
@@ -229,6 +229,11 @@ class Synthesizer:
     def time_s(self) -> float:
         """Physics time taken in."""
         return self._clock.time_s
+
+    @property
+    def lifted(self) -> dict[str, tuple[int, int]]:
+        """See `presence.lifted`."""
+        return lifted(self._state)
 
     def feed(self, step: Step, bodies: Records) -> Array:
         """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: by index, those at

@@ -9,7 +9,6 @@ not.
 
 from __future__ import annotations
 
-import inspect
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -39,7 +38,7 @@ from sonic_bullet.records.coerce import (
 )
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
-from sonic_bullet.session.arguments import as_sensors
+from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
 from sonic_bullet.session.wanted_bodies import WantedBody, checked, oversize_notes, solved_bodies, wanted_body
@@ -55,13 +54,8 @@ def _wanted(world: World, who: Any, how: Any) -> WantedBody:
     """One entry of a cast."""
     body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
     given = how if isinstance(how, Mapping) else {"material": how}
-    check_options(map(str, given), [name for name in _keywords(Listener.add) if name != "progress"], "add_all")
+    check_options(map(str, given), [name for name in keywords(Listener.add) if name != "progress"], "add_all")
     return wanted_body(world, body, link, **{"material": None, **given})
-
-
-def _keywords(call: Callable[..., Any]) -> list[str]:
-    """Names of the arguments that are given by name alone."""
-    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
 
 
 class Listener:
@@ -303,6 +297,12 @@ class Listener:
         return (*self.world.notes, *self._kept.notes)
 
     @property
+    def lifted(self) -> dict[str, tuple[int, int]]:
+        """By name of each body that rang on something: in how many steps, and in how many of them so loud that its
+        contacts would lift off and chatter, of which their law knows nothing."""
+        return self._synth.lifted
+
+    @property
     def time_s(self) -> float:
         """Physics time so far."""
         return float(self._synth.time_s)
@@ -325,7 +325,7 @@ class Listener:
         It goes to the file by blocks, however long it is; lufs= alone needs all of it in memory. Raises FileError,
         AudioError.
         """
-        check_options(options, _keywords(write_audio), "write", error=AudioError)
+        check_options(options, keywords(write_audio), "write", error=AudioError)
         place = as_path(path, "path", "name a file, such as out.wav")
         if not self.sensors:
             raise AudioError(
