@@ -25,9 +25,9 @@ from sonic_bullet.support.moving import Moving
 def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
     """See `in_place`; `turn` is the identity: modes are told by the motion that most resembles theirs when free."""
     m = len(body.omega_rad_s)
-    if not touches or not m:
+    if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
         return in_place(body, partners, touches)
-    x = gathered(body, partners, touches, squares=False)
+    x, row = gathered(body, partners, touches, squared=False)
     light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     yields = np.flatnonzero(x.other_lam > 0)
     both = np.hstack([x.own, -x.other[:, light]])
@@ -52,6 +52,8 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     root = np.sqrt(x.lam[:m])
     new = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), new)
     force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
+    lifts = np.zeros((3 * len(touches), m))
+    lifts[row] = np.abs(force)
     passed = np.where(held, 0, along * part / below)
     passed /= 1 + (np.abs(passed) ** 2).sum(axis=0)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
@@ -65,7 +67,7 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
         decay,
         np.eye(m),
         tuple(passed[a:b] for a, b in pairwise(ends)),
-        np.abs(force[::3]),
+        lifts[::3],
         decay[:, None] * power / whole,
         ~held,
     )
