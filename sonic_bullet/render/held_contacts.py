@@ -62,11 +62,11 @@ STAND = np.dtype(
 )
 """How a body stands."""
 
-SHARE = 0.1
-"""Of simulated time that may go into new poles: a pile of a hundred boxes costs 40 % more then, and live sound is never
-late for it. Who waits longest is served first, what moves before what does not.
+SHARE = 0.08
+"""Of simulated time that may go into new poles: with it, a pile of a hundred boxes costs 40 % more, and live sound is
+never late for it. Who waits longest is served first, what moves before what does not.
 """
-SAVED_S = 0.1
+SAVED_S = 0.03
 """Most of it that is saved up for a moment in which many come to rest."""
 AGAIN_S = 0.02
 """A body's poles stay at least so long, four blocks of the bank."""

@@ -41,8 +41,8 @@ ON = 0.02
 """Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
 NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
-HEARD = 0.1
-"""Of a body's own loudest weight: what passes on with less, 1 % of its power, is left out."""
+HEARD = 0.3
+"""Of a body's own loudest weight: what passes on with less would add 0.4 dB to it, and is left out."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
 
