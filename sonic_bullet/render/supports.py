@@ -63,15 +63,21 @@ def settle(state: State, number: int) -> None:
             _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
 
 
-def _stand(state: State, b: int, quaternion: Array) -> None:
+def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
+    """Partners of a body, its touches, the load (c,) on each, and what it becomes. quaternion (b, 4): all bodies'."""
     partners, touches, load_n = _touches(state, b, quaternion)
+    moving = [state.resonators[p].moving for p in partners]
+    return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches)
+
+
+def _stand(state: State, b: int, quaternion: Array) -> None:
+    partners, touches, load_n, placed = standing(state, b, quaternion)
     free = _lanes(state, b)
     m = state.resonators[b].mode_count
     if not touches:
         bank.set_poles(state.bank, state.ringing, b, free)
         bank.set_passes(state.bank, state.ringing, b, {})
         return
-    placed = first_order(state.resonators[b].moving, [state.resonators[p].moving for p in partners], touches)
     new = _audible((-placed.decay_per_s + 1j * placed.omega_rad_s) / state.bank.sr, free[:m])
     voice = state.voices[b]
     if voice is not None:
