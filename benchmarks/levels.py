@@ -68,14 +68,14 @@ def stopped() -> Iterator[str]:
 def floor_power_w(material: Material, thickness_m: float, loss: float) -> Array:
     """(16,) sound power in W of one side, of the tapping machine on a plate that is large.
 
-    Hammers do not bounce: p = m v falls as the pulse of m against the plate's mass at the contact; lines 2 p f_s |F̂|, of
-    which half their square is power in the plate through Re Y = 1/(8√(Dρh)), and ρ₀cσ/(ωηρh) of it leaves
+    Hammers do not bounce: p = m v falls as the pulse of m against the plate's mass at the contact; lines 2 p f_s |F̂|,
+    of which half their square is power in the plate through Re Y = 1/(8√(Dρh)), and ρ₀cσ/(ωηρh) of it leaves
     [Cremer, Heckl & Petersson 2005, sec. 4.3.2, 6.9]; σ = 1/√(1 − f_c/f) above f_c, at most 1 below [σ of long plates].
     """
     v = np.sqrt(2 * 9.81 * DROP_M)
     stiff, surface = material.plane_strain_pa * thickness_m**3 / 12, material.density_kg_m3 * thickness_m
     modulus = 1 / (1 / material.plane_strain_pa + 1 / load_material("steel").plane_strain_pa)
-    tau, flat = pulse_length(HAMMER_KG, modulus, 1 / HEAD_M, np.pi * 0.015**2, v)
+    tau, flat = pulse_length.py_func(HAMMER_KG, modulus, 1 / HEAD_M, np.pi * 0.015**2, v)
     mobility = 1 / (8 * np.sqrt(stiff * surface))
     critical = AIR.sound_speed_m_s**2 / (2 * np.pi) * np.sqrt(surface / stiff)
     power = []
@@ -106,7 +106,8 @@ def tapping() -> Iterator[str]:
             bands = 10 * np.log10(made / (1e-12 * 10 ** ((np.array(reference) + db(10 / 4)) / 10)))
             yield (
                 f"tapping machine on {name}, η {loss:.2f}: {made.sum() / total_w:.2g} of {total_w:.2f} W, reference "
-                f"{measured / total_w:.2g}: {db(made.sum() / measured):+.1f} dB (bands {bands.min():+.0f} … {bands.max():+.0f})"
+                f"{measured / total_w:.2g}: {db(made.sum() / measured):+.1f} dB "
+                f"(bands {bands.min():+.0f} … {bands.max():+.0f})"
             )
 
 
@@ -140,7 +141,10 @@ def spoon() -> Iterator[str]:
     for height in (0.05, 0.15):
         found = np.array([spoon_peak_db(height, place, seed) for seed, place in enumerate((0.0, 0.05, 0.08))])
         (near, far), spread = found.mean(axis=0), np.ptp(found, axis=0).max()
-        yield f"spoon from {height * 100:.0f} cm: {near:.1f} dB at 0.5 m, {far:.1f} dB at 1 m, spread {spread:.1f}; Killion 110 … 115"
+        yield (
+            f"spoon from {height * 100:.0f} cm: {near:.1f} dB at 0.5 m, {far:.1f} dB at 1 m, spread {spread:.1f}; "
+            "Killion 110 … 115"
+        )
 
 
 def mug() -> Iterator[str]:
