@@ -121,7 +121,7 @@ def spoon_peak_db(height_m: float, place_m: float, seed: int) -> tuple[float, fl
     )
     shape = client.createCollisionShape(client.GEOM_MESH, fileName=str(ASSETS / "plate.obj"))
     plate = client.createMultiBody(2400 * 206.8e-6, shape, basePosition=[0, 0, 0.012])
-    rod = client.createCollisionShape(client.GEOM_CYLINDER, radius=0.003, height=0.175)
+    rod = client.createCollisionShape(client.GEOM_CYLINDER, radius=0.004, height=0.1)
     turn = client.getQuaternionFromEuler([1.2 + 0.1 * seed, 0.2, 0.4])
     spoon = client.createMultiBody(0.039, rod, basePosition=[place_m, 0, height_m + 0.06], baseOrientation=turn)
     for body in (table, plate, spoon):
