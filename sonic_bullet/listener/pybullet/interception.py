@@ -105,6 +105,7 @@ class Interception:
     @contextmanager
     def watching(self) -> Iterator[None]:
         """The module's functions give way while this lasts."""
+        gc.collect()  # a BulletClient that somebody dropped before would end the run's, whose number is the same
         self._real = {name: getattr(pybullet, name) for name in (*watched(), *BESIDES)}
         ours: dict[str, Any] = {name: functools.partial(self._called, name) for name in watched()}
         ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search, "connect": self._connect}
