@@ -56,7 +56,7 @@ def judged(name: str, sound: Array, sr: int, modes: tuple[Array, Array, Array], 
 
 def of_case(folder: Path) -> Iterator[Row]:
     """Held-out strikes of a practice case."""
-    found: CaseFit = fit_case(read_case(folder), check_mesh=False)
+    found: CaseFit = fit_case(read_case(folder))
     strikes = case_strikes(found)
     floor = Floor(np.mean([floor_of(x).variance for x in strikes.left], axis=0))
     for recording in found.case.recordings:

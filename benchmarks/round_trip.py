@@ -184,7 +184,7 @@ def fitted(subject: Subject, model: ModalModel, sound: Array, sensor: str, at: P
     thing = CaseObject("object", subject.mesh, 1.0, subject.material)
     at_m, direction = ({"object": triple(look)}, {"object": triple(along)}) if sensor == "velocity" else (None, None)
     case = Case(subject.name, folder, {"object": thing}, (strike,), sensor, at_m, direction, medium="air")
-    return material_of(preset_of(fit_case(case, check_mesh=False)))
+    return material_of(preset_of(fit_case(case)))
 
 
 def triple(vector: Array) -> tuple[float, float, float]:

@@ -144,7 +144,7 @@ def by_fast_search(x: Recorded) -> Estimate:
 def fitted(x: Recorded) -> Estimate:
     """This project's fit of all 'fit' strikes. Raises SonicBulletError."""
     begun = time.process_time()
-    fit = fit_case(x.case, check_mesh=False)
+    fit = fit_case(x.case)
     spent = time.process_time() - begun
     said = (fit.fit.alpha_per_s, fit.fit.beta_s, fit.fit.gamma_m2_s2, fit.fit.poisson_ratio)
     return Estimate(FIT, *said, len(fit.objects[0].evidence.lines.freq_hz), 0, 0, spent)

@@ -82,6 +82,21 @@ def grid(
     cell = cell.reshape(-1, 20)
     where = np.stack([used // (size[1] * size[2]), used // size[2] % size[1], used % size[2]], axis=1) / (2 * n)
     node = place(where)
+    outer = outer_rings(cell)
+    triangle = outer[:, [[7, 0, 1], [1, 2, 3], [3, 4, 5], [5, 6, 7], [7, 1, 3], [7, 3, 5]]].reshape(-1, 3)
+    skin, face = np.unique(triangle, return_inverse=True)
+    face = face.reshape(-1, 3)
+    body = Bricks(node, cell, skin, face, centre)
+    corner = node[skin][face]
+    if np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0:
+        body = Bricks(node, _mirrored(cell), skin, face[:, ::-1], centre)
+    return body
+
+
+def outer_rings(cell: Array) -> Array:
+    """Faces (q, 8) of cells (c, 20) that belong to one cell alone: eight nodes around, corners first and every second,
+    counter-clockwise seen from outside a cell that is not mirrored.
+    """
     number = {(int(a), int(b), int(c)): i for i, (a, b, c) in enumerate(OFFSET)}
     sides = []
     for axis in range(3):
@@ -92,17 +107,8 @@ def grid(
             ]
             sides.append(cell[:, around])
     ring = np.concatenate(sides)
-    key = np.sort(ring, axis=1)
-    _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
-    outer = ring[np.sort(index[count == 1])]
-    triangle = outer[:, [[7, 0, 1], [1, 2, 3], [3, 4, 5], [5, 6, 7], [7, 1, 3], [7, 3, 5]]].reshape(-1, 3)
-    skin, face = np.unique(triangle, return_inverse=True)
-    face = face.reshape(-1, 3)
-    body = Bricks(node, cell, skin, face, centre)
-    corner = node[skin][face]
-    if np.einsum("fi,fi->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0:
-        body = Bricks(node, _mirrored(cell), skin, face[:, ::-1], centre)
-    return body
+    _, index, count = np.unique(np.sort(ring, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(ring[np.sort(index[count == 1])])
 
 
 def _inserted(a: int, b: int, axis: int, side: int) -> tuple[int, int, int]:
@@ -115,7 +121,7 @@ def _mirrored(cell: Array) -> Array:
     return cell[:, [number[(2 - int(a), int(b), int(c))] for a, b, c in OFFSET]]
 
 
-def _functions(points: Array) -> tuple[Array, Array]:
+def shape_functions(points: Array) -> tuple[Array, Array]:
     """N (q, 20) and its gradient (q, 20, 3) at points (q, 3) of the cube ±1."""
     sign = OFFSET - 1.0
     value, slope = np.empty((len(points), 20)), np.empty((len(points), 20, 3))
@@ -135,7 +141,7 @@ def _functions(points: Array) -> tuple[Array, Array]:
     return value, slope
 
 
-def _gauss(order: int) -> tuple[Array, Array]:
+def gauss_points(order: int) -> tuple[Array, Array]:
     """Points (order³, 3) in the cube ±1 and their weights."""
     point, weight = np.polynomial.legendre.leggauss(order)
     points = np.stack(np.meshgrid(point, point, point, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -152,29 +158,39 @@ def _strain(gradient: Array) -> Array:
     return strain.reshape(-1, 6, 60)
 
 
-def matrices(body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Array | None = None) -> tuple[Any, Any]:
+def _at_points(order: int) -> tuple[Array, Array, Array]:
+    points, weight = gauss_points(order)
+    return *shape_functions(points), weight
+
+
+def _jacobian(body: Bricks, slope: Array, weight: float) -> tuple[Array, Array]:
+    """Of each cell at a point: ∂x/∂ξ (c, 3, 3), and its weighted determinant (c,)."""
+    jacobian = np.einsum("cid,ik->cdk", body.node_m[body.cell], slope)
+    volume = np.linalg.det(jacobian) * weight
+    if not (volume > 0).all():
+        raise ValueError("a brick is turned inside out")
+    return jacobian, volume
+
+
+def matrices(
+    body: Bricks, stiffness_pa: Array, density_kg_m3: float, softer: Array | None = None, *, mass_points: int = 3
+) -> tuple[Any, Any]:
     """K and M, scipy CSC, of a body of stiffness (6, 6); softer (c,) multiplies the stiffness of each cell.
 
-    K is integrated at 2³ points, M at 3³: five times nearer in thin plates than K at 3³ [Zienkiewicz, Taylor & Too
-    1971].
+    K is integrated at 2³ points: five times nearer in thin plates than at 3³ [Zienkiewicz, Taylor & Too 1971]. M is
+    at mass_points³.
     """
     from scipy.sparse import coo_array
 
     c = len(body.cell)
     stiff, mass = np.zeros((c, 60, 60)), np.zeros((c, 20, 20))
-    for order in (2, 3):
-        points, weights = _gauss(order)
-        value, slope = _functions(points)
-        for q in range(len(points)):
-            jacobian = np.einsum("cid,ik->cdk", body.node_m[body.cell], slope[q])
-            volume = np.linalg.det(jacobian) * weights[q]
-            if not (volume > 0).all():
-                raise ValueError("a brick is turned inside out")
-            if order == 3:
-                mass += density_kg_m3 * volume[:, None, None] * np.outer(value[q], value[q])
-                continue
-            b_matrix = _strain(np.einsum("ik,ckd->cid", slope[q], np.linalg.inv(jacobian)))
-            stiff += np.matmul(b_matrix.transpose(0, 2, 1), np.matmul(stiffness_pa * volume[:, None, None], b_matrix))
+    for value, slope, weight in zip(*_at_points(mass_points), strict=True):
+        _, volume = _jacobian(body, slope, weight)
+        mass += density_kg_m3 * volume[:, None, None] * np.outer(value, value)
+    for _, slope, weight in zip(*_at_points(2), strict=True):
+        jacobian, volume = _jacobian(body, slope, weight)
+        b_matrix = _strain(np.einsum("ik,ckd->cid", slope, np.linalg.inv(jacobian)))
+        stiff += np.matmul(b_matrix.transpose(0, 2, 1), np.matmul(stiffness_pa * volume[:, None, None], b_matrix))
     if softer is not None:
         stiff *= softer[:, None, None]
     dof = (3 * body.cell[:, :, None] + np.arange(3)).reshape(c, 60)
@@ -227,15 +243,16 @@ def modes(
     to_hz: float = 20_000.0,
     softer: Array | None = None,
     load_kg: dict[int, float] | None = None,
+    mass_points: int = 3,
 ) -> Modes:
-    """Modes up to to_hz of a free body; load_kg: point masses at vertices of its surface."""
+    """Modes up to to_hz of a free body; load_kg: point masses at its surface's vertices; mass_points: of `matrices`."""
     from scipy.sparse import coo_array
 
     from sonic_bullet.modal import eigen
     from sonic_bullet.modal.ordering import dissection
 
     pascal = float(np.abs(stiffness_pa).max())
-    k_matrix, m_matrix = matrices(body, stiffness_pa / pascal, 1.0, softer)
+    k_matrix, m_matrix = matrices(body, stiffness_pa / pascal, 1.0, softer, mass_points=mass_points)
     rate = pascal / density_kg_m3
     mass = float(m_matrix[::3, ::3].sum()) * density_kg_m3
     for vertex, kilogram in (load_kg or {}).items():

@@ -129,6 +129,14 @@ cli.add_command(play)
     multiple=True,
     help="Clamp all within R of a point, in m, mesh frame; repeatable.",
 )
+@click.option(
+    "--accuracy",
+    type=click.FloatRange(0, 0.5, min_open=True),
+    default=0.01,
+    show_default=True,
+    metavar="A",
+    help="Relative error allowed at the highest mode.",
+)
 @click.option("--thickness", "thickness_m", type=float, metavar="T", help="Wall thickness in m of an open surface.")
 @click.option(
     "--scale",

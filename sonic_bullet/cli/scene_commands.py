@@ -75,7 +75,7 @@ def run_render(
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_coarse(result.log), *_oversized(result.log), *_warnings(report))
+        notes = (*result.notes, *_oversized(result.log), *_warnings(report))
         say(_summary(report, result.log))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
@@ -254,17 +254,6 @@ def _with_partial(
     if isinstance(error, SonicBulletError):
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
     return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
-
-
-def _coarse(log: ContactLog) -> tuple[str, ...]:
-    from sonic_bullet.modal import COARSER
-
-    names = sorted({body.name for body in log.bodies if body.model is not None and COARSER in body.model.note})
-    return (
-        (f"the mesh of {', '.join(names)} is {COARSER}: a faster machine may compute slightly other modes",)
-        if names
-        else ()
-    )
 
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:

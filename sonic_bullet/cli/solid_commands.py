@@ -28,6 +28,7 @@ def run_modes(
     to_hz: float | None,
     fixed: tuple[tuple[float, float, float, float], ...],
     thickness_m: float | None,
+    accuracy: float,
     scale: float,
     json_to: str | None,
     output: str | None,
@@ -51,6 +52,7 @@ def run_modes(
                 count=count,
                 fixed=fixed,
                 thickness_m=thickness_m,
+                accuracy=accuracy,
                 progress=progress,
                 to_hz=to_hz or HEARING_LIMIT_HZ,
             )

@@ -104,7 +104,7 @@ class Playback:
         self._card, self._full_scale, self._sr = card, full_scale_pa, card.sr
         self._ahead = round(ahead_s * card.sr)
         self._queue = SampleQueue(card.channels, round(QUEUE_S * card.sr))
-        self._returned: deque[float] = deque(maxlen=lag_steps + 1)
+        self._returned: deque[float | None] = deque([None] * (lag_steps + 1))  # None: before any sound, which is no lag
         self._starts: deque[tuple[int, float]] = deque()  # a frame's first sample, when the step it sounds returned
         self._latencies = Latencies()
         self._filling, self._draining, self._said, self.closed = True, False, False, False
@@ -124,8 +124,9 @@ class Playback:
             return
         if self.failure is not None:
             return self._say()
-        self._returned.append(returned_s)
-        if len(self._returned) == self._returned.maxlen:
+        self._returned.popleft()
+        self._returned.append(returned_s if self._queue.taken else None)
+        if self._returned[0] is not None:
             self._starts.append((self._queue.written, self._returned[0]))
         samples = frame.T / self._full_scale
         if max(samples.max(), -samples.min()) > 1:
@@ -162,8 +163,6 @@ class Playback:
         first = queue.taken
         waiting = queue.written - first
         self._filling = self._filling and waiting < self._ahead + len(out) and not self._draining
-        if not (first or self._filling):
-            self._starts.clear()  # the steps before any sound: how late those are says how long the first one took
         count = 0 if self._filling else queue.take(out)
         out[count:] = 0
         self._last = (time.perf_counter(), queue.taken, len(out))

@@ -6,8 +6,7 @@ Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (e
 
 from sonic_bullet.modal.meshing.mesh_files import read_mesh
 from sonic_bullet.modal.meshing.shape_meshes import check_fillable
-from sonic_bullet.modal.meshing.solid import COARSER
 from sonic_bullet.modal.model import analyse, missing_name
 from sonic_bullet.records.modal_options import ModalOptions
 
-__all__ = ["COARSER", "ModalOptions", "analyse", "check_fillable", "missing_name", "read_mesh"]
+__all__ = ["ModalOptions", "analyse", "check_fillable", "missing_name", "read_mesh"]

@@ -1,10 +1,14 @@
-"""Linear elasticity on quadratic tetrahedra: the one place that knows scikit-fem.
+"""Linear elasticity on tetrahedra: the one place that knows scikit-fem.
 
     K_ij = ∫ Bᵢᵀ C Bⱼ dV,   M_ij = ∫ ρ Nᵢ Nⱼ dV · 1₃          [Hughes, The Finite Element Method (1987), ch. 3.10, 7.2]
 
-N are scikit-fem's `ElementTetP2` shape functions at its Gauss points, mapped isoparametrically (curved bodies keep
-their volume), B the engineering strains in Voigt order xx yy zz yz xz xy, C any symmetric positive (6, 6) tensor.
-Blocks are gathered per pair of nodes, so that assembly is a few dense products and one sort.
+N are the field's shape functions (lagrange.py), mapped by the solid's quadratic elements (curved bodies keep their
+volume), C any symmetric positive (6, 6) tensor in Voigt order xx yy zz yz xz xy. With G = ∂ξ/∂x the integrand is
+
+    K_ij^ab = Σ_kl (Σ_de G_kd C_adbe G_le det J) ∂_k N_i ∂_l N_j
+
+the bracket one number an element where its edges are straight, so that all blocks are one dense product. They are
+gathered per pair of nodes.
 """
 
 from __future__ import annotations
@@ -13,97 +17,106 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3
+from sonic_bullet.modal import lagrange
+from sonic_bullet.modal.meshing.solid import TET_EDGE, Solid, corner_volume_m3
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-CHUNK = 2000  # elements at a time: keeps the (t, 30, 30) blocks of a large body out of memory
+CHUNK = 1000  # elements at a time: keeps their (k, k) blocks out of memory
+STRAIGHT = 1e-12  # of the body: a middle no farther off its chord lies on it
+VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
-def _element(order: int) -> tuple[Array, Array, Array]:
-    """Shape functions (10, q), their reference gradients (10, 3, q) and the weights (q,) of a rule exact to
-    ``order``.
-    """
-    from skfem import ElementTetP2
+def _rule(order: int) -> tuple[Array, Array]:
+    """Points (q, 3) and weights (q,) of a rule exact to ``order`` on the reference tetrahedron."""
+    from skfem import ElementTetP1
     from skfem.quadrature import get_quadrature
 
-    element = ElementTetP2()
-    point, weight = get_quadrature(element.refdom, order)
-    values = [element.lbasis(point, i) for i in range(10)]
-    return np.array([v[0] for v in values]), np.array([v[1] for v in values]), weight
+    point, weight = get_quadrature(ElementTetP1().refdom, order)
+    return point.T, weight
 
 
-def _geometry(solid: Solid, tet: Array, gradient: Array, weight: Array) -> tuple[Array, Array]:
-    """Volume per Gauss point (t, q) and physical gradients (t, q, 10, 3)."""
-    jacobian = np.einsum("tid,ikq->tqdk", solid.node_m[tet], gradient)  # dx_d / dξ_k
+def _geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
+    """det J (t, q) and ∂ξ/∂x (t, q, 3, 3) at reference points (q, 3)."""
+    jacobian = np.einsum("tid,ikq->tqdk", solid.node_m[tet], lagrange.gradients(2, point), optimize=True)
     determinant = np.linalg.det(jacobian)
     if not (determinant > 0).all():
         raise MeshError("an element is turned inside out", "repair the mesh, or give a simpler one")
-    physical = np.einsum("ikq,tqkd->tqid", gradient, np.linalg.inv(jacobian))
-    return determinant * weight, physical
+    return determinant, np.linalg.inv(jacobian)
 
 
-def _strain(gradient: Array) -> Array:
-    """B (t, q, 6, 30) from gradients (t, q, 10, 3): engineering strains in Voigt order."""
-    t, q = gradient.shape[:2]
-    strain = np.zeros((t, q, 6, 10, 3))
-    for row, axis in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
-        strain[:, :, row, :, axis[0]] += gradient[..., axis[1]]
-        if axis[0] != axis[1]:
-            strain[:, :, row, :, axis[1]] += gradient[..., axis[0]]
-    return strain.reshape(t, q, 6, 30)
+def _bent(solid: Solid) -> Array:
+    """Which elements (t,) have a curved edge."""
+    chord = solid.node_m[solid.tet[:, TET_EDGE]].mean(axis=2)
+    off = np.abs(solid.node_m[solid.tet[:, 4:]] - chord).max(axis=(1, 2))
+    return np.asarray(off > STRAIGHT * np.abs(solid.node_m).max())
 
 
-def assemble(solid: Solid, stiffness_pa: Array, density_kg_m3: float) -> tuple[Any, Any]:
-    """Stiffness and mass matrix, both (3n, 3n) scipy CSC with the dofs of a node side by side.
+def assemble(
+    solid: Solid, stiffness_pa: Array, density_kg_m3: float, field: lagrange.Field | None = None
+) -> tuple[Any, Any]:
+    """Stiffness and mass matrix of a field, by default the quadratic one, both (3n, 3n) scipy CSC with the unknowns of
+    a node side by side.
 
     Raises MeshError where an element is inverted.
     """
     from scipy.sparse import bsr_array, csc_array, csr_array
 
-    n, t = len(solid.node_m), len(solid.tet)
-    code = (solid.tet[:, :, None].astype(np.int64) * n + solid.tet[:, None, :]).ravel()
+    field = field or lagrange.field(solid, 2)
+    n, k = len(field.node_m), field.tet.shape[1]
+    code = (field.tet[:, :, None].astype(np.int64) * n + field.tet[:, None, :]).reshape(-1, k * k)
     pair, slot = np.unique(code, return_inverse=True)
-    slot = slot.reshape(t, 100)
-    _, gradient, weight = _element(2 if solid.affine else 4)
-    shape, mass_gradient, mass_weight = _element(4 if solid.affine else 6)
-    stiff = np.zeros((9, len(pair)))
-    mass = np.zeros(len(pair))
-    for start in range(0, t, CHUNK):
-        tet, where = solid.tet[start : start + CHUNK], slot[start : start + CHUNK].ravel()
-        volume, physical = _geometry(solid, tet, gradient, weight)
-        strain = _strain(physical)
-        block = np.zeros((len(tet), 30, 30))
-        for q in range(len(weight)):
-            b = strain[:, q]
-            block += np.matmul(b.transpose(0, 2, 1), np.matmul(stiffness_pa * volume[:, q, None, None], b))
-        parts = block.reshape(len(tet), 10, 3, 10, 3).transpose(2, 4, 0, 1, 3).reshape(9, -1)
-        for k in range(9):
-            stiff[k] += np.bincount(where, parts[k], len(pair))
-        if solid.affine:
-            volume = np.abs(corner_volume_m3(solid.node_m, tet))[:, None] * 6 * mass_weight
-        else:
-            volume, _ = _geometry(solid, tet, mass_gradient, mass_weight)
-        mass += np.bincount(where, np.einsum("tq,iq,jq->tij", volume, shape, shape, optimize=True).ravel(), len(pair))
+    slot = slot.reshape(-1, k * k)
+    stiff, mass = np.zeros((9, len(pair))), np.zeros(len(pair))
+    bent = _bent(solid)
+    for which, curved in ((np.flatnonzero(~bent), False), (np.flatnonzero(bent), True)):
+        for start in range(0, len(which), CHUNK):
+            mine = which[start : start + CHUNK]
+            blocks, masses = _blocks(solid, solid.tet[mine], stiffness_pa, field.degree, curved=curved)
+            where = slot[mine].ravel()
+            for component in range(9):
+                stiff[component] += np.bincount(where, blocks[:, component].ravel(), len(pair))
+            mass += np.bincount(where, masses.ravel(), len(pair))
     row = np.concatenate([[0], np.cumsum(np.bincount(pair // n, minlength=n))])
     k_matrix = bsr_array((stiff.T.reshape(-1, 3, 3), pair % n, row), shape=(3 * n, 3 * n))
-    blocks = np.zeros((len(pair), 3, 3))
-    blocks[:, range(3), range(3)] = (density_kg_m3 * mass)[:, None]
-    m_matrix = bsr_array((blocks, pair % n, row), shape=(3 * n, 3 * n))
-    m_csr = csr_array(m_matrix)
+    diagonal = np.zeros((len(pair), 3, 3))
+    diagonal[:, range(3), range(3)] = (density_kg_m3 * mass)[:, None]
+    m_csr = csr_array(bsr_array((diagonal, pair % n, row), shape=(3 * n, 3 * n)))
     m_csr.eliminate_zeros()
     k_csc = csc_array(k_matrix)
     return (k_csc + k_csc.T) / 2, csc_array(m_csr)
+
+
+def _blocks(solid: Solid, tet: Array, stiffness_pa: Array, degree: int, *, curved: bool) -> tuple[Array, Array]:
+    """K_ij^ab (t, 9, k²) and ∫ NᵢNⱼ (t, k²) of elements tet (t, 10)."""
+    tensor = stiffness_pa[VOIGT[:, :, None, None], VOIGT[None, None]]
+    point, weight = _rule(2 * degree if curved else 2 * degree - 2)
+    gradient = lagrange.gradients(degree, point)
+    product = np.einsum("ikq,jlq->klqij", gradient, gradient).reshape(9, len(weight), -1)
+    if not curved:  # one point stands for all
+        product, point, weight = np.einsum("pqi,q->pi", product, weight)[:, None], point[:1], np.ones(1)
+    determinant, inverse = _geometry(solid, tet, point)
+    half = np.einsum("tqkd,adbe->tqkabe", inverse, tensor, optimize=True)
+    bracket = np.einsum("tqkabe,tqle,tq->tabklq", half, inverse, determinant * weight, optimize=True)
+    blocks = bracket.reshape(len(tet) * 9, -1) @ product.reshape(9 * len(weight), -1)
+    point, weight = _rule(2 * degree + 2 if curved else 2 * degree)
+    shape = lagrange.values(degree, point)
+    if curved:
+        volume = _geometry(solid, tet, point)[0] * weight
+    else:
+        volume = 6 * np.abs(corner_volume_m3(solid.node_m, tet))[:, None] * weight
+    masses = volume @ np.einsum("iq,jq->qij", shape, shape).reshape(len(weight), -1)
+    return blocks.reshape(len(tet), 9, -1), masses
 
 
 def volume_m3(solid: Solid) -> float:
     """Volume of a solid, curved elements integrated."""
     if solid.affine:
         return float(np.abs(corner_volume_m3(solid.node_m, solid.tet)).sum())
-    _, gradient, weight = _element(6)
+    point, weight = _rule(6)
     return float(
         sum(
-            _geometry(solid, solid.tet[s : s + CHUNK], gradient, weight)[0].sum()
+            (_geometry(solid, solid.tet[s : s + CHUNK], point)[0] * weight).sum()
             for s in range(0, len(solid.tet), CHUNK)
         )
     )
@@ -120,9 +133,9 @@ def rigid_modes(node_m: Array) -> Array:
     return motion.reshape(3 * n, 6)
 
 
-def clamped(solid: Solid, clamp: Array) -> Array:
-    """Which nodes (n,) the spheres clamp (k, 4) of (x, y, z, radius) in m hold; a sphere between nodes holds the
-    nearest.
+def clamped(solid: Solid | lagrange.Field, clamp: Array) -> Array:
+    """Which nodes (n,) the spheres clamp (k, 4) of (x, y, z, radius) in m hold, of a solid or a field; a sphere between
+    nodes holds the nearest.
 
     Raises MeshError where a sphere is farther from the body than an element.
     """

@@ -22,7 +22,8 @@ class Family:
     on the surface at ρL³ = 1 kg.
 
     vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are
-    true. meshed: False where no element's error is in λ.
+    true. meshed: False where no element's error is in λ. error: estimated, relative, of the highest one's frequency,
+    NaN where it is not known.
     """
 
     lame: Array
@@ -35,6 +36,7 @@ class Family:
     count: int
     note: str
     meshed: bool = True
+    error: float = float("nan")
 
     def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
         """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""
@@ -54,25 +56,12 @@ class Family:
 
         Divide by √(ρL³) for shapes per √kg. Quadratic over each element's face, as the elements themselves are.
         """
-        moved, distance = self._moved(position_m)
-        return np.einsum("kxb,kx->kb", moved.astype(float), direction), distance
-
-    def skin_at(self, position_m: Array) -> Array:
-        """The basis (k, 3, b) float32, as `skin`, at the surface points nearest to position_m (k, 3): on another mesh
-        of the same surface.
-        """
-        if position_m.shape == self.vertex_m.shape and (position_m == self.vertex_m).all():
-            return self.skin
-        return self._moved(position_m)[0].astype(np.float32)
-
-    def _moved(self, position_m: Array) -> tuple[Array, Array]:
-        """The basis (k, 3, b) at the surface points nearest to position_m (k, 3), and how far off (k,) they lie."""
         face, weight, distance = closest_point(self.vertex_m, self.face, np.asarray(position_m, float))
         moved = np.empty((len(face), *self.skin.shape[1:]))
         for i, (f, w) in enumerate(zip(face, weight, strict=True)):
             node, share = _quadratic(self.face[f // 4 * 4 : f // 4 * 4 + 4], int(f % 4), w)
             moved[i] = np.tensordot(share, self.skin[node].astype(float), 1)
-        return moved, distance
+        return np.einsum("kxb,kx->kb", moved, direction), distance
 
 
 def _stiffness(family: Family, poisson: float) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-SOLVERS = ("numpy", "scipy", "scikit-fem", "pytetwild", "manifold3d")
+SOLVERS = ("numpy", "scipy", "scikit-fem", "netgen-mesher", "manifold3d")
 
 
 @lru_cache(maxsize=4)

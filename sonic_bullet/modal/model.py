@@ -11,22 +11,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from sonic_bullet.files import cache as store
 from sonic_bullet.geometry import oversize
 from sonic_bullet.modal.keys import key
+from sonic_bullet.modal.methods import chosen, converged
+from sonic_bullet.modal.sectors import MOST_MODES, Wanted
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Material, ModalModel, Shape
-from sonic_bullet.records.errors import MeshError, ModalError
+from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 
-if TYPE_CHECKING:
-    from sonic_bullet.modal.meshing.shape_meshes import Filled
-
-MOST_MODES = 200
+LEAST_ERROR = 1e-4  # relative, of a frequency: what is under it is not told apart
 MODES = {
     "value": store.Kept("f8", ("m",)),
     "vector": store.Kept("f4", ("v", 3, "m")),
@@ -35,15 +35,6 @@ MODES = {
     "face": store.Kept("i", ("f", 3), "v"),
     "curvature": store.Kept("f8", ("f",)),
 }
-SOLID = {
-    "node": store.Kept("f8", ("n", 3)),
-    "tet": store.Kept("i", (None, None), "n"),
-    "affine": store.Kept("b1", (1,)),
-    "skin": store.Kept("i", ("v",), "n"),
-    "face": store.Kept("i", ("f", 3), "v"),
-    "curvature": store.Kept("f8", ("f",)),
-}
-SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +52,7 @@ class _Unit:
     note: str
 
 
+@one_thread()
 def analyse(
     shapes: tuple[Shape, ...],
     material: Material,
@@ -69,6 +61,7 @@ def analyse(
     count: int | None = None,
     fixed: Sequence[Sequence[float]] = (),
     thickness_m: float | None = None,
+    accuracy: float = 0.01,
     edge_m: float | None = None,
     cache: Path | Literal["default"] | None = "default",
     progress: Callable[[str], None] | None = None,
@@ -78,14 +71,14 @@ def analyse(
 
     shapes: together one solid, in the body frame. fixed: clamped where (x, y, z, radius) in m, body frame, reach; a
     clamp between nodes takes the nearest. thickness_m: wall of open surfaces (see surfaces.py); it makes closed ones
-    hollow. edge_m: element size, by default from a budget of unknowns. cache: folder, "default" or None. progress:
-    called with a line now and then. A body all of whose modes lie above to_hz has none; so has a plane. Pieces that do
-    not hang together: the largest is kept and noted. Raises MeshError (broken, empty, flat, absurd or too slow mesh),
-    ModalError (no usable modes).
+    hollow. accuracy: relative, of the highest frequency; the note tells what is reached. edge_m: element size, by
+    default from a budget of unknowns. cache: folder, "default" or None. progress: called with a line now and then. A
+    body all of whose modes lie above to_hz has none; so has a plane. Pieces that do not hang together: the largest is
+    kept and noted. Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
     """
     say = progress or (lambda _: None)
-    asked = ModalOptions(to_hz, count, fixed, thickness_m)
-    to_hz, count, thickness_m = asked.to_hz, asked.count, asked.thickness_m
+    asked = ModalOptions(to_hz, count, fixed, thickness_m, accuracy)
+    to_hz, count = asked.to_hz, asked.count
     if not shapes:
         raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
     if any(shape.kind == "plane" for shape in shapes):
@@ -104,9 +97,7 @@ def analyse(
     of = _unit_of(shapes, material, asked, edge_m)
     unit = _recall(store.load(cache, of.name, MODES))
     if unit is None:
-        unit = _solve(
-            shapes, (edge_m, thickness_m), (cache, of.solid), of.length_m, of.stiffness, of.clamp, count, of.limit, say
-        )
+        unit = _solve(of, shapes, asked, edge_m, cache, say)
         store.save(cache, of.name, _arrays(unit), unit.note)
     lam = unit.value * of.per_s2
     freq, decay, alive = damped(lam, material)
@@ -163,34 +154,26 @@ class _UnitOf(NamedTuple):
 
 
 def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions, edge_m: float | None) -> _UnitOf:
-    solid = _solid_key(shapes, asked.thickness_m, edge_m)
-    length_m = _diagonal_m(shapes)
+    solid = solid_key(shapes, asked.thickness_m, edge_m)
+    length_m = diagonal_m(shapes)
     pascal = float(np.abs(material.stiffness_pa).max())
     per_s2 = pascal / (material.density_kg_m3 * length_m**2)
     limit = (2 * np.pi * asked.to_hz) ** 2 / per_s2
     clamp = np.array(asked.fixed, float).reshape(-1, 4)
     stiffness = material.stiffness_pa / pascal
-    name = key("modes", solid, stiffness, clamp, asked.count if asked.count is not None else limit)
+    name = key("modes", solid, stiffness, clamp, asked.count, limit, asked.accuracy)
     return _UnitOf(name, solid, length_m, per_s2, limit, stiffness, clamp)
 
 
-def surface_of(
-    shapes: tuple[Shape, ...], *, cache: store.Place = "default", progress: Callable[[str], None] | None = None
-) -> tuple[Array, Array]:
-    """vertex_m (v, 3) and face (f, 3) of the surface on which `analyse` gives the modes of these shapes, without
-    solving for them. Raises MeshError.
-    """
-    _diagonal_m(shapes)
-    body = _filled(shapes, (None, None), (cache, _solid_key(shapes, None, None)), progress or (lambda _: None))
-    return body.solid.node_m[body.skin.node], body.skin.face
+def solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
+    """Under which name shapes filled with elements are kept."""
+    sectors = [
+        sector for s in shapes for sector in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)
+    ]
+    return key("solid", *sectors, thickness_m, edge_m)
 
 
-def _solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
-    parts = [part for s in shapes for part in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)]
-    return key("solid", *parts, thickness_m, edge_m)
-
-
-def _diagonal_m(shapes: tuple[Shape, ...]) -> float:
+def diagonal_m(shapes: tuple[Shape, ...]) -> float:
     """A length that belongs to the shapes alone: what all is divided by. Raises MeshError where there is none."""
     sizes = [
         np.linalg.norm(np.ptp(s.vertex_m[np.unique(s.face)], axis=0)) if s.kind == "mesh" else np.linalg.norm(s.size_m)
@@ -215,108 +198,47 @@ def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Arra
     return freq[order], decay[alive[order]], alive[order]
 
 
-def _filled(
-    shapes: tuple[Shape, ...],
-    sizes: tuple[float | None, float | None],
-    kept: tuple[store.Place, str],
-    say: Callable[[str], None],
-) -> Filled:
-    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m."""
-    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
-    from sonic_bullet.modal.meshing.solid import Solid, SolidSurface
-
-    found = store.load(*kept, SOLID)
-    if found is not None:
-        a, note = found
-        return Filled(
-            Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
-        )
-    body = fill(shapes, *sizes, say)
-    solid, skin = body.solid, body.skin
-    arrays = {
-        "node": solid.node_m,
-        "tet": solid.tet,
-        "affine": np.array([solid.affine]),
-        "skin": skin.node,
-        "face": skin.face,
-        "curvature": body.curvature_per_m,
-    }
-    store.save(*kept, arrays, solid.note)
-    return body
-
-
 def _solve(
+    of: _UnitOf,
     shapes: tuple[Shape, ...],
-    sizes: tuple[float | None, float | None],
-    kept: tuple[store.Place, str],
-    length_m: float,
-    stiffness: Array,
-    clamp: Array,
-    count: int | None,
-    limit: float,
+    asked: ModalOptions,
+    edge_m: float | None,
+    cache: store.Place,
     say: Callable[[str], None],
 ) -> _Unit:
-    """Fill (or fetch the filled body), assemble, clamp and solve, all without units."""
-    from sonic_bullet.modal import eigen, fem, polynomials
-    from sonic_bullet.modal.meshing.solid import Solid
-
-    body = _filled(shapes, sizes, kept, say)
-    unit = Solid(body.solid.node_m / length_m, body.solid.tet, body.solid.affine)
-    skin_m = unit.node_m[body.skin.node]
-    corner = skin_m[body.skin.face]
-    area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
-    volume = fem.volume_m3(unit)
-    box = polynomials.recognised(shapes[0]) if len(shapes) == 1 and sizes == (None, None) and not len(clamp) else None
-    exact = (
-        polynomials.free(box, length_m, stiffness, body.solid.node_m[body.skin.node], limit, count, MOST_MODES)
-        if box is not None
-        else None
+    """The body's modes without units, by the method that it takes, as accurate as asked or as that can be."""
+    wanted = Wanted(of.limit, MOST_MODES) if asked.count is None else Wanted(np.inf, asked.count)
+    method = chosen(
+        shapes,
+        of.length_m,
+        of.stiffness,
+        wanted,
+        clamp=of.clamp,
+        edge_m=edge_m,
+        thickness_m=asked.thickness_m,
+        kept=(cache, of.solid),
+        say=say,
     )
-    if exact is not None:
-        value, moved = exact
-        below = slice(None) if count is not None else value <= limit
-        said = f"{body.solid.note}, its modes by polynomials"
-        where = body.solid.node_m[body.skin.node]
-        return _Unit(
-            value[below],
-            np.ascontiguousarray(moved[:, :, below], np.float32),
-            volume,
-            where,
-            body.skin.face,
-            body.curvature_per_m,
-            said,
-        )
-    say(f"assembling {3 * len(unit.node_m)} unknowns")
-    k_matrix, m_matrix = fem.assemble(unit, stiffness, 1.0)
-    fixed = fem.clamped(body.solid, clamp)
-    if fixed.all():
-        raise ModalError("the clamps hold the whole body", "give a smaller radius")
-    free = np.flatnonzero(np.repeat(~fixed, 3))
-    rigid = 6 - (
-        int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[~np.isin(np.arange(3 * len(fixed)), free)], tol=1e-9))
-        if fixed.any()
-        else 0
-    )
-    if fixed.any():
-        k_matrix, m_matrix = k_matrix[free][:, free], m_matrix[free][:, free]
-    most = min(count or MOST_MODES, max(1, len(free) // 3 - rigid))
-    shift = -SHIFT * (2 * volume / area) ** 2
-    enough = (lambda value: len(value) >= count) if count is not None else (lambda value: bool(value[-1] > limit))
-    modes = eigen.solve(k_matrix, m_matrix, shift, rigid=rigid, enough=enough, most=most, say=say)
-    keep = np.arange(len(modes.lambda_per_s2)) < most if count is not None else (modes.lambda_per_s2 <= limit)
-    vector = np.zeros((3 * len(fixed), int(keep.sum())), np.float32)
-    vector[free] = modes.vector[:, keep]
-    note = body.solid.note + f"; {len(free)} unknowns" + (f"; {int(fixed.sum())} nodes clamped" if fixed.any() else "")
-    shape = np.ascontiguousarray(vector.reshape(len(fixed), 3, -1)[body.skin.node])
+    found = converged(method, [of.stiffness], wanted, asked.accuracy, say)
+    shown = found.method.shown(found.sectors, [sector.found[0][1] for sector in found.sectors])
+    note = found.method.note(found.sectors)
+    if np.isfinite(found.error):
+        note += f"; error at {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
+        if found.error > asked.accuracy:
+            note += f", not the {100 * asked.accuracy:g} % asked for: that would cost too much, unless edge_m says so"
     return _Unit(
-        modes.lambda_per_s2[keep],
-        shape,
-        volume,
-        body.solid.node_m[body.skin.node],
-        body.skin.face,
-        body.curvature_per_m,
+        found.value,
+        np.ascontiguousarray(shown.shape[:, :, found.order]),
+        found.method.volume,
+        shown.vertex_m,
+        shown.face,
+        shown.curvature_per_m,
         note,
     )
+
+
+def _percent(error: float) -> str:
+    return f"about {100 * error:.2g} %" if error >= LEAST_ERROR else f"under {100 * LEAST_ERROR:g} %"
 
 
 def _arrays(unit: _Unit) -> dict[str, Array]:

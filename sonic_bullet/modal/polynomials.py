@@ -10,20 +10,22 @@ each parity. Errors fall exponentially with the degree.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.meshing import prisms
+from sonic_bullet.modal.meshing import prisms, structured
 from sonic_bullet.modal.meshing.shape_meshes import rotation
+from sonic_bullet.modal.meshing.solid import surface
+from sonic_bullet.modal.sectors import Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 
-MOST_UNKNOWNS = 1800
-"""Of one parity: a dense problem of that size takes seconds."""
+MOST_UNKNOWNS = 2200
+"""Of one parity: a dense problem of that size takes seconds. 200 modes of a square plate are no more."""
 PER_WAVE = 7.0  # cells of the skin to the shortest wave
 CELLS = 64  # along an axis of the skin, at most
 
@@ -85,14 +87,21 @@ def mirrored(stiffness: Array) -> bool:
     return not np.abs(rest).max() > 1e-9 * np.abs(stiffness).max()
 
 
-def wave_number(omega2: float, thickness: float, stiffness: Array) -> float:
+def wave_number(omega2: Any, thickness: Any, stiffness: Array) -> Any:
     """The largest wave number (1/length) of a plate at ω², density one: bending with shear and rotary inertia [Mindlin
     1951, eq. 37], in the softest direction.
     """
     compliance = np.linalg.inv(stiffness)
+    omega2 = np.minimum(omega2, 1e150)  # without a limit: more than any
     plate, shear = float(1 / np.diag(compliance)[:3].max()), 5 / 6 * float(np.diag(stiffness)[3:].min())
     fast, slow = omega2 / plate, omega2 / shear
-    return float(np.sqrt((fast + slow) / 2 + np.sqrt(12 * fast / thickness**2 + (slow - fast) ** 2 / 4)))
+    return np.sqrt((fast + slow) / 2 + np.sqrt(12 * fast / thickness**2 + (slow / 2 - fast / 2) ** 2))
+
+
+def omega2_of(wave: float, thickness: float, stiffness: Array) -> float:
+    """ω² at which a plate's largest wave number is ``wave``."""
+    tries = np.geomspace(1e-12, 1e12, 400)
+    return float(tries[int(np.argmax(wave_number(tries, thickness, stiffness) > wave))])
 
 
 def wave_number_of(count: int, size: Array) -> float:
@@ -137,8 +146,8 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
 
         def of(axis: int, k: int, mine: list[Array] = mine, ends: Array = ends) -> Any:
             """∂/∂axis of component k as a map from all unknowns of this parity."""
-            part = steps[axis][:, mine[k]].tocoo()
-            return csr_array((part.data, (part.row, part.col + ends[k])), shape=(len(degree), ends[3]))
+            slope = steps[axis][:, mine[k]].tocoo()
+            return csr_array((slope.data, (slope.row, slope.col + ends[k])), shape=(len(degree), ends[3]))
 
         strain = (of(0, 0), of(1, 1), of(2, 2), of(1, 2) + of(2, 1), of(0, 2) + of(2, 0), of(0, 1) + of(1, 0))
         yield Parity((degree[mine[0]], degree[mine[1]], degree[mine[2]]), strain, int(sum(parity) in (1, 2)))
@@ -184,45 +193,101 @@ def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
     return value[order], vector[:, order]
 
 
-def free(
-    box: Box, length: float, stiffness: Array, point_m: Array, limit: float, count: int | None, most: int
-) -> tuple[Array, Array] | None:
-    """λ (m,) of a free box, up to limit and at most ``most``, or its lowest ``count``; and its modes (v, 3, m) at
-    point_m (v, 3), all in lengths of ``length``.
-
-    None where its material's axes are not its own, or where it takes too many unknowns.
+@dataclass(frozen=True, slots=True, eq=False)
+class Ritz:
+    """A free box as a method (methods.py). terms: polynomials along each axis; wave: the largest wave number; high:
+    λ up to which it is solved where only a number of modes is wanted.
     """
-    isotropic = np.allclose(stiffness, _isotropic(stiffness), atol=1e-9 * np.abs(stiffness).max())
-    if not mirrored(stiffness) or not (isotropic or np.allclose(box.axes, np.eye(3), atol=1e-9)):
+
+    box: Box
+    length_m: float
+    terms: tuple[int, int, int]
+    wave: float
+    high: float
+
+    @property
+    def size(self) -> Array:
+        """Edges (3,) over L."""
+        return self.box.size_m / self.length_m
+
+    @property
+    def volume(self) -> float:
+        """In units of L³."""
+        return float(np.prod(self.size))
+
+    @property
+    def meshed(self) -> bool:
+        """No elements' error is in λ."""
+        return False
+
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+        """The modes wanted of each tensor (6, 6), a sector a parity."""
+        from scipy.sparse import eye_array
+
+        say(f"solving {8 * unknowns(self.terms)} unknowns of a box")
+        high = min(wanted.limit, self.high)
+        while True:
+            found: list[Sector] = []
+            for parity in parities(self.size, self.terms):
+                stiff = tuple(parity.stiffness(tensor) for tensor in tensors)
+                solved = []
+                for k, matrix in enumerate(stiff):
+                    bound = wanted._replace(limit=high).bound([(sector.found[k][0], 1) for sector in found])
+                    solved.append(lowest(matrix, bound, parity.rigid))
+                found.append(Sector(tuple(solved), stiff, eye_array(len(stiff[0])), 1, parity))
+            few = min(sum(len(sector.found[k][0]) for sector in found) for k in range(len(tensors)))
+            if high >= wanted.limit or few >= wanted.most:
+                return found
+            high *= 2
+
+    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+        """Vectors (n, b), a matrix a sector, on the surface."""
+        shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave))
+        skin = surface(shell)
+        point = shell.node_m[skin.node]
+        moved = [
+            shapes_at(point / self.length_m, self.size, sector.place, vector).transpose(0, 2, 1) @ self.box.axes.T
+            for sector, vector in zip(sectors, vectors, strict=True)
+        ]
+        shape = np.concatenate([m.astype(np.float32) for m in moved], axis=1).transpose(0, 2, 1)
+        vertex = point @ self.box.axes.T + self.box.centre_m
+        return Shown(vertex, skin.face, np.zeros(len(skin.face)), np.ascontiguousarray(shape))
+
+    def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
+        """Of the frequency of mode top[1] of sector top[0], relative: what two more degrees take off."""
+        mine = sectors[top[0]]
+        value = float(mine.found[0][0][top[1]])
+        more = list(parities(self.size, tuple(n + 2 for n in self.terms)))[top[0]]  # type: ignore[arg-type]
+        other, _ = lowest(more.stiffness(tensor), value * (1 + 1e-9), more.rigid)
+        return abs(value / float(other[top[1]]) - 1) / 2
+
+    def finer(self) -> Ritz | None:
+        """The same with two more polynomials along each axis, None where that takes too many unknowns."""
+        x, y, z = (n + 2 for n in self.terms)
+        return replace(self, terms=(x, y, z)) if unknowns((x, y, z)) <= MOST_UNKNOWNS else None
+
+    def note(self, sectors: Sequence[Sector]) -> str:
+        """How it was done."""
+        return f"box of {' x '.join(str(n) for n in self.terms)} polynomials"
+
+
+def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Ritz | None:
+    """The method of a free box, with polynomials enough for what is wanted; None where the shape is none, where its
+    material's axes are not its own, or where it takes too many unknowns.
+    """
+    box = recognised(shape)
+    if box is None or not mirrored(tensor) or not (isotropic(tensor) or np.allclose(box.axes, np.eye(3), atol=1e-9)):
         return None
-    size = box.size_m / length
-    thin = float(size.min())
-    high = limit
-    if count is not None:  # ω² at which the plate's waves are as short as ``count`` modes may take
-        tries = np.geomspace(1e-12, 1e12, 400)
-        high = float(
-            tries[int(np.argmax([wave_number(w, thin, stiffness) > wave_number_of(count, size) for w in tries]))]
-        )
-    for _ in range(8):
-        wave = (
-            wave_number(high, thin, stiffness)
-            if count is not None
-            else min(wave_number(high, thin, stiffness), wave_number_of(most, size))
-        )
-        terms = degrees(size, wave)
-        if unknowns(terms) > MOST_UNKNOWNS:
-            return None
-        held = [(parity, *lowest(parity.stiffness(stiffness), high, parity.rigid)) for parity in parities(size, terms)]
-        value = np.concatenate([v for _, v, _ in held])
-        if count is None or len(value) >= count:
-            break
-        high *= 2
-    else:
-        return None
-    local = (point_m - box.centre_m) @ box.axes / length
-    shape = np.concatenate([shapes_at(local, size, parity, vector) for parity, _, vector in held], axis=2)
-    order = np.argsort(value, kind="stable")[: most if count is None else count]
-    return value[order], np.asarray(np.einsum("yx,vxm->vym", box.axes, shape[:, :, order]))
+    size = box.size_m / length_m
+    thin, most = float(size.min()), wave_number_of(wanted.most, size)
+    wave = float(min(wave_number(wanted.limit, thin, tensor), most))
+    terms = degrees(size, wave)
+    return Ritz(box, length_m, terms, wave, omega2_of(most, thin, tensor)) if unknowns(terms) <= MOST_UNKNOWNS else None
+
+
+def isotropic(stiffness: Array) -> bool:
+    """Whether a tensor (6, 6) has no direction."""
+    return bool(np.allclose(stiffness, _isotropic(stiffness), atol=1e-9 * np.abs(stiffness).max()))
 
 
 def _isotropic(stiffness: Array) -> Array:

@@ -22,7 +22,9 @@ import numpy as np
 from sonic_bullet.files import cache as store
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.model import MOST_MODES, SHIFT, _diagonal_m
+from sonic_bullet.modal.model import diagonal_m
+from sonic_bullet.modal.sectors import MOST_MODES, SHIFT
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -122,6 +124,7 @@ def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, floa
     return np.asarray(np.linalg.inv(compliance))
 
 
+@one_thread()
 def tensor_family(
     shape: Shape,
     *,
@@ -138,7 +141,7 @@ def tensor_family(
     Raises MeshError, ModalError.
     """
     say = progress or (lambda _: None)
-    length = _diagonal_m((shape,))
+    length = diagonal_m((shape,))
     count = min(count, MOST_MODES)
     clamp = np.array(fixed, float).reshape(-1, 4)
     name = key(

@@ -17,15 +17,16 @@ THICKEST_M = 1e4
 @dataclass(frozen=True, slots=True)
 class ModalOptions:
     """to_hz, or the lowest ``count``: which modes. fixed: clamped where (x, y, z, radius) in m, body frame, reach.
-    thickness_m: wall of open surfaces.
+    thickness_m: wall of open surfaces. accuracy: relative, of the highest frequency.
 
-    Raises ModalError (to_hz, count, fixed) and MeshError (thickness_m), naming the argument.
+    Raises ModalError (to_hz, count, fixed, accuracy) and MeshError (thickness_m), naming the argument.
     """
 
     to_hz: float = 20_000.0
     count: int | None = None
     fixed: Sequence[Sequence[float]] = ()
     thickness_m: float | None = None
+    accuracy: float = 0.01
 
     def __post_init__(self) -> None:
         remedy = "give clamps as [(x, y, z, radius), …] in metres, body frame"
@@ -38,6 +39,14 @@ class ModalOptions:
                 self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=HIGHEST_HZ, error=ModalError
             ),
             fixed=fixed,
+            accuracy=as_number(
+                self.accuracy,
+                "accuracy",
+                "give a part of a frequency, such as 0.01",
+                above=0,
+                most=0.5,
+                error=ModalError,
+            ),
         )
         if self.count is not None:
             store(

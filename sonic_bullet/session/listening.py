@@ -141,6 +141,7 @@ class Listener:
         thickness_m: float | None = None,
         to_hz: float = 20_000.0,
         count: int | None = None,
+        accuracy: float = 0.01,
         progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; returns the modal models of its links.
@@ -150,15 +151,16 @@ class Listener:
         the body frame, where the body's own collision shapes should not be used. model: modes computed before.
         roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
         of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
-        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. progress:
-        called now and then with which link's modes are being computed, how far that is, and that it is their radiation
-        next (seconds a link the first time, then the cache has both); without one, a terminal shows it. Warns
+        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
+        relative, of the highest frequency; the models' notes tell what is reached. progress: called now and then with
+        which link's modes are computed, how far that is, and that it is their radiation next (seconds a link the first
+        time, then the cache has both); without one, a terminal shows it. Warns
         (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
         or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
-            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count,
+            "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
         }  # fmt: skip
         return self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 

@@ -27,7 +27,6 @@ from sonic_bullet.cli import main
 from sonic_bullet.files import read_audio, read_log, write_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
-from sonic_bullet.modal import COARSER
 from sonic_bullet.records import Body, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
@@ -266,20 +265,6 @@ def test_clipping_is_reported(scene: Path, monkeypatch: pytest.MonkeyPatch, capf
     assert run("render", "scene.py", "-o", "a.wav", "--json", "a.json") == 0
     assert json.loads(Path("a.json").read_text())["clipped"] == 0
     assert "the file is exact" in capfd.readouterr().err
-
-
-def test_a_mesh_that_time_made_coarser_is_told(
-    scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    made = log()
-    body = replace(made.bodies[0], model=replace(model(), note=f"fTetWild; {COARSER}: filling took long"))
-    monkeypatch.setattr(
-        sonic_bullet.scene,
-        "render_scene",
-        lambda path, **options: RenderResult(KeptSound.of(sound()), replace(made, bodies=(body, made.bodies[1])), SR),
-    )
-    assert run("render", "scene.py", "-o", "a.wav") == 0
-    assert f"the mesh of cup is {COARSER}" in capfd.readouterr().err
 
 
 def test_a_log_renders_again_with_its_own_rate_and_seed(scene: Path, asked: dict[str, Any]) -> None:

@@ -107,7 +107,7 @@ def test_importing_brings_nothing_heavy(module: str) -> None:
         "matplotlib",
         "trimesh",
         "soundfile",
-        "pytetwild",
+        "netgen",
         "pyloudnorm",
         "scipy.sparse.linalg",
         "rich",

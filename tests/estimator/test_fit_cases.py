@@ -69,8 +69,8 @@ def test_two_objects_of_one_material_tell_more_than_either(tmp_path: Path) -> No
     smaller than one object's.
     """
     (tmp_path / "one").mkdir()
-    both = fit_case(described(tmp_path, ("bar", "plate"), units="mm"), check_mesh=False)
-    one = fit_case(described(tmp_path / "one", ("plate",), units="m"), check_mesh=False)
+    both = fit_case(described(tmp_path, ("bar", "plate"), units="mm"))
+    one = fit_case(described(tmp_path / "one", ("plate",), units="m"))
     assert [(o.line >= 0).sum() for o in both.objects] == [len(o.evidence.lines.freq_hz) for o in both.objects]
     sd, alone = (np.sqrt(np.diag(found.fit.covariance)) for found in (both, one))
     gamma = BRASS.youngs_pa / BRASS.density_kg_m3
@@ -89,7 +89,7 @@ def test_two_objects_of_one_material_tell_more_than_either(tmp_path: Path) -> No
 
 def test_one_strike_is_enough_for_a_box(planted: Planted, tmp_path: Path) -> None:
     case = read_case(planted.folder)
-    found = fit_case(replace(case, recordings=case.recordings[:1]), check_mesh=False)
+    found = fit_case(replace(case, recordings=case.recordings[:1]))
     assert found.fit.verdict == "fitted"
     assert found.fit.gamma_m2_s2 == pytest.approx(BRASS.youngs_pa / BRASS.density_kg_m3, rel=1e-3)
     assert found.fit.alpha_per_s == pytest.approx(6.0, rel=0.05)
@@ -106,9 +106,7 @@ def test_impulses_that_contradict_the_sounds_are_told(planted: Planted) -> None:
     (e,) = gather(case)
     assert e.family is not None
     mine = tuple(r for r in told if r.split == "fit")
-    found = fit_evidence(
-        wrong, (replace(e, recordings=mine, seen=observed(wrong, e.thing, e.guess, mine, e.family)),), check_mesh=False
-    )
+    found = fit_evidence(wrong, (replace(e, recordings=mine, seen=observed(wrong, e.thing, e.guess, mine, e.family)),))
     assert "amplitudes scatter" in found.fit.verdict
 
 
@@ -204,5 +202,5 @@ def test_what_contradicts_itself_is_one_line(
     edit(case, tmp_path)
     (tmp_path / "case.json").write_text(json.dumps(case))
     with pytest.raises(error, match=word) as caught:
-        fit_case(read_case(tmp_path), check_mesh=False)
+        fit_case(read_case(tmp_path))
     assert "\n" not in str(caught.value)

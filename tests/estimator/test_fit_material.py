@@ -71,7 +71,7 @@ def test_held_out_strike_is_predicted_to_the_noise(planted: tuple[Planted, CaseF
 def test_constant_loss_is_no_rayleigh_damping(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
     made, _ = planted
     make(tmp_path, BRASS, guess=GUESS, decay=1e-3 * np.pi * made.model.freq_hz)
-    found = fit_case(read_case(tmp_path), check_mesh=False)
+    found = fit_case(read_case(tmp_path))
     assert found.fit.verdict.startswith("misfit: decays scatter by")
     assert found.fit.poisson_ratio == pytest.approx(0.345, abs=2e-3)  # what is right stays right
 
@@ -82,7 +82,7 @@ def test_foreign_line_is_named(planted: tuple[Planted, CaseFit], tmp_path: Path)
     for path in tmp_path.glob("s*.wav"):
         observed, _ = soundfile.read(path)
         soundfile.write(path, observed + 0.1 * np.exp(-20 * t) * np.sin(2 * np.pi * 1733 * t), SR, subtype="FLOAT")
-    found = fit_case(read_case(tmp_path), check_mesh=False)
+    found = fit_case(read_case(tmp_path))
     assert "belong to no mode (1733 Hz)" in found.fit.verdict
     assert found.fit.alpha_per_s == pytest.approx(6.0, rel=0.02)
 
@@ -95,7 +95,7 @@ def test_one_line_tells_neither_alpha_nor_beta_nor_poisson(planted: tuple[Plante
     ]
     (tmp_path / "box.obj").write_text((made.folder / "box.obj").read_text())
     (tmp_path / "case.json").write_text(json.dumps(case))
-    found = fit_case(read_case(tmp_path), check_mesh=False)
+    found = fit_case(read_case(tmp_path))
     told = found.fit.verdict
     assert told.startswith("not identifiable")
     assert all(name in told for name in ("alpha", "beta", "poisson_ratio", "sigma"))
@@ -122,7 +122,7 @@ def test_without_a_mesh_decays_alone_are_told(planted: tuple[Planted, CaseFit], 
 def test_clamped_body_is_fitted_clamped(tmp_path: Path) -> None:
     fixed = ((-0.07, 0.0, 0.0, 0.016),)
     made = make(tmp_path, BRASS, guess=GUESS, fixed=fixed)
-    found = fit_case(read_case(tmp_path), check_mesh=False)
+    found = fit_case(read_case(tmp_path))
     assert found.fit.verdict == "fitted"
     assert found.fit.gamma_m2_s2 == pytest.approx(BRASS.youngs_pa / BRASS.density_kg_m3, rel=1e-3)
     assert found.fit.freq_hz[0] == pytest.approx(made.model.freq_hz[0], rel=1e-4)
@@ -165,7 +165,7 @@ def test_bad_evidence_is_one_line(
     (tmp_path / "text.wav").write_text("not audio")
     (tmp_path / "case.json").write_text(json.dumps(case))
     with pytest.raises(error, match=word) as caught:
-        fit_case(read_case(tmp_path), check_mesh=False)
+        fit_case(read_case(tmp_path))
     assert "\n" not in str(caught.value)
 
 

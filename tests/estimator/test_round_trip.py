@@ -53,7 +53,7 @@ def fitted_lines(folder: Path, *, mesh: bool = True, **more: Any) -> Any:
         "band_hz": [20, 14000],
     } | more
     (folder / "case.json").write_text(json.dumps(case))
-    return fit_case(read_case(folder), check_mesh=False)
+    return fit_case(read_case(folder))
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_a_diagnosis_counts_radiation_once(tmp_path: Path) -> None:
 
     own = fitted_lines(tmp_path, sensor={"type": "microphone"})
     case = read_case(tmp_path)
-    total = fit_evidence(case, gather(case), check_mesh=False, total=True)  # as the diagnosis' baseline does
+    total = fit_evidence(case, gather(case), total=True)  # as the diagnosis' baseline does
     assert total.fit.beta_s > 1.1 * own.fit.beta_s
     assert kept(total) is True
     assert kept(total, Radiation(0.02, 1.0)) is False  # α and β are then what it leaves

@@ -56,25 +56,25 @@ def test_channels_stay_apart() -> None:
 def test_a_step_sounds_when_the_closed_form_says() -> None:
     """Frame k begins at sample 40 k and holds the sound of step k − 3; block j begins at 16 j, sounds at 2 + 16 j/sr.
 
-    Steps of the first fill are not counted, so that 0 … 2 have none.
+    Steps 0 … 2 fill the queue before anything sounds. They returned long before and are not counted.
     """
     card = HandCard()
     sound = playing(card, lag_steps=3)
-    returned = [1.0 + 0.003 * k + 0.0001 * (k % 4) for k in range(40)]
+    returned = [0.5 + 0.003 * k if k < 3 else 1.0 + 0.003 * k + 0.0001 * (k % 4) for k in range(41)]
     k = j = 0
     while 40 * k < AHEAD + BLOCK:
         sound.push(frame(40), returned[k])
         k += 1
-    while k < 40:
+    while k < 41:
         card.ask(BLOCK, 2.0 + j * BLOCK / SR)
         j += 1
-        while 40 * k - BLOCK * j <= AHEAD - 40 and k < 40:
+        while 40 * k - BLOCK * j <= AHEAD - 40 and k < 41:
             sound.push(frame(40), returned[k])
             k += 1
     while BLOCK * j < 40 * k:
         card.ask(BLOCK, 2.0 + j * BLOCK / SR)
         j += 1
-    latency = [2.0 + 40 * n / SR - returned[n - 3] for n in range(3, 40)]
+    latency = [2.0 + 40 * n / SR - returned[n - 3] for n in range(6, 41)]
     assert sound.report.latency_worst_s == pytest.approx(max(latency), abs=1e-12)
     assert sound.report.latency_median_s == pytest.approx(np.median(latency), abs=1e-4)
     assert sound.report.underruns == 0

@@ -132,10 +132,10 @@ def test_modes_end_at_the_limit_and_a_marble_has_none(steel: Material) -> None:
 
 def test_same_body_same_bytes_without_a_cache(steel: Material) -> None:
     ell = trimesh.creation.annulus(0.01, 0.02, 0.03, sections=12)
-    ell.vertices[:, 2] *= 1 + 5 * ell.vertices[:, 0]  # neither box nor prism: fTetWild's work
+    ell.vertices[:, 2] *= 1 + 5 * ell.vertices[:, 0]  # neither box nor prism: Netgen's work
     shape = Shape("mesh", vertex_m=ell.vertices, face=ell.faces)
     one, two = (analyse((shape,), steel, count=4, edge_m=0.01, cache=None) for _ in range(2))
-    assert "fTetWild" in one.note
+    assert "Netgen" in one.note
     assert one.shape.tobytes() == two.shape.tobytes() and one.freq_hz.tobytes() == two.freq_hz.tobytes()
 
 

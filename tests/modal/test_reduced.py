@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.modal import analyse, polynomials, reduced, revolved
+from sonic_bullet.modal import analyse, polynomials
 from sonic_bullet.modal import closed_forms as exact
 from sonic_bullet.modal.reduced import family
+from sonic_bullet.modal.revolution import rings, section
 from sonic_bullet.records import Array, Material, Shape
 
 GAMMA, NU = 2.5e7, 0.3
@@ -135,7 +136,7 @@ def test_a_turned_ring_moves_as_elements_do() -> None:
     turn[:3, 3] = (0.1, 0.2, -0.3)
     shape = ring_mesh(0.03, 0.05, 0.02, turn, sections=64)
     ours = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, cache=None)
-    theirs = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, edge_m=0.01, cache=None)
+    theirs = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=21_000, edge_m=0.008, cache=None)
     assert theirs.meshed and not ours.meshed
     value, vector = ours.modes(GAMMA, NU)
     other, turned = (part[..., : ours.count] for part in theirs.modes(GAMMA, NU))
@@ -154,19 +155,20 @@ def test_a_turned_ring_moves_as_elements_do() -> None:
 def test_finer_triangles_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     shape = ring_mesh(0.03, 0.05, 0.02)
     usual = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=30_000, cache=None)
-    monkeypatch.setattr(reduced, "SECTION_EDGE", 0.5 * reduced.SECTION_EDGE)
+    monkeypatch.setattr(section, "WALL", 0.5 * section.WALL)
+    monkeypatch.setattr(section, "WAVE", 0.5 * section.WAVE)
     finer = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=30_000, cache=None)
     assert usual.count == finer.count > 10
     assert np.abs(np.log(usual.modes(GAMMA, NU)[0] / finer.modes(GAMMA, NU)[0])).max() < 4e-4
 
 
 def test_what_is_not_round_is_no_body_of_revolution() -> None:
-    assert revolved.recognised(*trimesh_parts(trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64))) is not None
+    assert rings.recognised(*trimesh_parts(trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64))) is not None
     nut = trimesh.creation.annulus(0.03, 0.05, 0.02, sections=6)
     dented = trimesh.creation.annulus(0.03, 0.05, 0.02, sections=64)
     dented.vertices[5] *= 1.01
     for mesh in (nut, dented, trimesh.creation.box((0.1, 0.1, 0.02))):
-        assert revolved.recognised(*trimesh_parts(mesh)) is None
+        assert rings.recognised(*trimesh_parts(mesh)) is None
 
 
 def trimesh_parts(mesh: trimesh.Trimesh) -> tuple[Array, Array]:

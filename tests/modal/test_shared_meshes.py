@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from sonic_bullet.modal import analyse, read_mesh
-from sonic_bullet.modal.meshing import shape_meshes as shapes
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import MeshError, ModalError
 
@@ -35,18 +34,12 @@ def test_ratios_of_the_independent_solver(case: str, shared_path: Path) -> None:
 
 
 @pytest.mark.timeout(600)  # of wall time, which a busy machine multiplies
-def test_twenty_of_the_thousand_have_modes_or_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarse: a wide envelope and two passes, or the twenty would take two minutes (`benchmarks/modal_sweep.py` does it
-    all with the defaults).
-    """
+def test_ten_of_the_thousand_have_modes_or_a_name() -> None:
     import pybullet_data
 
-    monkeypatch.setattr(shapes, "MOST_PASSES", shapes.LUMP_PASSES)
-    monkeypatch.setattr(shapes, "ENVELOPE", (0.3, 0.02))
-    monkeypatch.setattr(shapes, "FILL_LIMITS_S", (6.0,))
     plastic = Material.isotropic("plastic", youngs_pa=2.4e9, poisson=0.37, density_kg_m3=1050.0)
     root = Path(pybullet_data.getDataPath()) / "random_urdfs"
-    asked = range(0, 1000, 50)
+    asked = range(0, 1000, 100)
     done = 0
     for k in asked:
         urdf = root / f"{k:03d}" / f"{k:03d}.urdf"
@@ -54,11 +47,11 @@ def test_twenty_of_the_thousand_have_modes_or_a_name(monkeypatch: pytest.MonkeyP
         shape = read_mesh(urdf.with_suffix(".obj"), float(scale.group(1)) if scale else 1.0)
         size = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
         try:
-            model = analyse((shape,), plastic, count=3, edge_m=size / 8, cache=None)
+            model = analyse((shape,), plastic, count=3, edge_m=size / 4, cache=None)
         except (MeshError, ModalError) as error:
             assert "\n" not in str(error) and error.remedy
         else:
             assert model.mode_count == 3 and model.mass_kg > 0
             done += 1
     print(f"{done} of {len(asked)} have modes")
-    assert done >= 19
+    assert done >= 9

@@ -125,6 +125,7 @@ def adding(client: Any, _: Path) -> Made:
         "thickness_m": None,
         "to_hz": 20_000,
         "count": None,
+        "accuracy": 0.01,
         "progress": None,
     }
     return listener.add, {"body": body, "link": -1, "material": STEEL, "model": plate_model(), **rest}
@@ -305,6 +306,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "thickness_m": [*OPTIONAL, 0, -1, 1e308],
         "to_hz": [*NUMBER, 0, -1, 1e308],
         "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
+        "accuracy": [*NUMBER, 0, -1, 0.6],
         "progress": CALL,
     },
     "Listener.add_all": {"cast": [None, 5, "steel", b"steel", object(), ["steel"], [(0, "steel")]], "progress": CALL},

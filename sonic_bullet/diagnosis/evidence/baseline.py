@@ -139,7 +139,7 @@ def _off_db(b: Baseline) -> float:
 
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
-    found = fit_evidence(case, recorded, check_mesh=False, total=True, progress=progress)
+    found = fit_evidence(case, recorded, total=True, progress=progress)
     bodies = (
         struck_bodies(found, cache=cache, progress=progress)
         if found.objects

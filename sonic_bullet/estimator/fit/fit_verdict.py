@@ -7,22 +7,21 @@ fitted | not identifiable: WHICH and why | misfit: WHAT does not hold
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
-from sonic_bullet.estimator.fit.mesh_error import mesh_warning
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.fit.rayleigh import RayleighFit
 from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
+from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 
 DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their spreads
 AMPLITUDE_MISFIT = 0.25
+GAMMA_MOVES = 0.01  # by elements: what is worth a warning
 FREQUENCY_MISFIT = 0.01
 FOREIGN = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of strong lines that must be modes
@@ -38,8 +37,6 @@ def finished(
     gain: tuple[float, float, float],
     *,
     radiation: RadiationIn,
-    check_mesh: bool,
-    progress: Callable[[str], None] | None,
 ) -> CaseFit:
     """The CaseFit of all that was found."""
     log_gamma, poisson, information, scatter = elastic
@@ -85,8 +82,8 @@ def finished(
     if not objects:
         assumed.append("gamma (from the guess: no mesh)")
     warnings = [note for e in evidence for note in e.notes]
-    if check_mesh and objects and not np.isnan(covariance[2, 2]):
-        warnings += mesh_warning(objects[0], gamma * density, density, poisson, progress)
+    if objects and objects[0].evidence.family is not None and not np.isnan(covariance[2, 2]):
+        warnings += _mesh_warning(objects[0].evidence.family)
     scatters = (damping.scatter, scatter, gain[2])
     return CaseFit(
         case,
@@ -102,6 +99,15 @@ def finished(
         decibels,
         radiation,
     )
+
+
+def _mesh_warning(family: Family) -> list[str]:
+    """A warning where elements may bend γ by over 1 %, or where that is not known; none without elements."""
+    if not family.meshed or 2 * family.error <= GAMMA_MOVES:
+        return []
+    if np.isnan(family.error):
+        return ["the mesh's error is not known: no coarser mesh could be made"]
+    return [f"the mesh may move gamma by about {2 * family.error:.1%}: its highest frequencies are half that uncertain"]
 
 
 def _decays_seen(evidence: tuple[RecordedObject, ...]) -> int:

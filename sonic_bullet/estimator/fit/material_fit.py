@@ -42,16 +42,14 @@ __all__ = [
 ]
 
 
-def fit_case(
-    case: Case, *, cache: Place = "default", check_mesh: bool = True, progress: Callable[[str], None] | None = None
-) -> CaseFit:
+def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> CaseFit:
     """The material of a case, from its 'fit' strikes alone.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands
     in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
-    return fit_evidence(case, evidence, cache=cache, check_mesh=check_mesh, progress=progress)
+    return fit_evidence(case, evidence, cache=cache, progress=progress)
 
 
 def fit_evidence(
@@ -59,7 +57,6 @@ def fit_evidence(
     evidence: tuple[RecordedObject, ...],
     *,
     cache: Place = "default",
-    check_mesh: bool = True,
     total: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> CaseFit:
@@ -86,7 +83,7 @@ def fit_evidence(
     apart = radiation == "apart"
     if apart and progress is not None:
         progress("how its modes radiate")
-    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart, cache) for e in shaped)
+    air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart) for e in shaped)
     lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))
     damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, KNOWN * extra), start, decay)
@@ -103,8 +100,6 @@ def fit_evidence(
         damping,
         (gain, gain_sd, amplitude_scatter),
         radiation=radiation,
-        check_mesh=check_mesh,
-        progress=progress,
     )
 
 

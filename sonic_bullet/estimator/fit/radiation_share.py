@@ -1,11 +1,10 @@
 """What an object's modes lose to the air, as the run time has it, so that a fit of the material leaves it out.
 
     d_line = ½(α + βλ) + Δd
-        Δd: radiation.far_field, in the air that the run time plays in, of the modes on the run time's own surface
-        (render/resonator.py)
+        Δd: radiation.far_field, in the air that the run time plays in (render/resonator.py), of the modes on the
+        family's surface, which follows their waves as the run time's own does (modal/methods.py makes both)
 
-The surface matters: what a mesh costs, about a decibel of pressure, is up to a third of Δd, and only the same mesh
-costs the same. Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor
+Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor
 hear of each.
 """
 
@@ -18,11 +17,8 @@ import numpy as np
 from sonic_bullet.estimator.fit.case_fit import RadiationIn
 from sonic_bullet.estimator.fit.pairing import Group, grouped
 from sonic_bullet.estimator.fit.recorded import RecordedObject
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
-from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.modal.model import surface_of
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel
 
@@ -54,13 +50,11 @@ def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationI
     return "apart" if case.medium == "air" and all(e.family is not None for e in evidence) else "damping"
 
 
-def in_air(
-    e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool, cache: Place = "default"
-) -> Radiated | None:
+def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool) -> Radiated | None:
     """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its
     sensor nor the fit asks for the air.
 
-    apart: radiation is no part of the material's damping. Raises MeshError where its surface cannot be made.
+    apart: radiation is no part of the material's damping.
     """
     assert e.family is not None and e.seen is not None
     if not apart and e.seen.kind != "pressure":
@@ -69,9 +63,8 @@ def in_air(
     value, vector = e.family.modes(float(np.exp(log_gamma)), poisson)
     freq = np.sqrt(value) / (2 * np.pi)
     m = int((freq < BEYOND * to_hz).sum())
-    surface = surface_of((read_mesh(e.thing.mesh or "", e.thing.scale),), cache=cache) if apart else None
     weight, extra = np.full(len(freq), np.nan), np.full(len(freq), np.nan)
-    weight[:m], extra[:m] = into_air(e.family, e.guess.density_kg_m3, freq[:m], vector[:, :m], surface)
+    weight[:m], extra[:m] = into_air(e.family, e.guess.density_kg_m3, freq[:m], vector[:, :m])
     observed = np.nan_to_num((e.seen.transfer(vector) ** 2).sum(axis=0))
     observed = observed * weight**2 if e.seen.kind == "pressure" else observed
     first = np.array([who[0] for who in group.member], int)
@@ -88,22 +81,27 @@ def into_air(
     density_kg_m3: float,
     freq_hz: Array,
     vector: Array,
-    surface: tuple[Array, Array] | None = None,
     air: Air | None = None,
 ) -> tuple[Array, Array]:
     """|w| (m,) in Pa·m per modal velocity and Δd (m,) in 1/s of modes (b, m) of the family, freq_hz (m,) ascending.
 
     Source: `radiation.far_field`.
-
-    surface: vertex_m (v, 3) and face (f, 3) of another mesh of the body than the family's own.
     """
-    vertex_m, face = surface or (family.vertex_m, family.face)
-    shape = np.einsum("vxb,bm->vxm", family.skin_at(vertex_m), vector.astype(np.float32)) / np.float32(
+    shape = np.einsum("vxb,bm->vxm", family.skin, vector.astype(np.float32)) / np.float32(
         np.sqrt(density_kg_m3 * family.length_m**3)
     )
     mass = family.volume_m3 * density_kg_m3
     weight, extra = radiation(
-        ModalModel(freq_hz, np.zeros(len(freq_hz)), shape, vertex_m, face, np.zeros(len(face)), family.volume_m3, mass),
+        ModalModel(
+            freq_hz,
+            np.zeros(len(freq_hz)),
+            shape,
+            family.vertex_m,
+            family.face,
+            np.zeros(len(family.face)),
+            family.volume_m3,
+            mass,
+        ),
         air or Air(),
     )
     return np.abs(weight), extra

@@ -22,12 +22,11 @@ from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.reduced import family
-from sonic_bullet.records import Array, Material, Shape
+from sonic_bullet.records import Array, Material
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
 MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
-PLATE_DOF = 52_000  # unknowns: 36 ab/e² in one layer of cells
 CLIPPED = 8  # samples in a row at the file's peak
 # after an onset; of the usual length: that much shorter is worth a word
 LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5
@@ -167,31 +166,15 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     listed = [line.freq_hz for r in case.recordings if r.object == thing.name for line in r.lines or ()]
     if listed and not any(r.file for r in case.recordings):
         high = max(listed)
-    edge = mesh_edge_m(shape) if thing.fixed else None  # a free box takes polynomials, not elements
     return family(
         shape,
         gamma_m2_s2=gamma,
         poisson=guess.poisson,
         to_hz=high * MARGIN,
         fixed=thing.fixed,
-        edge_m=edge,
         cache=cache,
         progress=say,
     )
-
-
-def mesh_edge_m(shape: Shape) -> float | None:
-    """A finer mesh for a clamped flat plate: with the usual one its higher modes are 1 to 2 % stiff, which γ and ν
-    would be bent to. None: the usual one does.
-    """
-    from sonic_bullet.geometry import is_closed
-    from sonic_bullet.modal.meshing.prisms import as_box
-
-    found = as_box(shape.vertex_m, shape.face) if is_closed(shape.face) else None
-    if found is None:
-        return None
-    thin, wide, long = np.sort(found[0])
-    return float(np.sqrt(36 * wide * long / PLATE_DOF)) if wide > long / 4 and thin < wide / 12 else None
 
 
 def _strikes(

@@ -180,7 +180,7 @@ class PyBulletWorld(facts.AskedLinks):
         records = {code: added.again(code, one, before.set_values.of(*decode(code))) for code, one in there.items()}
         self._begin()
         self.properties.set_values = before.set_values
-        self._added.by_code = there = added.still_there(self._past.roster)
+        self._added.by_code = there
         before.names.hand_over(there, self.properties.names)
         for code in there:
             self._append(code, records[code])

@@ -1,5 +1,4 @@
-"""Boxes and extruded outlines recognised in a mesh, and filled by rule: thin plates need flat elements, fTetWild's are
-round.
+"""Boxes and extruded outlines recognised in a mesh, and filled by rule: elements as flat as the plate.
 
     all faces look along three right axes, and the volume is that of their extents         -> a box
     two parallel flat sides, all else at right angles to them, volume = area x thickness

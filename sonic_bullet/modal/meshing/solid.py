@@ -17,10 +17,6 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-COARSER = "coarser than wanted for want of time"
-"""In a model's note: its elements are larger than wanted because this machine was too slow; another's modes may differ
-in the last per cent.
-"""
 TET_EDGE = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 # Faces of a positively oriented tetrahedron seen from outside: three corners, then the nodes on their edges 01, 12, 20.
 TET_FACE = np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]])

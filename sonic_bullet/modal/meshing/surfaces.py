@@ -6,6 +6,7 @@ Choices, each told in the model's note:
     small holes (caps under `CAP_PART` of the area): filled, as if capped
     open surface: a wall of thickness_m, half on either side, `SHEET_PART` of the diagonal by default; flat sheets need
         thickness_m
+    open pieces beside a solid that is most of the area: left out
     loose pieces: they stay; the solid keeps its largest piece (solid.largest_component)
 """
 
@@ -140,8 +141,19 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
     return face, note
 
 
+def _solid_pieces(vertex_m: Array, face: Array) -> Array:
+    """Which faces (f,) are of pieces that enclose a volume but for small holes."""
+    label = pieces_of_faces(face)
+    solid = np.zeros(len(face), bool)
+    for piece in np.unique(label):
+        mine = label == piece
+        area = geometry.face_areas_m2(vertex_m, face[mine]).sum()
+        solid[mine] = _cap_area_m2(vertex_m, _boundary(face[mine])) < CAP_PART * area
+    return solid
+
+
 def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
-    """The surface that fTetWild is to fill.
+    """The surface that is to be filled.
 
     Raises MeshError for no triangle, NaN, an absurd size, or a sheet it cannot thicken.
     """
@@ -160,8 +172,13 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     face = face[area > 1e-14 * diagonal_m**2]
     if len(face) == 0:
         raise MeshError("mesh has no area", "its vertices lie on one line: repair the mesh file")
-    total = float(geometry.face_areas_m2(vertex_m, face).sum())
     face, note = _oriented(vertex_m, face)
+    area = geometry.face_areas_m2(vertex_m, face)
+    solid = _solid_pieces(vertex_m, face)
+    if 0.5 * area.sum() < area[solid].sum() < area.sum() and thickness_m is None:
+        note += f"; {len(np.unique(pieces_of_faces(face)[~solid]))} open pieces left out"
+        face, area = face[solid], area[solid]
+    total = float(area.sum())
     volume = geometry.volume_m3(vertex_m, face)
     cap = _cap_area_m2(vertex_m, _boundary(face))
     if cap < CAP_PART * total and 2 * volume / total > FLAT_PART * diagonal_m:

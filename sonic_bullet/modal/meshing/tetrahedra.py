@@ -1,8 +1,6 @@
-"""Surface -> tetrahedra by fTetWild [Hu, Schneider, Wang, Zorin, Panozzo 2020], in a child process with a
-time and a memory limit.
+"""Closed surface -> tetrahedra by Netgen [Schöberl 1997], in a child process with a memory limit and a guard.
 
-fTetWild takes soup, holes and overlaps and fills where the winding number says inside; the surface may move by the
-envelope.
+Sizes alone decide the mesh, never a clock: what runs into the guard is an error.
 """
 
 from __future__ import annotations
@@ -14,70 +12,79 @@ from pathlib import Path
 
 import numpy as np
 
+from sonic_bullet import geometry
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-TIME_LIMIT_S = 45.0
-BUSY = 4.0
+GUARD_S, GUARD_S_PER_TET = 20, 0.01
+"""Of processor time, after which a child counts as hung: thirty times what meshes take."""
+BUSY = 20.0
 """Wall time per processor time that a child may take on a busy machine before it counts as hung."""
 MEMORY_LIMIT_BYTES = 2 * 1024**3
 CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
+ACROSS = 100.0  # the diagonal as Netgen sees it: its tolerances then fit metres and micrometres alike
 
 
-class TooSlow(MeshError):
-    """Filling took longer than it may: on another machine it might not."""
+class EndlessError(MeshError):
+    """A child that did not come to an end, or outgrew its memory: smaller elements would not either."""
 
 
 def tetrahedra(
     vertex_m: Array,
     face: Array,
     edge_m: float,
-    envelope_m: float,
+    point_m: Array | None = None,
+    size_m: Array | None = None,
     *,
-    passes: int = 80,
-    time_limit_s: float = TIME_LIMIT_S,
+    guard_s: int | None = None,
 ) -> tuple[Array, Array]:
-    """Corners (n, 3) and tetrahedra (t, 4) filling a surface vertex_m (v, 3), face (f, 3).
+    """Corners (n, 3) and tetrahedra (t, 4) filling a closed surface vertex_m (v, 3), face (f, 3).
 
-    edge_m: wanted edge; envelope_m: how far the surface may move; passes: of optimisation, at most. Raises MeshError
-    where fTetWild fails, fills nothing, or takes more than time_limit_s of processor time or 2 GiB.
+    edge_m: the longest edge; size_m (k,): that at point_m (k, 3). Raises MeshError where Netgen fails, fills nothing,
+    needs more than 2 GiB, or hangs.
     """
     low, high = vertex_m[face].reshape(-1, 3).min(axis=0), vertex_m[face].reshape(-1, 3).max(axis=0)
-    diagonal_m = float(np.linalg.norm(high - low))
+    unit_m = float(np.linalg.norm(high - low)) / ACROSS
     centre = (low + high) / 2
+    point_m, size_m = (np.zeros((0, 3)), np.zeros(0)) if point_m is None or size_m is None else (point_m, size_m)
+    given = {
+        "vertex": (vertex_m - centre) / unit_m,
+        "face": face,
+        "edge": np.array(edge_m / unit_m),
+        "point": (point_m - centre) / unit_m,
+        "size": size_m / unit_m,
+    }
+    volume, area = geometry.volume_m3(vertex_m, face), geometry.face_areas_m2(vertex_m, face).sum()
+    tets = float(9 * abs(volume) / edge_m**3 + 2 * area / edge_m**2)
+    result = in_child("_netgen.py", given, guard_s or int(GUARD_S + GUARD_S_PER_TET * min(tets, 1e4)))
+    if len(result["tet"]) == 0:
+        raise MeshError("mesh encloses no volume", "give thickness_m to make a sheet solid, or close the surface")
+    return result["node"] * unit_m + centre, result["tet"]
+
+
+def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Array]:
+    """What a script beside this file makes of given arrays, in a process of its own. Raises MeshError where it ends
+    otherwise.
+    """
+    name = script.strip("_").removesuffix(".py").capitalize()
     with tempfile.TemporaryDirectory(prefix="sonic_bullet-") as folder:
         source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
-        # Unit size about the origin: fTetWild's own tolerances then see every body alike, in metres or micrometres.
-        numbers = {
-            "edge": np.array(edge_m / diagonal_m),
-            "envelope": np.array(envelope_m / diagonal_m),
-            "passes": np.array(passes),
-            "memory": np.array(MEMORY_LIMIT_BYTES),
-            "seconds": np.array(int(np.ceil(time_limit_s))),
-            "vertex": (vertex_m - centre) / diagonal_m,
-            "face": face,
-        }
-        np.savez(source, allow_pickle=False, **numbers)
-        command = [sys.executable, str(Path(__file__).with_name("_tetwild.py")), str(source), str(target)]
+        limits = {"memory": np.array(MEMORY_LIMIT_BYTES), "seconds": np.array(guard_s)}
+        np.savez(source, allow_pickle=False, **given, **limits)
+        command = [sys.executable, str(Path(__file__).with_name(script)), str(source), str(target)]
         try:
             ended = subprocess.run(
-                command, timeout=BUSY * time_limit_s, capture_output=True, text=True, check=False, cwd=folder
-            )  # fTetWild leaves a file where it runs
+                command, timeout=BUSY * guard_s, capture_output=True, text=True, check=False, cwd=folder
+            )
         except subprocess.TimeoutExpired:
             ended = None
         if ended is None or -ended.returncode in CUT_OFF:
-            raise TooSlow(
-                f"filling the mesh with tetrahedra took more than {time_limit_s:.0f} s of processor time",
-                "give a simpler mesh",
-            )
+            raise EndlessError(f"{name} did not come to an end on the mesh", "repair the mesh, or give a simpler one")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
-            raise MeshError(
-                f"fTetWild failed on the mesh (exit {ended.returncode}: {said[:200]})",
+            raise (EndlessError if "MemoryError" in said else MeshError)(
+                f"{name} failed on the mesh (exit {ended.returncode}: {said[:200]})",
                 "repair the mesh, or give a simpler one",
             )
         with np.load(target, allow_pickle=False) as result:
-            node, tet = result["node"], result["tet"]
-    if len(tet) == 0:
-        raise MeshError("mesh encloses no volume", "give thickness_m to make a sheet solid, or close the surface")
-    return node * diagonal_m + centre, tet.astype(np.int64)
+            return {name: result[name] for name in result.files}

@@ -1,0 +1,56 @@
+"""Bodies filled with elements, kept beside their modes: filling one takes as long as solving it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet.files import cache as store
+from sonic_bullet.modal.meshing.solid import Solid
+from sonic_bullet.records import Shape
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.shape_meshes import Filled
+
+SOLID = {
+    "node": store.Kept("f8", ("n", 3)),
+    "tet": store.Kept("i", (None, None), "n"),
+    "affine": store.Kept("b1", (1,)),
+    "skin": store.Kept("i", ("v",), "n"),
+    "face": store.Kept("i", ("f", 3), "v"),
+    "curvature": store.Kept("f8", ("f",)),
+}
+
+
+def kept_or_filled(
+    shapes: tuple[Shape, ...],
+    sizes: tuple[float | None, float | None],
+    kept: tuple[store.Place, str],
+    say: Callable[[str], None],
+    *,
+    lattice: bool,
+) -> Filled:
+    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m. Raises MeshError."""
+    from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
+    from sonic_bullet.modal.meshing.solid import SolidSurface
+
+    found = store.load(*kept, SOLID)
+    if found is not None:
+        a, note = found
+        return Filled(
+            Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
+        )
+    body = fill(shapes, *sizes, say, lattice=lattice)
+    solid, skin = body.solid, body.skin
+    arrays = {
+        "node": solid.node_m,
+        "tet": solid.tet,
+        "affine": np.array([solid.affine]),
+        "skin": skin.node,
+        "face": skin.face,
+        "curvature": body.curvature_per_m,
+    }
+    store.save(*kept, arrays, solid.note)
+    return body

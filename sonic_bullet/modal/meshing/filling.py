@@ -1,0 +1,155 @@
+"""A prepared surface -> a solid of quadratic tetrahedra.
+
+a box or an extruded outline  -> by rule (prisms.py): thin plates need flat elements
+any other closed surface      -> Netgen (tetrahedra.py), the middles of its edges put on the surface (on_surface.py)
+what Netgen refuses           -> simplified below an element (Manifold), and again
+one that is not closed, or that Netgen still refuses: it passes through itself   -> a lattice (stuffing.py)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sonic_bullet import geometry
+from sonic_bullet.modal.meshing import named_shapes, prisms
+from sonic_bullet.modal.meshing.on_surface import fitted
+from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, curved_sizes, dof_budget, edge_within_m
+from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
+from sonic_bullet.modal.meshing.stuffing import stuffed
+from sonic_bullet.modal.meshing.surfaces import Skin
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError, tetrahedra
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import MeshError
+
+LATTICE = "lattice"  # how the note of a solid filled by one begins
+MOST_TETS = 60_000
+"""A third of a million unknowns, 1.5 GB."""
+FILLED = (0.6, 1.7)
+"""Of the enclosed volume: what a fill may hold.
+
+Wide, for a surface that passes through itself encloses some of it twice.
+"""
+FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
+SIMPLER, SLIVER = 0.05, 0.01
+"""Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
+slivers of unions, on which it takes ten times as long."""
+LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
+LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
+LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
+
+
+def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
+    """Solid of a surface that is a box or an extruded outline, else None."""
+    vertex, face = skin.vertex_m, skin.face
+    if not geometry.is_closed(face):
+        return None
+    found = prisms.as_box(vertex, face)
+    if found is not None:
+        size, axes, centre = found
+        made = named_shapes.box(size, edge_m)
+        return Solid(made.node_m @ axes.T + centre, made.tet, note=made.note + skin.note)
+    prism = prisms.as_prism(vertex, face, edge_m, dof_budget(skin.thickness_m, _diagonal_m(vertex)))
+    return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
+
+
+def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, lattice: bool = False) -> Solid:
+    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. lattice: Netgen has refused it
+    before. Raises MeshError.
+    """
+    made = by_rule(skin, edge_m)
+    if made is not None:
+        return made
+    thickness, diagonal = skin.thickness_m, _diagonal_m(skin.vertex_m)
+    volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
+    tets = dof_budget(thickness, diagonal) / DOF_PER_TET
+    edge = edge_m or edge_within_m(volume, thickness, tets)
+    if lattice or not geometry.is_closed(skin.face):
+        return _of_lattice(skin, edge_m, volume, tets, say, "as before" if lattice else "its surface is open")
+    whole, simple = skin, simplified(skin, SIMPLER * edge)
+    attempts = [(whole, edge)] if not _slivers(whole, edge) else []
+    refused: MeshError | None = None
+    for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
+        try:
+            return _by_netgen(skin, tried, size, say)
+        except EndlessError as error:
+            refused = error
+            break
+        except MeshError as error:
+            refused = error
+    assert refused is not None
+    return _of_lattice(skin, edge_m, volume, tets, say, refused.what)
+
+
+def simplified(skin: Skin, tolerance_m: float) -> Skin:
+    """A closed surface without what is smaller than tolerance_m; as it was where it passes through itself."""
+    import manifold3d
+
+    vertex, face = np.ascontiguousarray(skin.vertex_m), np.ascontiguousarray(skin.face, np.uint64)
+    solid = manifold3d.Manifold(manifold3d.Mesh64(vertex, face)).simplify(tolerance_m)
+    mesh = solid.to_mesh64()
+    if solid.status() != manifold3d.Error.NoError or not len(mesh.tri_verts):
+        return skin
+    corner, triangle = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts).astype(np.int64)
+    return Skin(corner, triangle, skin.thickness_m, skin.note)
+
+
+def _slivers(skin: Skin, edge_m: float) -> bool:
+    """Whether the surface has triangles too flat for a mesh of edge_m: what a union of pieces leaves."""
+    corner = skin.vertex_m[skin.face]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    height = 2 * geometry.face_areas_m2(skin.vertex_m, skin.face) / longest
+    return bool(height.min() < SLIVER * edge_m)
+
+
+def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None]) -> Solid:
+    say(f"filling {len(tried.face)} triangles with tetrahedra of {edge_m:.3g} m")
+    corner, tet = tetrahedra(tried.vertex_m, tried.face, edge_m, *curved_sizes(tried.vertex_m, tried.face, edge_m))
+    _check_filled(skin, corner, tet)
+    tet, said = _largest(corner, tet)
+    note = f"Netgen, {len(tet)} tetrahedra, edge {edge_m:.3g} m{skin.note}{said}"
+    return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
+
+
+def _of_lattice(
+    skin: Skin, edge_m: float | None, volume_m3: float, tets: float, say: Callable[[str], None], why: str
+) -> Solid:
+    edge = edge_m or min((LATTICE_VOLUME * volume_m3 / tets) ** (1 / 3), LATTICE_WALL * skin.thickness_m)
+    while True:
+        say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
+        try:
+            corner, tet = stuffed(skin.vertex_m, skin.face, edge)
+            _check_filled(skin, corner, tet)
+            break
+        except MeshError:  # some of its walls are thinner than it is on the whole, and than an edge
+            if edge < LATTICE_LEAST * skin.thickness_m:
+                raise
+            edge *= FINER
+    tet, said = _largest(corner, tet)
+    note = f"{LATTICE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
+    return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
+
+
+def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
+    """Tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
+    tet, pieces = largest_component(corner_m, tet)
+    if len(tet) > MOST_TETS:
+        raise MeshError(f"mesh needs {len(tet)} tetrahedra, more than {MOST_TETS}", "give a simpler mesh")
+    return tet, f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""
+
+
+def _check_filled(skin: Skin, node: Array, tet: Array) -> None:
+    """Raise MeshError where tetrahedra do not hold what a closed surface encloses."""
+    if not geometry.is_closed(skin.face):
+        return
+    kept = float(np.abs(corner_volume_m3(node, tet)).sum()) / geometry.volume_m3(skin.vertex_m, skin.face)
+    if not FILLED[0] < kept < FILLED[1]:
+        raise MeshError(
+            f"filling the mesh with tetrahedra turns its volume to {kept:.0%}",
+            "give a mesh with thicker walls, or a simpler one",
+        )
+
+
+def _diagonal_m(vertex_m: Array) -> float:
+    return float(np.linalg.norm(np.ptp(vertex_m, axis=0)))

@@ -1,0 +1,98 @@
+"""Nodes in the middle of edges, put where the body's surface is: chords of a curved wall cost it per cents.
+
+edge on a smooth part       -> nearest point that looks the same way
+edge along a crease         -> nearest point of the surface's own creases
+an element that this folds  -> its edges are straight again
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet import geometry
+from sonic_bullet.geometry import CREASE_RAD
+from sonic_bullet.modal.meshing.solid import TET_EDGE, TET_FACE, Solid, corner_volume_m3
+from sonic_bullet.records import Array
+
+FARTHEST = 0.25  # of an edge's length: a chord of a right angle strays 0.21
+LEAST_DET = 0.3  # of the straight element's: below it counts as folded
+LATTICE = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
+"""Where an element's Jacobian is looked at: corners and middles of its edges."""
+
+
+def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
+    """A straight solid with the middles of its surface's edges on the surface vertex_m (v, 3), face (f, 3) that it
+    fills.
+    """
+    edge, middle, normal, crease = _surface_edges(solid)
+    ends = solid.node_m[edge]
+    length, chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), ends.mean(axis=1)
+    found, weight, _ = geometry.closest_point(vertex_m, face, chord, normal)
+    target = np.einsum("kc,kcx->kx", weight, vertex_m[face[found]])
+    line = creases(vertex_m, face)
+    if crease.any() and len(line):
+        along = nearest_on_lines(vertex_m[line], chord[crease])
+        close = np.linalg.norm(along - chord[crease], axis=1) < FARTHEST * length[crease]
+        target[crease] = np.where(close[:, None], along, target[crease])
+    moved = np.linalg.norm(target - chord, axis=1)
+    near = (moved < FARTHEST * length) & (moved > 1e-9 * length)
+    node = solid.node_m.copy()
+    node[middle[near]] = target[near]
+    return unfolded(Solid(node, solid.tet, not near.any(), solid.note))
+
+
+def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
+    """Edges (e, 2) of a solid's surface, their middle nodes (e,), mean outward normals (e, 3), and which are
+    creases.
+    """
+    faces = solid.tet[:, TET_FACE].reshape(-1, 6)
+    _, first, count = np.unique(np.sort(faces[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
+    outer = faces[np.sort(first[count == 1])]
+    normal = geometry.outward_normals(solid.node_m, outer[:, :3])
+    middle, at, count = np.unique(outer[:, 3:].ravel(), return_inverse=True, return_counts=True)
+    owner = np.repeat(np.arange(len(outer)), 3)
+    total = np.stack([np.bincount(at, normal[owner, x], len(middle)) for x in range(3)], axis=1)
+    # |n₁ + n₂| = 2 cos(angle/2); more than two faces meet where pieces touch: as good as a crease
+    crease = (np.linalg.norm(total, axis=1) < 2 * np.cos(CREASE_RAD / 2)) | (count != 2)
+    ends = np.stack([outer[:, [0, 1, 2]], outer[:, [1, 2, 0]]], axis=-1).reshape(-1, 2)
+    edge = np.empty((len(middle), 2), np.int64)
+    edge[at] = ends
+    return edge, middle, total, crease
+
+
+def creases(vertex_m: Array, face: Array) -> Array:
+    """Edges (e, 2) of a surface across which it turns by more than `CREASE_RAD`."""
+    normal = geometry.outward_normals(vertex_m, face)
+    edge = np.sort(np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    line, at, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
+    owner = np.repeat(np.arange(len(face)), 3)
+    total = np.stack([np.bincount(at.ravel(), normal[owner, x], len(line)) for x in range(3)], axis=1)
+    return np.asarray(line[(np.linalg.norm(total, axis=1) < 2 * np.cos(CREASE_RAD / 2)) & (count == 2)])
+
+
+def nearest_on_lines(line_m: Array, point_m: Array) -> Array:
+    """Nearest points (k, 3) to point_m (k, 3) of straight lines line_m (e, 2 ends, 3)."""
+    start, along = line_m[:, 0], line_m[:, 1] - line_m[:, 0]
+    square = np.maximum((along**2).sum(axis=1), 1e-300)
+    found = np.empty_like(point_m)
+    for k, point in enumerate(point_m):
+        part = np.clip(np.einsum("ex,ex->e", point - start, along) / square, 0, 1)
+        on = start + part[:, None] * along
+        found[k] = on[np.argmin(((on - point) ** 2).sum(axis=1))]
+    return found
+
+
+def unfolded(solid: Solid) -> Solid:
+    """The solid with straight edges where an element would fold."""
+    from skfem import ElementTetP2
+
+    element = ElementTetP2()
+    gradient = np.array([element.lbasis(LATTICE.T, i)[1] for i in range(10)])
+    node = solid.node_m.copy()
+    straight = 6 * corner_volume_m3(node, solid.tet)
+    while True:  # each round straightens one element at least
+        determinant = np.linalg.det(np.einsum("tid,ikq->tqdk", node[solid.tet], gradient))
+        folded = solid.tet[(determinant < LEAST_DET * straight[:, None]).any(axis=1)]
+        if not len(folded):
+            return Solid(node, solid.tet, solid.affine, solid.note)
+        node[folded[:, 4:]] = node[folded[:, TET_EDGE]].mean(axis=2)
