@@ -35,6 +35,12 @@ FIELD = re.compile(
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
     ("sonic_bullet.records.simulated", "What a simulator says, as a contact log holds it.", ("Body", "Change")),
+    (
+        "sonic_bullet.comparing.comparison_record",
+        "What a comparison finds.",
+        ("Comparison", "Difference", "Consequence"),
+    ),
+    ("sonic_bullet.comparing.sides", "A scene to be compared.", ("SceneSide",)),
     ("sonic_bullet.environments", "Sound as an observation. It needs the extra `environments`.", None),
     ("sonic_bullet.estimator.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),

@@ -13,6 +13,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sonic_bullet.comparing.compared_sides import compare
     from sonic_bullet.files import read_audio, read_log, write_audio
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.listener import keep_restitution
@@ -39,6 +40,7 @@ _HOME = {
     "Step": "records.contacts",
     "Vibrometer": "records",
     "attach": "session",
+    "compare": "comparing.compared_sides",
     "keep_restitution": "listener",
     "list_materials": "presets",
     "load_material": "presets",
@@ -62,6 +64,7 @@ __all__ = [
     "Step",
     "Vibrometer",
     "attach",
+    "compare",
     "keep_restitution",
     "list_materials",
     "load_material",

@@ -42,5 +42,9 @@ def client() -> Iterator[Any]:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say how many tests did not happen, and for want of what: a comparison that silently did not run is a defect."""
     skipped = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", [])]
-    for what, said in (("shared data", "shared data not found"), ("another library", "could not import")):
+    for what, said in (
+        ("shared data", "shared data not found"),
+        ("another library", "could not import"),
+        ("a Chromium", "no Chromium on PATH"),
+    ):
         terminalreporter.write_line(f"{sum(said in one for one in skipped)} tests skipped for want of {what}")

@@ -5,6 +5,7 @@
     modes MESH                -> ModalModel   -> table, JSON, npz
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
+    compare A B               -> Comparison   -> words, JSON, page
     cache                     -> table, JSON
 
 Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name
@@ -20,6 +21,7 @@ from typing import Any
 import click
 
 from sonic_bullet.cli.cache_command import cache
+from sonic_bullet.cli.compare_commands import baseline, compare
 from sonic_bullet.cli.console import run_and_exit
 from sonic_bullet.cli.examples import (
     CASE_EPILOG,
@@ -45,6 +47,8 @@ def cli() -> None:
 
 
 cli.add_command(cache)
+cli.add_command(compare)
+cli.add_command(baseline)
 
 
 @cli.command(epilog=RENDER_EPILOG)
@@ -91,7 +95,10 @@ cli.add_command(cache)
 @click.option(
     "--residual/--no-residual",
     default=None,
-    help="What presets sound beside their modes. [default: sounded; of a log, as it was rendered]",
+    help="What presets sound beside their modes. [default: it sounds; of a log, as it was rendered]",
+)
+@click.option(
+    "--supports/--no-supports", default=None, help="Bodies that stand on others ring less. [default: as above]"
 )
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""

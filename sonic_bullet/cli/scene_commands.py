@@ -47,6 +47,7 @@ def run_render(
     seed: int | None,
     material: str | None,
     residual: bool | None,
+    supports: bool | None,
 ) -> None:
     """The `render` command.
 
@@ -60,7 +61,7 @@ def run_render(
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
-                wish = _Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
+                wish = _Wish(seconds, rate, microphones, seed, material, residual, supports, progress, tell)
                 result: RenderResult | _Replay = _replayed(scene, wish) if _is_log(scene) else _simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise _with_partial(error, to, output, peak_dbfs, lufs) from error
@@ -161,6 +162,7 @@ class _Wish:
     seed: int | None
     material: str | None
     residual: bool | None
+    supports: bool | None
     progress: Callable[[float], None]
     say: Callable[[str], None]
 
@@ -177,6 +179,7 @@ def _simulated(scene: str, wish: _Wish) -> RenderResult:
         "microphones": places,
         "material": wish.material,
         "residual": wish.residual is not False,
+        "supports": wish.supports is not False,
     }
     return render_scene(scene, **asked, progress=wish.progress, say=wish.say)
 
@@ -205,6 +208,8 @@ def _replayed(path: str, wish: _Wish) -> _Replay:
         log = replace(log, seed=wish.seed)
     if wish.residual is not None:
         log = replace(log, residual=wish.residual)
+    if wish.supports is not None:
+        log = replace(log, supports=wish.supports)
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(
@@ -311,6 +316,8 @@ def _described(result: RenderResult | _Replay, report: AudioReport, notes: tuple
         "bodies": _bodies(result.log),
         "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in result.log.events],
         "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in result.log.changes],
+        "supports": result.log.supports,
+        "lifted": None if isinstance(result, _Replay) else {name: list(of) for name, of in result.lifted.items()},
         "engine": dict(result.log.engine),
         "versions": dict(result.log.versions),
         "notes": list(notes),

@@ -72,6 +72,10 @@ class LogError(SonicBulletError):
     """A contact log is cut, foreign or inconsistent."""
 
 
+class CompareError(SonicBulletError):
+    """Two things cannot be compared, or there is nothing to compare them with."""
+
+
 class AudioError(SonicBulletError):
     """Sample rate, samples, level or sound card with which nothing can be synthesised, written or played."""
 

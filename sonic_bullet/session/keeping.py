@@ -95,6 +95,4 @@ class KeptRun:
 @cache
 def package_versions() -> dict[str, str]:
     """Of the packages that a render's numbers hang on."""
-    from sonic_bullet import __version__
-
-    return {"sonic_bullet": __version__, **{name: metadata.version(name) for name in ("numpy", "numba")}}
+    return {name: metadata.version(name) for name in ("sonic_bullet", "numpy", "numba")}

@@ -79,15 +79,19 @@ def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch])
             np.stack([body.decay_per_s, np.zeros(m), np.zeros(m)], axis=1),
             np.ones(m, bool),
         )
-    x, row = _gathered(body, partners, touches)
+    x, row = gathered(body, partners, touches)
     found = _described(x, m, partners, *poles(x, *start(x, m)))
     force = np.zeros((3 * len(touches), m))
     force[row] = found.force_n_s
     return replace(found, force_n_s=force[::3])
 
 
-def _gathered(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> tuple[Touched, Array]:
-    """All springs of all touches, and which of their (3c,) directions those are: what slides has none."""
+def gathered(
+    body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], *, squared: bool = True
+) -> tuple[Touched, Array]:
+    """All springs of all touches, and which of their (3c,) directions those are: what slides has none. squared: with
+    φφᵀ, which Newton needs.
+    """
     begin = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
     own = np.concatenate([body.moves(touch.own) for touch in touches])
     other, under = np.zeros((len(own), int(begin[-1]))), np.zeros((2, len(touches), 3))
@@ -107,8 +111,8 @@ def _gathered(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]
         np.concatenate([p.decay for p in partners]),
         under[0].ravel()[row],
         under[1].ravel()[row],
-        squares(own[row]),
-        squares(other[row]),
+        squares(own[row] if squared else own[:0]),
+        squares(other[row] if squared else other[:0]),
     )
     return of, row
 

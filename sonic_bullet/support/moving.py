@@ -27,6 +27,13 @@ class Moving:
     inertia_kg_m2: Array = field(default_factory=lambda: np.zeros((3, 3)))
     plate_m_n_s: float = 0.0
     half_space_m_s_n: float = 0.0
+    turn: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        value, vector = np.linalg.eigh(self.inertia_kg_m2)
+        least = max(1e-12 * float(value.max()), 1e-300)
+        turn = vector / np.sqrt(np.maximum(value, least)) if value.max() > 0 else 0 * vector
+        object.__setattr__(self, "turn", turn)  # J^{−1/2}, by columns
 
     @property
     def lam(self) -> Array:
@@ -42,9 +49,9 @@ class Moving:
         """Φ (3, m + 6): motion along a place's axes of each mode and of each rigid motion; 0 where it has none."""
         rigid = np.zeros((3, 6))
         if self.mass_kg > 0:
-            value, vector = np.linalg.eigh(self.inertia_kg_m2)
-            turn = vector / np.sqrt(np.maximum(value, 1e-12 * value.max())) if value.max() > 0 else 0 * vector
-            rigid = np.hstack([np.eye(3) / np.sqrt(self.mass_kg), np.cross(turn.T, place.arm_m).T])
+            x, y, z = place.arm_m
+            rigid[:, :3] = np.eye(3) / np.sqrt(self.mass_kg)
+            rigid[:, 3:] = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]]) @ self.turn  # turn × arm
         return np.asarray(place.axes @ np.hstack([place.shape, rigid]))
 
 

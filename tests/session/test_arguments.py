@@ -104,6 +104,14 @@ LOG = {
     "changes": (),
     "residual": True,
 }
+
+
+def one_step() -> sb.ContactLog:
+    """A log of one step in which nothing is."""
+    nobody = sb.Step(1 / 240, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), sb.Contacts.none())
+    return sb.ContactLog(**{**LOG, "steps": (nobody,)})
+
+
 BUILT = (
     "import pybullet as p\nSECONDS = 0.01\n\ndef build(client):\n"
     "    client.createMultiBody(0, client.createCollisionShape(p.GEOM_PLANE))\n    return {}\n"
@@ -216,6 +224,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
         sb.attach,
         {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None, **KEEPS},
     ),
+    "compare": lambda *_: (sb.compare, {"a": one_step(), "b": one_step(), "say": None}),
     "keep_restitution": lambda client, _: (sb.keep_restitution, {"client": client}),
     "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
     "read_audio": reading_audio,
@@ -390,6 +399,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "air": RECORD,
         **dict.fromkeys(KEEPS, FLAG),
     },
+    "compare": {"a": PATH, "b": PATH, "say": CALL},
     "keep_restitution": {"client": CLIENT},
     "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
     "read_audio": {"path": PATH},

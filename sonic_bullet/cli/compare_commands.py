@@ -1,0 +1,212 @@
+"""`compare` and `baseline`: two versions of a scene, log or recording; what a version sounds like, kept.
+
+    A, B (or a revision of A) -> Comparison, or one a name of two folders -> words, JSON, one page
+
+Exit 0: samples equal, or --audible was given and nothing stands out; 1: samples differ, or a partner is missing; 2:
+wrong use, or something that cannot be compared; 130: stopped, and what was known by then is printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
+from sonic_bullet.cli.parameters import json_option
+from sonic_bullet.records.errors import CompareError, FileError
+
+COMPARE_EPILOG = """\b
+Examples:
+  sonic-bullet compare old/bar.py new/bar.py --report bar.html
+  sonic-bullet compare scenes --ref main --json differences.json"""
+
+
+@click.command(epilog=COMPARE_EPILOG)
+@click.argument("a", metavar="A")
+@click.argument("b", metavar="[B]", required=False)
+@click.option("--ref", metavar="REV", help="Compare A as it was at this git revision with A as it is now.")
+@click.option("--audible", is_flag=True, help="Is the change beyond chance? Runs A 99 times, starts 0.1 mm apart.")
+@click.option("--report", metavar="OUT.html", help="Also write one page that opens offline: players, pictures, tables.")
+@click.option("--seconds", type=click.FloatRange(0, min_open=True), metavar="S", help="How long to run both scenes.")
+@click.option("--sr", type=click.IntRange(8000, 384000), metavar="HZ", help="Rate of both scenes. [default: 48000]")
+@json_option
+def compare(a: str, b: str | None, **options: Any) -> None:
+    """Say whether two versions sound the same, and if not, which input is the cause.
+
+    A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
+    baseline (.json) of the scene B.
+    """
+    _check(a, b, options["ref"], options["report"])
+    _check_options(a, b, options)
+    to, page = places(options["json_to"], options["report"])
+    with clean_stdout(to) as say, ExitStack() as stack:
+        with quiet_stderr():
+            import sonic_bullet.comparing.compared_sides  # noqa: F401  PyBullet says when it was built
+        if options["ref"] is not None:
+            from sonic_bullet.comparing.revisions import at_revision
+
+            a, b = stack.enter_context(at_revision(a, options["ref"])), a
+        assert b is not None
+        tell = stack.enter_context(status("compare"))
+        found, stopped = _found(Path(a), Path(b), options, tell, page is not None)
+        _say(say, found, stopped)
+        if page is not None:
+            from sonic_bullet.report.compare_page import write_page
+
+            write_page(page, [one.kept["page"] for one in found if one.kept is not None])
+    write_json(to, _described(found, stopped))
+    if stopped:
+        raise KeyboardInterrupt("stopped: what was compared by then is above")
+    _exit(found)
+
+
+def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
+    """Raise CompareError, FileError for wrong use."""
+    if (b is None) == (ref is None):
+        raise CompareError("compare needs two things", "give A and B, or A and --ref REV")
+    for name in (a, b):
+        if name is not None and not Path(name).exists():
+            raise CompareError(f"there is no {name}", "give a scene (.py), a contact log (.npz), a recording, a folder")
+    if b is not None and Path(a).is_dir() != Path(b).is_dir():
+        raise CompareError("one is a folder, the other a file", "give two folders, or two files")
+    if report is not None and not report.endswith((".html", ".htm")):
+        raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
+    if report is not None and a.lower().endswith(".json"):
+        raise CompareError("a baseline holds no sound, so there is no page of it", "leave --report out")
+
+
+def _check_options(a: str, b: str | None, options: Any) -> None:
+    """Raise CompareError for an option that says nothing of what is given."""
+    of_scenes = [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]
+    scenes = a.lower().endswith(".py") or (b or a).lower().endswith(".py") or Path(a).is_dir()
+    if a.lower().endswith(".json"):
+        if not (b or "").lower().endswith(".py"):
+            raise CompareError(f"{b} is no scene to hold against a baseline", "give a scene (.py) after the baseline")
+        if of_scenes:
+            raise CompareError(f"a baseline says itself what {of_scenes[0]} would", f"leave {of_scenes[0]} out")
+    elif of_scenes and not scenes:
+        raise CompareError(f"{of_scenes[0]} is for scenes, and these are none", f"leave {of_scenes[0]} out")
+
+
+def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
+    """All that was compared, one entry a pair; whether it was stopped."""
+    from sonic_bullet.comparing.compared_sides import compare as compare_both
+    from sonic_bullet.comparing.folders import Paired, compare_folders
+    from sonic_bullet.comparing.sides import SceneSide
+
+    def side(path: Path) -> Any:
+        if path.suffix.lower() != ".py":
+            return path
+        return SceneSide(path, seconds=options["seconds"], sr=options["sr"] or 48_000)
+
+    def both(one: Path, other: Path) -> dict[str, Any]:
+        found, refused = compare_both(side(one), side(other), say=tell), ""
+        if options["audible"] and not found.same and not found.stopped:
+            from sonic_bullet.comparing.ensemble import audible
+
+            try:
+                found = replace(found, audible=audible(found.a, found.b, tell))
+            except KeyboardInterrupt:
+                found = replace(found, stopped=True)
+            except CompareError as error:
+                refused = str(error)
+        return _kept(found, page) | {"refused": refused}
+
+    if a.suffix.lower() == ".json":
+        return [Paired(b.name, _against_baseline(a, b, tell))], False
+    if a.is_dir():
+        return compare_folders(a, b, both, tell)
+    kept = both(a, b)
+    return [Paired(b.name, kept)], kept["stopped"]
+
+
+def _kept(found: Any, page: bool) -> dict[str, Any]:
+    """What is printed and written of a comparison; its sounds go."""
+    kept = {"lines": found.lines(), "described": found.described(), "passed": found.passed, "stopped": found.stopped}
+    if page:
+        from sonic_bullet.report.compare_page import page_entry
+
+        kept["page"] = page_entry(found)
+    return kept
+
+
+def _against_baseline(a: Path, b: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+    """A scene held against what it sounded like."""
+    from sonic_bullet.comparing.baselines import check_baseline, read_baseline
+
+    checked = check_baseline(read_baseline(a), b, tell)
+    words = [*checked.words, *([checked.audible.words] if checked.audible is not None else [])]
+    head = "same: all samples are as the baseline's" if checked.same else f"differs from {a.name}"
+    described = {"same": checked.same, "passed": checked.passed, "verdict": head, "effects": words}
+    return {"lines": [head, *(f"  {one}" for one in words)], "described": described, "passed": checked.passed,
+            "stopped": False, "refused": ""}  # fmt: skip
+
+
+def _say(say: Callable[[str], None], found: list[Any], stopped: bool) -> None:
+    for one in found:
+        head = f"{one.name}: " if len(found) > 1 else ""
+        for number, line in enumerate(one.kept["lines"] if one.kept is not None else [one.error]):
+            say(f"{head if not number else ''}{line}")
+    compared = sum(one.kept is not None for one in found)
+    passed = sum(one.kept is not None and one.kept["passed"] for one in found)
+    rest = len(found) - compared
+    tail = f", {rest} not compared" if rest else ""
+    say(f"compared {compared}: {passed} the same, {compared - passed} differ{tail}{', stopped' if stopped else ''}")
+
+
+def _described(found: list[Any], stopped: bool) -> dict[str, Any]:
+    """What JSON holds."""
+    return {
+        "compared": sum(one.kept is not None for one in found),
+        "stopped": stopped,
+        "pairs": [
+            {"name": one.name, "error": one.error or None, **({} if one.kept is None else one.kept["described"])}
+            for one in found
+        ],
+    }
+
+
+def _exit(found: list[Any]) -> None:
+    """0, 1 or, where something could not be compared, the error that ends with 2."""
+    for one in found:
+        why = one.kept["refused"] if one.kept is not None else "" if one.missing else one.error
+        if why:
+            raise CompareError(f"{one.name}: {why}")
+    if not all(one.kept is not None and one.kept["passed"] for one in found):
+        raise click.exceptions.Exit(1)
+
+
+BASELINE_EPILOG = """\b
+Example:
+  sonic-bullet baseline scenes/bar.py -o tests/sonic_baselines --reason "new cup"
+"""
+
+
+@click.command(epilog=BASELINE_EPILOG)
+@click.argument("scenes", metavar="SCENE.py...", nargs=-1, required=True)
+@click.option("-o", "--output", "folder", default="sonic_baselines", show_default=True, metavar="DIR", help="Where to.")
+@click.option("--reason", default="", metavar="WHY", help="Why it is to sound so, for whoever reads the file.")
+@click.option("--runs", type=click.IntRange(0, 9999), default=99, show_default=True, help="Of the ensemble; 0: none.")
+def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> None:
+    """Keep what scenes sound like now as small files, for tests to hold them against."""
+    for scene in scenes:
+        if not Path(scene).is_file() or not scene.lower().endswith(".py"):
+            raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
+    root = Path(folder_place(folder))
+    root.mkdir(parents=True, exist_ok=True)
+    to = places(*(str(root / f"{Path(scene).stem}.json") for scene in scenes))
+    with quiet_stderr():
+        from sonic_bullet.comparing.baselines import make_baseline, write_baseline
+    for scene, place in zip(scenes, to, strict=True):
+        with status(scene) as tell:
+            made = make_baseline(scene, reason, tell, runs)
+        write_baseline(str(place), made)
+        what = f"{len(made.features)} runs" if made.features else "no ensemble"
+        click.echo(
+            f"{scene} -> {place}: {what}, commit {made.commit[:12] or 'none'}{'' if made.clean else ' with changes'}"
+        )

@@ -1,0 +1,36 @@
+"""Two versions of a scene, and which input makes them sound different.
+
+    scene, scene -> sides -> calls side by side -> inputs that differ ┐
+                    logs  -> effects, first difference first          ├─> Comparison -> words, JSON, page
+                    put back one by one in the second scene -> causes ┘
+
+sides: what is compared, run | compared_sides: all together | comparison_record: what is found | words: in words
+inputs: side by side, put back, the smallest set that is the cause | outcome: what they did | ensemble: chance
+baselines, revisions, folders: of projects | pytest_plugin, failure_folder: of their tests
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.comparing.compared_sides import compare
+    from sonic_bullet.comparing.comparison_record import Comparison, Consequence, Difference
+    from sonic_bullet.comparing.sides import SceneSide
+
+__all__ = ["Comparison", "Consequence", "Difference", "SceneSide", "compare"]
+
+_HOME = {
+    "Comparison": "comparison_record",
+    "Difference": "comparison_record",
+    "Consequence": "comparison_record",
+    "SceneSide": "sides",
+    "compare": "compared_sides",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(f"sonic_bullet.comparing.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'sonic_bullet.comparing' has no attribute '{name}'")

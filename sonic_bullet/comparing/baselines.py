@@ -1,0 +1,165 @@
+"""What a version of a scene sounds like, kept as a small file, and a later version held against it.
+
+    scene -> digest of its samples, measurements, ensemble, commit, reason, versions -> NAME.json
+    NAME.json + scene -> the same samples, or within chance, or what of it has changed
+
+The file holds no sound. Where the commit is still there, the scene as it was is run again: then the cause is named.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
+from sonic_bullet.comparing.revisions import changed_files, head
+from sonic_bullet.comparing.sides import SceneSide, Side, run
+from sonic_bullet.files import replacing
+from sonic_bullet.files.reading import reading
+from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.records.errors import CompareError, FileError
+from sonic_bullet.session.scene_file import defines_build
+
+FORMAT = "sonic_bullet baseline 1"
+MOST_BYTES = 4 << 20
+Tell = Callable[[str], None]
+
+
+class SceneBaseline(msgspec.Struct, omit_defaults=True):
+    """See the module. commit: of the scene's repository, "": none; clean: the scene was as it is in that commit;
+    features, spectra: of the ensemble, empty for a plain script; seconds, rests: how long it ran, and whether to rest.
+    """
+
+    format: str
+    scene: str
+    reason: str
+    commit: str
+    clean: bool
+    versions: dict[str, str]
+    sr: int
+    channels: int
+    frames: int
+    samples_sha256: str
+    onsets_s: list[float]
+    t60_s: float | None
+    band_hz: list[float]
+    band_db: list[float | None]
+    seconds: float = 0.0
+    rests: bool = False
+    features: list[list[float]] = []
+    spectra: list[list[float]] = []
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Checked:
+    """A scene held against its baseline. same: the samples are; audible: within the ensemble or not, None: there is
+    none, or no need to ask; words: one line each of what has changed.
+    """
+
+    baseline: SceneBaseline
+    side: Side
+    same: bool
+    audible: Audibility | None
+    words: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether it counts as the same."""
+        return self.same or (self.audible is not None and not self.audible.beyond_chance)
+
+
+def samples_digest(sound: KeptSound) -> str:
+    """What tells one sound from another."""
+    made = hashlib.sha256()
+    for block in sound.blocks():
+        made.update(np.ascontiguousarray(block).tobytes())
+    return made.hexdigest()
+
+
+def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) -> SceneBaseline:
+    """What the scene sounds like now. Raises what running it does."""
+    side = run(SceneSide(scene), "a")
+    assert side.log is not None
+    x, place = side.sound.samples(), Path(scene).resolve()
+    levels = band_levels(x, side.sr)
+    made = SceneBaseline(
+        FORMAT, place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
+        side.sr, len(x), x.shape[1], samples_digest(side.sound), onsets_s(x, side.sr), t60_s(x, side.sr),
+        list(OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
+    )  # fmt: skip
+    if defines_build(place) and runs:
+        known = ensemble(SceneSide(scene), tell, runs)
+        made.seconds, made.rests = known.seconds, known.rests
+        made.features = np.round(known.features, 4).tolist()
+        made.spectra = np.round(known.spectra, 1).tolist()
+    return made
+
+
+def write_baseline(path: str | Path, baseline: SceneBaseline) -> None:
+    """Write it, whole or not at all. Raises FileError."""
+    with replacing(str(path)) as file:
+        file.write(msgspec.json.encode(baseline) + b"\n")
+
+
+def read_baseline(path: str | Path) -> SceneBaseline:
+    """Raises FileError, and CompareError for one of another version."""
+    remedy = "make it anew: sonic-bullet baseline"
+    with reading(str(path), "baseline", FileError, remedy):
+        data = Path(path).read_bytes()
+    if len(data) > MOST_BYTES:
+        raise FileError(f"{path} is no baseline: it is too large", remedy)
+    try:
+        version = msgspec.json.decode(data, type=dict[str, Any]).get("format")
+        if version != FORMAT:
+            raise CompareError(f"{path} is a baseline of another version ({str(version)[:40]})", remedy)
+        return msgspec.json.decode(data, type=SceneBaseline)
+    except msgspec.MsgspecError as error:
+        raise FileError(f"{path} is no baseline: {error}", remedy) from None
+
+
+def check_baseline(baseline: SceneBaseline, scene: str | Path, tell: Tell) -> Checked:
+    """The scene as it is now against the baseline. Raises what running it does."""
+    side = run(SceneSide(scene, sr=baseline.sr), "b")
+    assert side.log is not None
+    if samples_digest(side.sound) == baseline.samples_sha256:
+        return Checked(baseline, side, True, None, ())
+    words = [
+        f"{name} {baseline.versions.get(name)} → {version}: another version's samples may be others"
+        for name, version in side.log.versions.items()
+        if baseline.versions.get(name) != version
+    ]
+    audible = None
+    if baseline.features:
+        features, spectra = np.array(baseline.features), np.array(baseline.spectra)
+        known = Ensemble(features, spectra, baseline.seconds, baseline.rests)
+        again = run(SceneSide(scene, seconds=baseline.seconds, sr=baseline.sr), "b")
+        audible = judged(known, *measured(again))
+    return Checked(baseline, side, False, audible, (*words, *_changes(baseline, side)))
+
+
+def _changes(baseline: SceneBaseline, side: Side) -> list[str]:
+    x = side.sound.samples()
+    found = []
+    if x.shape != (baseline.channels, baseline.frames):
+        found.append(f"length {baseline.frames / baseline.sr:.4g} → {x.shape[1] / side.sr:.4g} s, {len(x)} channels")
+    change = [
+        (f, new - old)
+        for f, old, new in zip(baseline.band_hz, baseline.band_db, band_levels(x, side.sr).tolist(), strict=False)
+        if old is not None and np.isfinite(new)
+    ]
+    if change:
+        f, most = max(change, key=lambda pair: abs(pair[1]))
+        found.append(f"level at {f:g} Hz {most:+.2g} dB, the most of all bands")
+    onsets, t60 = onsets_s(x, side.sr), t60_s(x, side.sr)
+    if len(onsets) != len(baseline.onsets_s):
+        found.append(f"onsets {len(baseline.onsets_s)} → {len(onsets)}")
+    if t60 is not None and baseline.t60_s is not None and abs(t60 / baseline.t60_s - 1) > 0.005:
+        found.append(f"T60 {baseline.t60_s:.3g} → {t60:.3g} s")
+    return found

@@ -1,0 +1,118 @@
+"""What a comparison finds: records, and what JSON holds of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sonic_bullet.comparing.ensemble import Audibility
+    from sonic_bullet.comparing.sides import Side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Difference:
+    """An input that is not the same in both.
+
+    who: the body, "": the engine, what listens, how it is rendered; what: the quantity; a, b: its values, None where
+    there is none. words: one line. cause: True where it is among the smallest set whose return makes A of B, False
+    where it changes no sample, None where that is not known. share: of what is put right when all is put back, where
+    contacts are equal. kept: why it cannot be put back, "" where it can.
+    """
+
+    who: str
+    what: str
+    a: Any
+    b: Any
+    words: str
+    cause: bool | None = None
+    share: float | None = None
+    kept: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Consequence:
+    """What inputs did, never a cause. kind: contacts, modes, level, onset, decay, loudness, or what became of a
+    recording; at_s: when it begins; values: numbers by name, units in the names.
+    """
+
+    kind: str
+    words: str
+    at_s: float | None = None
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Two sides compared. same: their samples are equal, to the bit. differences: causes first. exact: whether the
+    causes put back in B give A to the bit; None: not tried. audible: whether B stands out of an ensemble of A; None:
+    not asked. stopped: it was interrupted, and this is what it had.
+    """
+
+    a: Side
+    b: Side
+    same: bool
+    differences: tuple[Difference, ...] = ()
+    effects: tuple[Consequence, ...] = ()
+    exact: bool | None = None
+    audible: Audibility | None = None
+    notes: tuple[str, ...] = ()
+    stopped: bool = False
+
+    @property
+    def causes(self) -> tuple[Difference, ...]:
+        """The inputs whose return makes A of B."""
+        return tuple(one for one in self.differences if one.cause)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the two count as the same: samples equal, or audibility was asked for and there is none."""
+        return self.same or (self.audible is not None and not self.audible.beyond_chance)
+
+    @property
+    def verdict(self) -> str:
+        """One line."""
+        from sonic_bullet.comparing.words import verdict
+
+        return verdict(self)
+
+    def lines(self) -> list[str]:
+        """The whole finding, a line each: verdict, inputs, effects, notes."""
+        tag = {True: "cause", False: "changes no sample", None: "input"}
+        return [
+            self.verdict,
+            *(f"  {tag[one.cause]}: {one.words}{f' ({one.kept})' if one.kept else ''}" for one in self.differences),
+            *(f"  effect: {one.words}" for one in self.effects),
+            *([f"  audible: {self.audible.words}"] if self.audible is not None else []),
+            *(f"  note: {one}" for one in self.notes),
+        ]
+
+    def described(self) -> dict[str, Any]:
+        """What JSON holds of it."""
+        return {
+            "a": self.a.name,
+            "b": self.b.name,
+            "same": self.same,
+            "passed": self.passed,
+            "verdict": self.verdict,
+            "exact": self.exact,
+            "differences": [
+                {"who": x.who, "what": x.what, "a": _shown(x.a), "b": _shown(x.b), "words": x.words, "cause": x.cause,
+                 "share": x.share, "kept": x.kept}
+                for x in self.differences
+            ],
+            "effects": [{"kind": x.kind, "words": x.words, "at_s": x.at_s, "values": x.values} for x in self.effects],
+            "audible": None if self.audible is None else self.audible.described(),
+            "notes": list(self.notes),
+            "stopped": self.stopped,
+        }  # fmt: skip
+
+
+def _shown(value: Any) -> Any:
+    """A value as JSON can hold it."""
+    if value is None or isinstance(value, (bool, int, str)) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    if isinstance(value, (tuple, list)):
+        return [_shown(one) for one in value]
+    return str(value)[:200]

@@ -1,0 +1,207 @@
+"""Is a change beyond chance? The scene again and again, each body's start shifted by 0.1 mm along the support.
+
+    A, 99 times -> features (99, k) ┐
+    B           -> features (k,)    ┴-> T² of each of the 100 among all -> rank of B -> p = rank/100
+
+What is chaotic sounds otherwise at the least push, so one run is no standard. T² is the squared Mahalanobis distance
+[Mahalanobis 1936] of a run's features from the mean of all 100, with their common covariance: no run is treated other
+than the rest, so under the null hypothesis every rank is as likely (a permutation test), and B alarms in 1 of 100.
+Features: contacts (episodes, impulse), log-spectral distance from the mean of the others, octave levels, signed level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ
+from sonic_bullet.comparing.sides import SceneSide, Side, run
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.listener.calls import Call, Who, with_leaves
+from sonic_bullet.parallel import parallel_map
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import CompareError
+from sonic_bullet.session.scene_file import defines_build
+
+RUNS = 99
+"""The fewest with which a rank can be at the 1 % level."""
+LEVEL = 0.01
+SHIFT_M = 1e-4
+SLICES = 12
+FLOOR_DB = -90.0
+REST_M = 1e-5
+"""A body that moves less in the last tenth of a second rests."""
+LONGEST = 4
+"""Times as long as a scene says of itself it is run to see it rest."""
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ensemble:
+    """features (runs, k), spectra (runs, slices · bands): of shifted runs of a scene, seconds long each. rests: whether
+    it rests by then.
+    """
+
+    features: Array
+    spectra: Array
+    seconds: float
+    rests: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Audibility:
+    """rank: of B's statistic among all runs, 1 the largest; p: rank / (runs + 1)."""
+
+    statistic: float
+    rank: int
+    runs: int
+    p: float
+    beyond_chance: bool
+    note: str = ""
+
+    def described(self) -> dict[str, Any]:
+        """What JSON holds of it."""
+        return {"statistic": self.statistic, "rank": self.rank, "runs": self.runs, "p": self.p,
+                "beyond_chance": self.beyond_chance, "note": self.note}  # fmt: skip
+
+    @property
+    def words(self) -> str:
+        """One line."""
+        what = "beyond chance" if self.beyond_chance else "within chance"
+        tail = f"; {self.note}" if self.note else ""
+        return f"{what}: rank {self.rank} of {self.runs + 1} (p = {self.p:.2g}) among starts 0.1 mm apart{tail}"
+
+
+@dataclass(slots=True, eq=False)
+class Shifted:
+    """A `Plan`: every body that moves starts SHIFT_M away, along the support, in a direction of its own."""
+
+    seed: int
+    _count: int = 0
+
+    def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
+        """See `Plan`."""
+        given = call.arguments
+        place = {"createMultiBody": "basePosition", "loadURDF": "basePosition"}.get(call.name)
+        if call.name == "resetBasePositionAndOrientation" and call.step == 0 and call.who is not None:
+            return [], with_leaves(given, {("posObj",): self._moved(given["posObj"], call.who)})
+        fixed = given.get("useFixedBase") or (call.name == "createMultiBody" and not given.get("baseMass"))
+        if place is None or call.step or fixed:
+            self._count += place is not None
+            return [], given
+        who = Who("", self._count)
+        self._count += 1
+        return [], with_leaves(given, {(place,): self._moved(given.get(place, (0.0, 0.0, 0.0)), who)})
+
+    def behind(self, step: int, name: str | None = None) -> list[Call]:
+        """See `Plan`."""
+        return []
+
+    def _moved(self, place: Any, who: Who) -> tuple[float, ...]:
+        angle = np.random.default_rng([self.seed, who.serial]).uniform(0, 2 * np.pi)
+        x, y, z = place
+        return (x + SHIFT_M * float(np.cos(angle)), y + SHIFT_M * float(np.sin(angle)), z)
+
+
+def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
+    """Shifted runs of a scene. Raises CompareError for a plain script, whose starts are its own affair."""
+    if not defines_build(Path(scene.path)):
+        raise CompareError(
+            f"{scene.path} is a plain script: it has no ensemble", "write build(client), or leave --audible out"
+        )
+    seconds, rests = until_rest(scene)
+    longer = replace(scene, seconds=seconds)
+
+    def one(seed: int) -> tuple[Array, Array]:
+        tell(f"run {seed} of {runs}")
+        return measured(run(longer, "b", plan=Shifted(seed)))
+
+    found = parallel_map(one, range(1, runs + 1), tell)
+    return Ensemble(np.array([x for x, _ in found]), np.array([y for _, y in found]), seconds, rests)
+
+
+def until_rest(scene: SceneSide) -> tuple[float, bool]:
+    """How long to run a scene so that everything in it rests at the end, and whether it does."""
+    side = run(scene, "a")
+    assert side.log is not None
+    first = seconds = side.log.duration_s
+    for times in range(1, LONGEST + 1):
+        assert side.log is not None
+        if at_rest(side.log):
+            return seconds, True
+        if times < LONGEST:
+            seconds = first * (times + 1)
+            side = run(replace(scene, seconds=seconds), "a")
+    return seconds, False
+
+
+def at_rest(log: ContactLog) -> bool:
+    """Whether nobody who sounds moves in the last tenth of a second."""
+    count = max(2, round(0.1 / log.steps[-1].dt_s))
+    one, other = log.steps[max(0, len(log.steps) - count)], log.steps[-1]
+    if len(one.body) != len(other.body):
+        return False
+    sounds = np.array([log.bodies[i].material is not None for i in one.body], bool)
+    return bool(np.abs(one.position_m - other.position_m)[sounds].max(initial=0) < REST_M)
+
+
+def measured(side: Side) -> tuple[Array, Array]:
+    """Features (k,) but the distance, and the log spectra (slices · bands,) that it is of."""
+    assert side.log is not None
+    x = side.sound.samples()
+    spectra = _band_spectra(x, side.sr)
+    mean = 10 * np.log10(np.mean(10 ** (spectra / 10), axis=0))
+    level = 10 * np.log10(float(np.square(x).mean()) + 1e-12)
+    return np.array([*_contacts(side.log), *mean, level]), spectra.ravel()
+
+
+def _contacts(log: ContactLog) -> tuple[float, float]:
+    """ln(1 + contact episodes), ln of the sum of impulses."""
+    before: set[tuple[int, int]] = set()
+    episodes, total = 0, 0.0
+    for step in log.steps:
+        row = step.contacts.row
+        now = set(zip(row["a"].tolist(), row["b"].tolist(), strict=True))
+        episodes += len(now - before)
+        total += float(np.linalg.norm(row["impulse_n_s"], axis=1).sum())
+        before = now
+    return float(np.log1p(episodes)), float(np.log(total + 1e-12))
+
+
+def _band_spectra(x: Array, sr: int) -> Array:
+    """(slices, bands) mean square in octave bands, dB, with a floor FLOOR_DB below the largest."""
+    n = x.shape[1] // SLICES
+    frames = x[:, : n * SLICES].reshape(len(x), SLICES, n)
+    power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
+    freq = np.fft.rfftfreq(n, 1 / sr)
+    bands = [power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in OCTAVES_HZ if f < sr / 2**1.5]
+    table = np.array(bands).T
+    return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (FLOOR_DB / 10)) + 1e-12))
+
+
+def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
+    """Where a run stands among those of an ensemble."""
+    every = np.vstack([known.spectra, spectra])
+    n = len(every)
+    apart = np.sqrt(np.square((every - every.mean(axis=0)) * (n / (n - 1))).mean(axis=1))
+    table = np.column_stack([np.vstack([known.features, features]), np.log(apart + 1e-9)])
+    table = (table - table.mean(axis=0)) / (table.std(axis=0) + 1e-12)
+    values, axes = np.linalg.eigh(np.cov(table.T))
+    kept = values > 1e-6 * values.max()
+    statistic = np.square(table @ axes[:, kept] / np.sqrt(values[kept])).sum(axis=1)
+    rank = 1 + int((statistic[:-1] >= statistic[-1]).sum())
+    note = "" if known.rests else "the scene does not come to rest: its end is cut in every run"
+    return Audibility(float(statistic[-1]), rank, n - 1, rank / n, rank / n <= LEVEL, note)
+
+
+def audible(a: Side, b: Side, tell: Tell, known: Ensemble | None = None) -> Audibility:
+    """Whether B stands out of an ensemble of A. Raises CompareError where A is no scene with a `build`."""
+    if a.scene is None or b.scene is None:
+        raise CompareError(f"{a.name} is no scene: it has no ensemble", "leave --audible out, or compare scenes")
+    known = ensemble(a.scene, tell) if known is None else known
+    tell("B until it rests")
+    return judged(known, *measured(run(replace(b.scene, seconds=known.seconds), "b")))

@@ -1,0 +1,86 @@
+"""Folders of scenes, logs or recordings, compared pair by pair: two names that are the same are a pair.
+
+A/pour.py B/pour.py -> compared -> what is kept of it        A/roll.py alone -> a partner is missing
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sonic_bullet.parallel import parallel_map
+from sonic_bullet.records.errors import CompareError, SonicBulletError
+from sonic_bullet.session.scene_file import defines_build
+
+SOUNDS = (".wav", ".flac", ".ogg", ".aiff", ".aif", ".caf", ".w64", ".rf64")
+AT_ONCE = 4
+"""Pairs that two processes are given at a time; what is done is kept when it is stopped."""
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """One name of both folders. kept: what was made of its comparison, None: a partner is missing or it broke; error:
+    why.
+    """
+
+    name: str
+    kept: Any = None
+    error: str = ""
+    missing: bool = False
+
+
+def pairs_of(a: Path, b: Path) -> list[tuple[str, Path | None, Path | None]]:
+    """Names in both, or one alone, in order. Raises CompareError where there is nothing to compare."""
+    found = [
+        {str(path.relative_to(place)): path for path in sorted(place.rglob("*")) if _taken(path)} for place in (a, b)
+    ]
+    names = sorted({*found[0], *found[1]})
+    if not names:
+        raise CompareError(f"{a} and {b} hold no scene, log or recording", "give folders of them")
+    return [(name, found[0].get(name), found[1].get(name)) for name in names]
+
+
+def _taken(path: Path) -> bool:
+    """Whether it is something to compare; a Python file without a step to make is what scenes import."""
+    if path.suffix.lower() == ".py":
+        try:
+            return defines_build(path) or "stepSimulation" in path.read_text(encoding="utf-8", errors="replace")
+        except SonicBulletError:
+            return True
+    return path.suffix.lower() in (".npz", *SOUNDS)
+
+
+def compare_folders(
+    a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]], say: Callable[[str], None]
+) -> tuple[list[Paired], bool]:
+    """What ``both`` makes of each pair, and whether it was stopped before the last.
+
+    both: compares two files where the work is done: on two cores, side by side; "stopped" in what it returns ends all.
+    """
+    listed = pairs_of(a, b)
+    reached: list[Paired] = []
+
+    def do(one: tuple[str, Path | None, Path | None]) -> Paired:
+        name, first, second = one
+        if first is None or second is None:
+            return Paired(name, error=f"is in {'B' if first is None else 'A'} alone", missing=True)
+        try:
+            found = Paired(name, both(first, second))
+        except SonicBulletError as error:
+            found = Paired(name, error=str(error))
+        reached.append(found)
+        if found.kept is not None and found.kept["stopped"]:
+            raise KeyboardInterrupt
+        return found
+
+    done: list[Paired] = []
+    try:
+        for start in range(0, len(listed), AT_ONCE):
+            say(f"{start} of {len(listed)}")
+            done += parallel_map(do, listed[start : start + AT_ONCE], say)
+    except KeyboardInterrupt:
+        known = {one.name for one in done}
+        return [*done, *(one for one in reached if one.name not in known)], True
+    return done, False

@@ -1,0 +1,162 @@
+"""The calls of two runs side by side: which call of one is which of the other, and what only one of them makes.
+
+    A: create a, create b, friction a        a with a: two that ask the same of the same body
+    B: create a, friction a                  b, and all about it: of A alone
+
+Bodies are matched first, by what they are made as, in their order: the alignment of least cost [Needleman and Wunsch,
+J. Mol. Biol. 48 (1970) 443], which finds the body that is missing among equal ones. Then calls are, a step at a time:
+the same function about the same body, in order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from sonic_bullet.listener.calls import ABSENT, Call, Who, leaves, mapped, same
+
+One = TypeVar("One")
+GAP = 0.6
+"""Cost of a body that has no partner; two that share nothing cost 1, less than two without partners."""
+MOST_CELLS = 4_000_000
+"""Beyond this many pairs of calls, what is the same in one order is looked for in the middle by place alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CallPair:
+    """A call of A, of B, or of both that are the same one; arguments of A with B's bodies where those are matched."""
+
+    a: Call | None
+    b: Call | None
+
+    @property
+    def step(self) -> int:
+        one = self.b or self.a
+        return one.step if one is not None else 0
+
+
+def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], dict[Who, Who]]:
+    """All calls of both in an order that is that of each, and whom of A is whom of B."""
+    match = matched_bodies(a, b)
+    renamed = [_renamed(call, match) for call in a]
+    pairs: list[CallPair] = []
+    of_a, of_b = _by_step(renamed), _by_step(b)
+    for step in sorted({*of_a, *of_b}):
+        pairs += [CallPair(one, other) for one, other in aligned(of_a.get(step, []), of_b.get(step, []), _unlike, _gap)]
+    return pairs, match
+
+
+def matched_bodies(a: Sequence[Call], b: Sequence[Call]) -> dict[Who, Who]:
+    """From the bodies and constraints of A to those of B that are the same ones."""
+    makers = [[call for call in calls if call.made] for calls in (a, b)]
+    return {
+        one: other
+        for x, y in aligned(makers[0], makers[1], _unlike_bodies, lambda call: GAP)
+        if x is not None and y is not None
+        for one, other in zip(x.made, y.made, strict=False)
+    }
+
+
+def aligned(
+    a: Sequence[One], b: Sequence[One], unlike: Callable[[One, One], float], gap: Callable[[One], float]
+) -> list[tuple[One | None, One | None]]:
+    """Both in their order, partners together, at the least sum of ``unlike`` (inf: never) and gaps."""
+    start = 0
+    while start < min(len(a), len(b)) and unlike(a[start], b[start]) == 0:
+        start += 1
+    end = 0
+    while end < min(len(a), len(b)) - start and unlike(a[-1 - end], b[-1 - end]) == 0:
+        end += 1
+    head = [(x, y) for x, y in zip(a[:start], b[:start], strict=True)]
+    tail = [(x, y) for x, y in zip(a[len(a) - end :], b[len(b) - end :], strict=True)]
+    return [*head, *_middle(a[start : len(a) - end], b[start : len(b) - end], unlike, gap), *tail]
+
+
+def _middle(
+    a: Sequence[One], b: Sequence[One], unlike: Callable[[One, One], float], gap: Callable[[One], float]
+) -> list[tuple[One | None, One | None]]:
+    n, m = len(a), len(b)
+    if n * m > MOST_CELLS:
+        half = min(n, m)
+        return [*zip(a[:half], b[:half], strict=True), *((x, None) for x in a[half:]), *((None, y) for y in b[half:])]
+    cost = np.zeros((n + 1, m + 1))
+    cost[1:, 0] = np.cumsum([gap(x) for x in a])
+    cost[0, 1:] = np.cumsum([gap(y) for y in b])
+    between = np.array([[unlike(x, y) for y in b] for x in a]).reshape(n, m)
+    for i in range(1, n + 1):
+        for j in range(1, m + 1):
+            cost[i, j] = min(
+                cost[i - 1, j - 1] + between[i - 1, j - 1],
+                cost[i - 1, j] + gap(a[i - 1]),
+                cost[i, j - 1] + gap(b[j - 1]),
+            )
+    found: list[tuple[One | None, One | None]] = []
+    i, j = n, m
+    while i or j:
+        if i and j and cost[i, j] == cost[i - 1, j - 1] + between[i - 1, j - 1]:
+            i, j = i - 1, j - 1
+            found.append((a[i], b[j]))
+        elif i and cost[i, j] == cost[i - 1, j] + gap(a[i - 1]):
+            i -= 1
+            found.append((a[i], None))
+        else:
+            j -= 1
+            found.append((None, b[j]))
+    return found[::-1]
+
+
+def differing(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any, Any]]:
+    """Leaves of two calls that are not the same: (A's, B's), ABSENT where one has none."""
+    one, other = dict(leaves(a.arguments) if a else ()), dict(leaves(b.arguments) if b else ())
+    return {
+        path: (one.get(path, ABSENT), other.get(path, ABSENT))
+        for path in {**one, **other}
+        if not same(one.get(path, ABSENT), other.get(path, ABSENT))
+    }
+
+
+def about(call: Call) -> tuple[Any, ...]:
+    """What a call must share with another to be the same one: function, body, link or joint."""
+    places = (call.arguments.get(name) for name in ("linkIndex", "jointIndex", "jointIndices", "links"))
+    return (call.name, call.who, *places)
+
+
+def _unlike(a: Call, b: Call) -> float:
+    if about(a) != about(b):
+        return float("inf")
+    return _share(a, b)
+
+
+def _gap(call: Call) -> float:
+    return GAP
+
+
+def _unlike_bodies(a: Call, b: Call) -> float:
+    return _share(a, b) if a.name == b.name and len(a.made) == len(b.made) else float("inf")
+
+
+def _share(a: Call, b: Call) -> float:
+    """Of all leaves of both, the share that differs."""
+    most = len({path for call in (a, b) for path, _ in leaves(call.arguments)})
+    return len(differing(a, b)) / max(most, 1)
+
+
+def _by_step(calls: Iterable[Call]) -> dict[int, list[Call]]:
+    found: dict[int, list[Call]] = {}
+    for call in calls:
+        found.setdefault(call.step, []).append(call)
+    return found
+
+
+def _renamed(call: Call, match: Mapping[Who, Who]) -> Call:
+    """The call with B's bodies in the place of A's where they are matched."""
+
+    def other(value: Any) -> Any:
+        return match.get(value, value) if isinstance(value, Who) else value
+
+    who = other(call.who)
+    made = tuple(other(one) for one in call.made)
+    return Call(call.name, call.step, mapped(call.arguments, other), who, made, call.own)

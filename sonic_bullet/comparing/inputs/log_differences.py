@@ -1,0 +1,275 @@
+"""Which inputs of two contact logs differ, read off their records, whatever fields these have.
+
+    header, bodies, first poses -> leaves that differ -> one input a quantity -> where contacts are equal: exchange
+
+An inertia that grew with the mass, a volume with the shape, and modes with the material are no inputs of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.comparing.inputs.input_differences import ONE_QUANTITY, damping
+from sonic_bullet.comparing.inputs.matched_logs import body_leaves
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
+from sonic_bullet.records import Array, Body
+
+OF_RUN = ("bodies", "steps", "events", "changes", "untouched", "versions", "engine")
+"""Fields of a log that are no settings of its sound."""
+OF_MODES = ("density_kg_m3", "stiffness_pa", "alpha_per_s", "beta_s", "effects", "includes_radiation", "name")
+"""Of a material: what its modes are made of."""
+ONE_BODY = {
+    ("mass_kg",): "mass",
+    ("dynamics", "mass"): "mass",
+    ("inertia_kg_m2",): "inertia",
+    ("volume_m3",): "shape",
+    ("curvature_per_m",): "shape",
+}
+SHAPE_SHARE = 2e-3
+"""Of a volume: two meshes of one shape differ by less where elements are as large as this project's."""
+AS_POSES_TELL = "as first poses tell: a force or a joint, which a log does not hold, would look the same"
+
+Exchange = Callable[[ContactLog, ContactLog], ContactLog]
+
+
+@dataclass(slots=True, eq=False)
+class Logged:
+    """An input of two logs that differs. exchange(a, b): b's log with a's input, None: it cannot be exchanged; silent:
+    it acts before the contacts alone, or after them alone ("sound").
+    """
+
+    who: str
+    what: str
+    a: Any
+    b: Any
+    exchange: Exchange | None = None
+    acts: str = "contacts"
+    note: str = ""
+
+
+def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
+    """Inputs that differ: the engine's, each body's, what listens, how it is rendered, versions."""
+    found = [*_engine(a, b)]
+    for i, j in pairs:
+        if i is None or j is None:
+            found += _lone(a, b, i, j)
+        else:
+            found += _body(a, b, i, j)
+    found += _changes(a, b, pairs)
+    for one in fields(a):
+        if one.name not in OF_RUN:
+            old, new = dict(leaves(getattr(a, one.name), (one.name,))), dict(leaves(getattr(b, one.name), (one.name,)))
+            for path in {**old, **new}:
+                if not same(old.get(path), new.get(path)):
+                    what = ONE_QUANTITY.get(path[-1], path[-1])
+                    found.append(Logged("", what, old.get(path), new.get(path), _setting(path), "sound"))
+    step_s = max(float(a.steps[0].dt_s), float(b.steps[0].dt_s))
+    if abs(a.duration_s - b.duration_s) > 1.5 * step_s:
+        found.append(Logged("", "seconds", a.duration_s, b.duration_s))
+    for name in {**a.versions, **b.versions}:
+        if a.versions.get(name) != b.versions.get(name):
+            note = "another version cannot be put back: install it"
+            found.append(Logged(name, "version", a.versions.get(name), b.versions.get(name), note=note))
+    return found
+
+
+def _engine(a: ContactLog, b: ContactLog) -> list[Logged]:
+    found = []
+    names = [name for name in {**a.engine, **b.engine} if a.engine.get(name) != b.engine.get(name)]
+    one, other = a.steps[0], b.steps[0]
+    values: dict[str, Any] = {ONE_QUANTITY.get(name, name): (a.engine.get(name), b.engine.get(name)) for name in names}
+    if one.dt_s != other.dt_s:
+        values["time step"] = (one.dt_s, other.dt_s)
+    if not same(one.gravity_m_s2, other.gravity_m_s2):
+        values = {name: x for name, x in values.items() if not name.startswith("gravity")}
+        values["gravity"] = (tuple(one.gravity_m_s2.tolist()), tuple(other.gravity_m_s2.tolist()))
+    for what, (old, new) in values.items():
+        found.append(Logged("", what, old, new))
+    return found
+
+
+def _lone(a: ContactLog, b: ContactLog, i: int | None, j: int | None) -> list[Logged]:
+    """A body of one log alone; who sounds not and has met nobody in the other is there too, unseen."""
+    body, other = (a.bodies[i], b) if i is not None else (b.bodies[j], a)  # type: ignore[index]
+    if body.material is None and body.body_id in other.untouched:
+        return []
+    return [Logged(body.name, "body", body if i is not None else None, body if j is not None else None)]
+
+
+def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
+    one, other = a.bodies[i], b.bodies[j]
+    old, new = body_leaves(one), body_leaves(other)
+    changed = [path for path in {**old, **new} if not same(old.get(path), new.get(path))]
+    found: dict[str, Logged] = {}
+    modes_differ = not same_model(one, other)
+    for path in changed:
+        what, acts = _quantity(path)
+        value = old.get(path), new.get(path)
+        if path[0] == "material" and one.material and other.material and one.material.name != other.material.name:
+            what, value = "material", (one.material.name, other.material.name)
+        if what == "damping":
+            value = damping(one.material), damping(other.material)
+        if path[0] == "material" and (one.material is None or other.material is None):
+            what, value = "sounding", (one.material and one.material.name, other.material and other.material.name)
+        if what not in found:
+            exchange = _of_modes(i, j) if path[0] in ("material", "options") and modes_differ else _leaf(path, i, j)
+            if path[0] == "material" and path[-1] not in OF_MODES and what not in ("material", "sounding"):
+                exchange = _leaf(path, i, j)
+            found[what] = Logged(one.name, what, *value, exchange, acts)
+    if modes_differ and not any(path[0] in ("material", "options") and path[-1] != "source" for path in changed):
+        found.setdefault("mesh", _mesh(one, other, i, j))
+    _without_what_follows(found, one, other)
+    for what in ("since_step", "until_step"):  # in steps: of another length they are others
+        old_step, new_step = getattr(one, what), getattr(other, what)
+        if old_step != new_step and a.steps[0].dt_s == b.steps[0].dt_s:
+            found[what] = Logged(one.name, what, old_step, new_step)
+    return [*found.values(), *_start(a, b, i, j, bool(found) or bool(_engine(a, b)))]
+
+
+def _quantity(path: Path) -> tuple[str, str]:
+    """What a leaf is, and whether it acts on contacts or on sound alone."""
+    if path in ONE_BODY:
+        return ONE_BODY[path], "contacts"
+    acts = "sound" if path[0] in ("material", "options", "mounting") else "contacts"
+    return ONE_QUANTITY.get(path[-1], path[-1]), acts
+
+
+def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> None:
+    """Take out what is no input of its own."""
+    if "mass" in found and "inertia" in found and one.mass_kg and other.mass_kg:
+        grown = one.inertia_kg_m2 * (other.mass_kg / one.mass_kg)
+        if np.allclose(grown, other.inertia_kg_m2, rtol=1e-6, atol=1e-18):
+            found.pop("inertia")
+    if "mesh" in found:
+        collides_alike = "inertia" not in found and one.mass_kg > 0  # then the surface that sounds alone is another
+        large = abs(one.volume_m3 - other.volume_m3) > SHAPE_SHARE * max(one.volume_m3, other.volume_m3)
+        found.pop("mesh" if large and "shape" in found and not collides_alike else "shape", None)
+    if "shape" in found:
+        found.pop("inertia", None)
+    if any(name in found for name in ("thickness_m", "fixed", "material")):
+        found.pop("shape", None)
+
+
+def _mesh(one: Body, other: Body, i: int, j: int) -> Logged:
+    count = [0 if body.model is None else len(body.model.vertex_m) for body in (one, other)]
+    words = [f"{x} vertices" for x in count]
+    if count[0] == count[1]:
+        words = ["of A", "of B"]
+    return Logged(one.name, "mesh", words[0], words[1], _of_modes(i, j), "sound")
+
+
+def same_model(one: Body, other: Body) -> bool:
+    """Whether two bodies have the same modes on the same surface."""
+    return (one.model is None) == (other.model is None) and (one.model is None or same(one.model, other.model))
+
+
+def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> list[Logged]:
+    """Where a body starts, and how fast, as its first poses and contacts tell. explained: something else differs that
+    moves it otherwise.
+    """
+    one, name = a.bodies[i], a.bodies[i].name
+    first = [_pose(log, index, 0) for log, index in ((a, i), (b, j))]
+    if first[0] is None or first[1] is None:
+        return []
+    found = []
+    for place, what in ((0, "start position"), (1, "start orientation")):
+        if not same(first[0][place], first[1][place]):
+            old, new = (tuple(np.round(pose[place], 9).tolist()) for pose in first if pose is not None)
+            found.append(Logged(name, what, old, new))
+    if not found and not explained:
+        if one.mass_kg and not same(_speeds(a, i), _speeds(b, j)):
+            return [Logged(name, "start velocity", _speeds(a, i), _speeds(b, j))]
+        second = [_pose(log, index, 1) for log, index in ((a, i), (b, j))]
+        free = not any(index in {*log.steps[0].contacts.a, *log.steps[0].contacts.b} for log, index in ((a, i), (b, j)))
+        alike = same(a.steps[0].gravity_m_s2, b.steps[0].gravity_m_s2)
+        if second[0] is not None and second[1] is not None and free and alike:
+            speed = [(s[0] - f[0]) / a.steps[0].dt_s for s, f in zip(second, first, strict=True) if s and f]
+            if not np.allclose(speed[0], speed[1], rtol=1e-9, atol=1e-9):
+                old, new = (tuple(np.round(x, 6).tolist()) for x in speed)
+                found.append(Logged(name, "start velocity", old, new, note=AS_POSES_TELL))
+            elif not same(second[0][1], second[1][1]):
+                found.append(Logged(name, "start spin", "of A", "of B", note=AS_POSES_TELL))
+    return found
+
+
+def _speeds(log: ContactLog, index: int) -> tuple[float, ...]:
+    """Slip of a body's contacts before the first step, m/s: its first velocity where it touches from the start."""
+    rows = log.steps[0].contacts.row
+    mine = rows[(rows["a"] == index) | (rows["b"] == index)]
+    return tuple(np.round(mine["slip_m_s"], 6)[:1].ravel().tolist())
+
+
+def _pose(log: ContactLog, index: int, step: int) -> tuple[Array, Array] | None:
+    if len(log.steps) <= step:
+        return None
+    one = log.steps[step]
+    row = np.flatnonzero(one.body == index)
+    return (one.position_m[row[0]], one.quaternion_xyzw[row[0]]) if len(row) else None
+
+
+def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
+    """What was set otherwise under way."""
+    names = {j: a.bodies[i].name for i, j in pairs if i is not None and j is not None}
+    listed: list[dict[tuple[str, str], list[Any]]] = []
+    for log in (a, b):
+        mine: dict[tuple[str, str], list[Any]] = {}
+        for change in log.changes:
+            for what, value in change.values.items():
+                who = "" if change.body is None else log.bodies[change.body].name
+                if log is b and change.body is not None:
+                    who = names.get(change.body, who)
+                mine.setdefault((who, ONE_QUANTITY.get(what, what)), []).append((change.step, value))
+        listed.append(mine)
+    return [
+        Logged(who, f"{what} under way", str(listed[0].get((who, what))), str(listed[1].get((who, what))))
+        for who, what in {**listed[0], **listed[1]}
+        if listed[0].get((who, what)) != listed[1].get((who, what)) and a.steps[0].dt_s == b.steps[0].dt_s
+    ]
+
+
+def _setting(path: Path) -> Exchange:
+    """The whole setting of that name, or a part of it."""
+
+    def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
+        value: Any = getattr(a, path[0])
+        for name in path[1:]:
+            value = getattr(value, name)
+        made: Mapping[str, Any] = {path[0]: with_leaves(getattr(b, path[0]), {path[1:]: value})}
+        return replace(b, **made)
+
+    return exchange
+
+
+def _leaf(path: Path, i: int, j: int) -> Exchange:
+    def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
+        value = body_leaves(a.bodies[i]).get(path)
+        return _with_body(b, j, with_leaves(b.bodies[j], {path: value}))
+
+    return exchange
+
+
+def _of_modes(i: int, j: int) -> Exchange:
+    """A body's material and modes together: the one is made of the other."""
+
+    def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
+        one = a.bodies[i]
+        given: dict[str, Any] = {
+            "material": one.material,
+            "model": one.model,
+            "options": one.options,
+            "volume_m3": one.volume_m3,
+        }
+        return _with_body(b, j, replace(b.bodies[j], **given))
+
+    return exchange
+
+
+def _with_body(log: ContactLog, index: int, body: Body) -> ContactLog:
+    bodies = list(log.bodies)
+    bodies[index] = body
+    return replace(log, bodies=tuple(bodies))

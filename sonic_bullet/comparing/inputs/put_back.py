@@ -1,0 +1,86 @@
+"""The second scene once more, with some of its inputs as the first has them.
+
+pairs + chosen places -> Plan: each call of B with A's arguments, calls of A where B has none, none where A has none
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from sonic_bullet.comparing.inputs.call_pairs import CallPair, about, differing
+from sonic_bullet.listener.calls import ABSENT, Call, Path, leaves, with_leaves
+
+HANDLES = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId", "body", "links", "linkIndex", "jointIndex")
+"""Arguments that say of whom a call is; they are never what differs."""
+Place = tuple[int, Path | None]
+"""A number of a pair, and which of its leaves; None: the whole call."""
+
+
+@dataclass(slots=True, eq=False)
+class PutBack:
+    """A `Plan`: places of pairs that are as A has them."""
+
+    pairs: Sequence[CallPair]
+    chosen: frozenset[Place]
+    _next: int = field(default=0)
+
+    def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
+        """See `Plan`."""
+        if call.who is not None and call.who.side == "a":  # B's own loops find a body of A's: its calls come anyway
+            return [], None
+        number = self._number(call)
+        if number is None:
+            return [], call.arguments
+        first = self._of_a(self._next, number)
+        self._next = number + 1
+        pair = self.pairs[number]
+        if (number, None) in self.chosen and pair.a is None:
+            return first, None
+        changed = {path: a for path, (a, _) in differing(pair.a, pair.b).items() if (number, path) in self.chosen}
+        if not changed:
+            return first, call.arguments
+        made = with_leaves(call.arguments, changed)
+        return first, made if pair.a is not None or _asks(made) else None
+
+    def behind(self, step: int, name: str | None = None) -> list[Call]:
+        """See `Plan`."""
+        end = self._next
+        while end < len(self.pairs) and self.pairs[end].step <= step:
+            pair = self.pairs[end]
+            gone = pair.a is None and (end, None) in self.chosen  # B does not come to ask it
+            if name is not None and not gone and (pair.b is not None or pair.a is None or pair.a.name != name):
+                break
+            end += 1
+        found, self._next = self._of_a(self._next, end), end
+        return found
+
+    def _number(self, call: Call) -> int | None:
+        """Of the next pair whose call of B is this one."""
+        for number in range(self._next, len(self.pairs)):
+            pair = self.pairs[number]
+            if pair.step > call.step:
+                return None
+            if pair.b is not None and pair.step == call.step and about(pair.b) == about(call):
+                return number
+        return None
+
+    def _of_a(self, start: int, stop: int) -> list[Call]:
+        """Calls of A alone that are chosen: whole, or with the arguments that are."""
+        found = []
+        for number, pair in enumerate(self.pairs[start:stop], start):
+            if pair.a is None or pair.b is not None:
+                continue
+            paths = {path for path, _ in leaves(pair.a.arguments)}
+            absent = {path: ABSENT for path in paths if (number, path) not in self.chosen and path[0] not in HANDLES}
+            if (number, None) in self.chosen:
+                found.append(pair.a)
+            elif len(absent) < len([path for path in paths if path[0] not in HANDLES]):
+                found.append(replace(pair.a, arguments=with_leaves(pair.a.arguments, absent)))
+        return found
+
+
+def _asks(arguments: Mapping[str, Any]) -> bool:
+    """Whether anything is asked of whom these arguments name."""
+    return any(name not in HANDLES for name in arguments)

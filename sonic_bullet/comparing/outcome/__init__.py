@@ -1,0 +1,1 @@
+"""What inputs did: modes, levels, onsets, decays; what became of a recording."""

@@ -1,0 +1,157 @@
+"""What two sounds differ in, as one hears it: first sample, levels by band and time, onsets, decay, loudness.
+
+level_dB(band) = 10 lg ∫ |B|² df / ∫ |A|² df over an octave band [IEC 61260-1]
+T60: the slope of the backward integral of p² between −5 and −25 dB [Schroeder, J. Acoust. Soc. Am. 37 (1965) 409]
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.comparing.comparison_record import Consequence
+from sonic_bullet.records import Array
+
+OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
+QUIET_DB = -80.0
+"""Below the loudest band: what is as quiet in both has no level of its own to compare."""
+FRAME_S, RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
+"""An onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; flams closer than that are one."""
+FLOOR_DB = -50.0
+"""Onsets are looked for down to here below the loudest moment."""
+
+
+def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Array, int]:
+    """Both sounds (channels, n) at the lower of their rates."""
+    low = min(sr_a, sr_b)
+
+    def lowered(x: Array, sr: int) -> Array:
+        if sr == low:
+            return x
+        from scipy.signal import resample_poly
+
+        common = math.gcd(sr, low)
+        return np.asarray(resample_poly(x, low // common, sr // common, axis=1))
+
+    return lowered(a, sr_a), lowered(b, sr_b), low
+
+
+def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
+    """Effects of sounds (channels, n) at one rate, first difference first."""
+    found: list[Consequence] = []
+    n = min(a.shape[1], b.shape[1])
+    if a.shape[0] != b.shape[0]:
+        return [Consequence("channels", f"{a.shape[0]} → {b.shape[0]} channels", 0.0)]
+    where = np.flatnonzero((a[:, :n] != b[:, :n]).any(axis=0))
+    if len(where):
+        first = int(where[0])
+        found.append(Consequence("sample", f"first sample that differs at {first / sr * 1e3:.4g} ms", first / sr))
+    if a.shape[1] != b.shape[1]:
+        found.append(Consequence("length", f"length {a.shape[1] / sr:.4g} → {b.shape[1] / sr:.4g} s", n / sr))
+    found += [one for one in (_levels(a, b, sr), _onsets(a, b, sr), _decay(a, b, sr), _loudness(a, b, sr)) if one]
+    return found
+
+
+def band_levels(x: Array, sr: int) -> Array:
+    """(bands,) mean square in octave bands, all channels together, dB re 1 Pa²; −inf where there is none."""
+    n = max(x.shape[1], 1)
+    power = (np.abs(np.fft.rfft(x, axis=1)) ** 2).sum(axis=0) * 2 / n**2
+    freq = np.fft.rfftfreq(n, 1 / sr)
+    edge = math.sqrt(2)
+    sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in OCTAVES_HZ if f / edge < sr / 2]
+    with np.errstate(divide="ignore"):
+        return np.asarray(10 * np.log10(np.array(sums)))
+
+
+def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
+    one, other = band_levels(a, sr), band_levels(b, sr)
+    top = max(one.max(initial=-np.inf), other.max(initial=-np.inf))
+    if not math.isfinite(top):
+        return None
+    loud = np.maximum(one, other) > top + QUIET_DB
+    if not (np.isfinite(one[loud]).all() and np.isfinite(other[loud]).all()):
+        which = "A" if not np.isfinite(one[loud]).all() else "B"
+        return Consequence("level", f"{which} is silent in some bands where the other is not")
+    change = other - one
+    total = 10 * math.log10(float(np.square(b).mean()) / float(np.square(a).mean()))
+    k = int(np.argmax(np.where(loud, np.abs(change), -1)))
+    most = f", most at {_hz(OCTAVES_HZ[k])}: {change[k]:+.2g} dB" if abs(change[k]) > 0.005 else ""
+    values: dict[str, Any] = {"total_db": total, "band_hz": list(OCTAVES_HZ[: len(change)])}
+    values["band_db"] = [round(float(x), 4) if good else None for x, good in zip(change, loud, strict=True)]
+    return Consequence("level", f"level {total:+.2g} dB{most}", None, values)
+
+
+def onsets_s(x: Array, sr: int) -> list[float]:
+    """When something begins to sound, in s."""
+    hop = max(1, round(FRAME_S * sr / 2))
+    square = np.square(x).sum(axis=0)
+    count = len(square) // hop
+    if count < 4:
+        return []
+    envelope = square[: count * hop].reshape(count, hop).mean(axis=1)
+    level = 10 * np.log10(envelope + 1e-300)
+    back = max(2, round(BEFORE_S * sr / hop))
+    found: list[float] = []
+    last = -back
+    for i in range(count):
+        before = level[max(0, i - back) : i].max(initial=-3000.0)
+        if level[i] > level.max() + FLOOR_DB and level[i] > before + RISE_DB and i - last >= back:
+            found.append(i * hop / sr)
+            last = i
+    return found
+
+
+def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
+    one, other = onsets_s(a, sr), onsets_s(b, sr)
+    if len(one) != len(other):
+        shared = min(len(one), len(other))
+        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > FRAME_S), None)
+        longer = one if len(one) > len(other) else other
+        at = longer[shared] if at is None else at
+        return Consequence("onset", f"onsets {len(one)} → {len(other)}", at, {"a_s": one, "b_s": other})
+    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > FRAME_S / 2]
+    if not moved:
+        return None
+    most = max(moved, key=lambda pair: abs(pair[0]))
+    words = f"{len(moved)} of {len(one)} onsets move, most by {most[0] * 1e3:+.3g} ms at {most[1]:.3g} s"
+    return Consequence("onset", words, moved[0][1], {"a_s": one, "b_s": other})
+
+
+def t60_s(x: Array, sr: int) -> float | None:
+    """Time in which the sound after its loudest moment falls by 60 dB; None: it does not fall by 25."""
+    square = np.square(x).sum(axis=0)
+    if not square.any():
+        return None
+    left = np.cumsum(square[int(np.argmax(square)) :][::-1])[::-1]
+    level = 10 * np.log10(left / left[0] + 1e-300)
+    i, j = (int(np.argmax(level <= db)) for db in (-5.0, -25.0))
+    if not 0 < i < j:
+        return None
+    slope = np.polyfit(np.arange(i, j) / sr, level[i:j], 1)[0]
+    return float(-60 / slope) if slope < 0 else None
+
+
+def _decay(a: Array, b: Array, sr: int) -> Consequence | None:
+    one, other = t60_s(a, sr), t60_s(b, sr)
+    if one is None or other is None or abs(other / one - 1) < 0.005:
+        return None
+    words = f"T60 {one:.3g} → {other:.3g} s ({(other / one - 1) * 100:+.2g} %)"
+    return Consequence("decay", words, None, {"a_s": one, "b_s": other})
+
+
+def _loudness(a: Array, b: Array, sr: int) -> Consequence | None:
+    import pyloudnorm
+
+    if min(a.shape[1], b.shape[1]) < math.ceil(0.4 * sr) or a.shape[0] > 5:
+        return None
+    peak = max(float(np.abs(a).max()), float(np.abs(b).max())) or 1.0
+    one, other = (float(pyloudnorm.Meter(sr).integrated_loudness(x.T / peak)) for x in (a, b))
+    if not (math.isfinite(one) and math.isfinite(other)) or abs(other - one) < 0.05:
+        return None
+    return Consequence("loudness", f"loudness {other - one:+.2g} LU", None, {"change_lu": other - one})
+
+
+def _hz(f: float) -> str:
+    return f"{f / 1000:g} kHz" if f >= 1000 else f"{f:g} Hz"

@@ -1,0 +1,224 @@
+"""What is compared: a scene that is run, a contact log, a recording; each becomes a `Side`, its sound and all that is
+known of where it comes from.
+
+    scene  -> run, calls seen -> Side(calls, log, sound)
+    log    -> rendered        -> Side(log, sound)
+    recording                 -> Side(sound)
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_path, shown
+from sonic_bullet.records.errors import CompareError, SonicBulletError
+from sonic_bullet.render import render_kept
+from sonic_bullet.session.directed import directed
+from sonic_bullet.session.listening import Listener
+from sonic_bullet.session.wanted_bodies import WantedBody
+
+Say = Callable[[str], None]
+OF_WHOM = ("body", "links", "parts", "own_shapes")
+"""Fields of a `WantedBody` that say who it is and how it looks; all others are inputs."""
+REMEDY = "give a scene (.py), a contact log (.npz), a recording, or a folder of them"
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSide:
+    """A scene to be run, with what `render_scene` is given of it; None: the scene's own."""
+
+    path: str | Path
+    seconds: float | None = None
+    sr: int = 48_000
+    seed: int | None = None
+    microphones: Any = None
+    material: Any = None
+    residual: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One of the two. sound (channels, n) at sr; log, calls, scene: where they are known; names: of bodies and links
+    in calls; frames: a digest of each as it came, for runs that are to be the same. notes: what a user should read.
+    """
+
+    name: str
+    sound: KeptSound
+    sr: int
+    log: ContactLog | None = None
+    calls: tuple[Call, ...] = ()
+    scene: SceneSide | None = None
+    names: Mapping[tuple[Who, int], str] = field(default_factory=dict)
+    frames: tuple[bytes, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class OtherSound(SonicBulletError):
+    """A run sounds otherwise than the one that it is held against; its step says since when."""
+
+
+@dataclass(slots=True, eq=False)
+class _Run:
+    """Who watches a run: calls, what is added, frames. plan: what is asked instead; like: frames that it must have."""
+
+    side: str
+    plan: Plan | None = None
+    like: Sequence[bytes] | None = None
+    listener: Listener | None = None
+    frames: list[bytes] = field(default_factory=list)
+    calls: Any = None
+
+    def attached(self, options: dict[str, Any]) -> dict[str, Any]:
+        call = Call("attach", self.calls.steps, dict(options))
+        if self.plan is None:
+            self.calls.calls.append(call)
+            return options
+        first, arguments = self.plan.instead(call)
+        self.calls.make(first)
+        return dict(arguments) if arguments is not None else options
+
+    def listens(self, listener: Listener) -> None:
+        self.listener = self.listener or listener
+
+    def absent(self, body: Any) -> bool:
+        return isinstance(body, int) and body >= FIRST_ABSENT
+
+    def added(self, world: Any, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+        made: list[WantedBody] = []
+        for one in wanted:
+            call = self._adding(one)
+            if self.plan is None:
+                self.calls.calls.append(call)
+                made.append(one)
+                continue
+            first, arguments = self.plan.instead(call)
+            made += self._of_the_other(first)
+            if arguments is not None:
+                made.append(_changed(one, call.arguments, arguments))
+        if self.plan is not None:
+            made += self._of_the_other(self.plan.behind(self.calls.steps, "add"))
+        return made
+
+    def _adding(self, one: WantedBody) -> Call:
+        who = self.calls.who(one.body)
+        shapes = (tuple(shapes for _, shapes in one.parts),) if one.own_shapes else ()
+        rest = {x.name: getattr(one, x.name) for x in fields(one) if x.name not in OF_WHOM}
+        arguments = {"body": who, "links": one.links, **rest, "model": (one.model,), "shapes": shapes}
+        return Call("add", self.calls.steps, arguments, who, own=one)
+
+    def _of_the_other(self, calls: Sequence[Call]) -> Iterator[WantedBody]:
+        """Bodies of the other scene that are added here; all its other calls among them are made."""
+        for call in calls:
+            if call.name == "add":
+                yield replace(call.own, body=self.calls.ids[call.who])
+            else:
+                self.calls.make([call])
+
+    def look(self) -> None:
+        """Before each step: the frame of the one before."""
+        if self.listener is None or not self.calls.steps:
+            return
+        number = len(self.frames)
+        self.frames.append(frame_digest(self.listener.frame))
+        if self.like is not None and (number >= len(self.like) or self.like[number] != self.frames[-1]):
+            raise OtherSound(f"step {number} sounds otherwise")
+
+
+def frame_digest(frame: Array) -> bytes:
+    """What tells one frame from another."""
+    return hashlib.blake2b(frame.tobytes(), digest_size=8).digest()
+
+
+def _changed(one: WantedBody, before: Any, after: Any) -> WantedBody:
+    """The body as it is to be added instead."""
+    given = {
+        x.name: after[x.name] for x in fields(one) if x.name in after and x.name not in (*OF_WHOM, "model", "links")
+    }
+    given["model"] = after["model"][0]
+    if after["shapes"] is not before["shapes"] and after["shapes"]:
+        parts = zip(one.parts, after["shapes"][0], strict=False)
+        given |= {"parts": tuple((name, shapes) for (name, _), shapes in parts), "own_shapes": True}
+    return replace(one, **given)
+
+
+def run(
+    scene: SceneSide,
+    side: str,
+    *,
+    plan: Plan | None = None,
+    like: Sequence[bytes] | None = None,
+    say: Say | None = None,
+) -> Side:
+    """A scene run, its calls seen; plan: with what asked instead; like: frames that it must have, else OtherSound is
+    raised. Raises what `render_scene` does.
+    """
+    from sonic_bullet.listener.pybullet.interception import Interception
+    from sonic_bullet.scene import render_scene
+
+    watch = _Run(side, plan, like)
+    watch.calls = Interception(side, plan, watch.look)
+    with _own_modules(Path(scene.path)), watch.calls.watching(), directed(watch):
+        result = render_scene(
+            scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
+            material=scene.material, residual=scene.residual, say=say or (lambda text: None),
+        )  # fmt: skip
+    names = {(watch.calls.who(body.body_id), body.link): body.name for body in result.log.bodies}
+    return Side(
+        str(scene.path), result.sound, result.sr, result.log, tuple(watch.calls.calls), scene, names,
+        tuple(watch.frames), result.notes,
+    )  # fmt: skip
+
+
+@contextmanager
+def _own_modules(path: Path) -> Iterator[None]:
+    """What a scene imports from beside it is its own: the other version's are others, of the same names."""
+    before, folder = set(sys.modules), path.resolve().parent
+    try:
+        yield
+    finally:
+        for name in set(sys.modules) - before:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file and Path(file).resolve().is_relative_to(folder):
+                del sys.modules[name]
+
+
+def as_side(given: Any, side: str, say: Say | None = None) -> Side:
+    """What is given, run or read. Raises CompareError and what running and reading raises."""
+    if isinstance(given, Side):
+        return given
+    if isinstance(given, SceneSide):
+        return run(given, side, say=say)
+    if isinstance(given, ContactLog):
+        return of_log(given, f"log {side}")
+    name = as_path(given, side, REMEDY, error=CompareError)
+    place = Path(name)
+    if not place.is_file():
+        raise CompareError(f"no file {shown(name)}", REMEDY)
+    if place.suffix.lower() == ".py":
+        return run(SceneSide(name), side, say=say)
+    if place.suffix.lower() == ".npz":
+        return of_log(read_log(name), name)
+    samples, sr = read_audio(name)
+    if not np.size(samples):
+        raise CompareError(f"{shown(name)} holds no sample", "give a recording that has some")
+    return Side(name, KeptSound.of(np.atleast_2d(np.asarray(samples, float))), sr)
+
+
+def of_log(log: ContactLog, name: str) -> Side:
+    """A log and its sound. Raises CompareError where there is nothing in it."""
+    if not len(log.steps):
+        raise CompareError(f"{name} is an empty log: it has no step", "simulate the scene for longer")
+    return Side(name, render_kept(log), log.sr, log)
