@@ -39,8 +39,8 @@ BANDS_HZ = 100 * 10 ** (np.arange(16) / 10)
 HEAVY_DB = [67, 67.5, 68, 68.5, 69, 69.5, 70, 70.5, 71, 71.5, 72, 72, 72, 72, 72, 72]
 """Ln,r,0 of the reference floor [ISO 717-2, table 4]: a bare slab of 120 mm, A0 = 10 m²."""
 TIMBER_DB = [78, 78, 78, 78, 78, 78, 76, 74, 72, 69, 66, 63, 60, 57, 54, 51]
-"""Lt,r,0 of the light reference floors C1 and C2 [ISO 717-2, annex on lightweight floors]: boards on joists, under which
-hangs the ceiling that radiates.
+"""Lt,r,0 of the light reference floors C1 and C2 [ISO 717-2, annex on lightweight floors]: boards on joists, under
+which hangs the ceiling that radiates.
 """
 HAMMER_KG, DROP_M, RATE_HZ, HEAD_M = 0.5, 0.04, 10.0, 0.5
 ASSETS = Path(__file__).resolve().parents[1] / "assets"

@@ -104,8 +104,8 @@ def report(data: Path) -> Iterator[str]:
         f, change = both(data, thing)
         law = stand_in(material, scale)
         yield (
-            f"{thing}: {len(f)} lines in common, {f.min():.0f} … {f.max():.0f} Hz; decays differ by {quartiles(change)} dB "
-            f"(quartiles), |dB| with frequency: rank correlation {words(rank_correlation(f, np.abs(change)))}"
+            f"{thing}: {len(f)} lines in common, {f.min():.0f} … {f.max():.0f} Hz; decays differ by "
+            f"{quartiles(change)} dB (quartiles), |dB| with frequency: rank correlation {words(rank_correlation(f, np.abs(change)))}"
         )
         yield (
             f"    law, {len(law[0])} modes of a stand-in of {material}, {law[0].min():.0f} Hz and up: "
