@@ -105,7 +105,8 @@ def report(data: Path) -> Iterator[str]:
         law = stand_in(material, scale)
         yield (
             f"{thing}: {len(f)} lines in common, {f.min():.0f} … {f.max():.0f} Hz; decays differ by "
-            f"{quartiles(change)} dB (quartiles), |dB| with frequency: rank correlation {words(rank_correlation(f, np.abs(change)))}"
+            f"{quartiles(change)} dB (quartiles), |dB| with frequency: rank correlation "
+            f"{words(rank_correlation(f, np.abs(change)))}"
         )
         yield (
             f"    law, {len(law[0])} modes of a stand-in of {material}, {law[0].min():.0f} Hz and up: "
