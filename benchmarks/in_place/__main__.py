@@ -1,6 +1,6 @@
 """Does what lies on a table stop ringing as physics says? One table of what must hold: figure, bound, met or missed.
 
-    python -m benchmarks.in_place [--only spring_and_dashpot limits reciprocity passive loads rod bowl ring glass bar fork]
+    python -m benchmarks.in_place [--only PART ...]
 
 "Newton" is `support.in_place`, exact; "run" is `support.first_order`, whose poles scenes play.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from benchmarks.in_place import closed_forms, standing
+from benchmarks.in_place import closed_forms, forks, standing
 from benchmarks.in_place.lines import HEAD
 
 PARTS = {
@@ -24,6 +24,8 @@ PARTS = {
     "rim": standing.bowl_upside_down,
     "glass": standing.glass_on_its_foot,
     "bar": standing.bar_on_pads,
+    "fork": forks.fork_on_board,
+    "matched": forks.matched_board,
 }
 
 

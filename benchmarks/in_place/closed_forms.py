@@ -65,17 +65,17 @@ def limits() -> Iterator[Line]:
         found = solve(body, [NOTHING], stood(steel, (0, 5), 1e-6 * (1 + 0.1j)))
         worst = max(worst, np.abs(poles_of(found) / poles_of(in_place(body, [], [])) - 1).max())
     yield Line("K → 0: free poles", "<= 1e-6", f"{worst:.1e}", bool(worst <= 1e-6))
-    body, touches = steel.moving(0.0), stood(steel, (3,), 1e16)
+    body, touches = steel.moving(0.0), stood(steel, (3,), 1e15)
     basis = null_space(body.moves(touches[0].own)[:1])
-    held = np.sqrt(eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True))
+    held = np.sqrt(np.abs(eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True)))  # rigid: 0, nearly
     free = np.delete(np.arange(len(steel.lam)), 6)
-    elements = np.sqrt(eigh(steel.stiffness[np.ix_(free, free)], steel.mass[np.ix_(free, free)], eigvals_only=True))
+    elements = np.sqrt(np.abs(eigh(steel.stiffness[np.ix_(free, free)], steel.mass[np.ix_(free, free)], eigvals_only=True)))
     for name, solve in (("", in_place), (", as they run", first_order)):
         found = solve(body, [NOTHING], touches)
         got = found.omega_rad_s[found.newton]
         for what, want in (("the basis with that motion constrained", held), ("the elements with that node held", elements)):
             off = np.abs(got[:, None] / want[want > 30] - 1).min(axis=1).max()
-            yield Line(f"K → ∞, all modes: {what}{name}", "<= 1e-6", f"{off:.1e}", bool(off <= 1e-6))
+            yield Line(f"K = 1e15 N/m, all modes: {what}{name}", "<= 1e-6", f"{off:.1e}", bool(off <= 1e-6))
     offs, counts = [], (4, 6, 8, 12, 16)
     for modes in counts:
         found = in_place(steel.moving(0.0, modes), [NOTHING], stood(steel, (3,), 1e14, modes))
@@ -115,7 +115,7 @@ def reciprocity() -> Iterator[Line]:
         offs = []
         for k in (1.0, 10.0, 100.0):
             (a, b), there, back = pair(np.random.default_rng(5), k, 1, 0.5, (4, 3))
-            a, b = (replace_decay(x, 0 * x.decay_per_s) for x in (a, b))
+            a, b = (replace(x, decay_per_s=0 * x.decay_per_s) for x in (a, b))
             offs.append(np.abs(solve(a, [b], there).passes[0] / solve(b, [a], back).passes[0].T + 1).max())
         slope = np.diff(np.log10(offs))
         yield Line(
@@ -124,10 +124,6 @@ def reciprocity() -> Iterator[Line]:
             ", ".join(f"{off:.1e}" for off in offs),
             bool(offs[0] <= 1e-4 and (slope > 0.9).all()),
         )
-
-
-def replace_decay(one: Moving, decay: Array) -> Moving:
-    return Moving(one.omega_rad_s, decay, one.mass_kg, one.inertia_kg_m2)
 
 
 def passive() -> Iterator[Line]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.in_place.lines import Line
-from benchmarks.in_place.things import Stands, Thing, asset, bar, board, fork, lossless, rod, spring, stand, with_loss
+from benchmarks.in_place.things import Stands, Thing, asset, bar, board, lossless, rod, spring, stand, with_loss
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array
 from sonic_bullet.support import ContactSide, Region, contact_spring, pad_spring
@@ -35,13 +35,6 @@ def percents(values: Array) -> str:
 def poles_hold(stands: Stands) -> str:
     """How far Newton's poles are from the eigenproblem's."""
     return f"poles {np.nanmax(stands.off(stands.newton)):.0e} from exact"
-
-
-def upright(stands: Stands) -> Array:
-    """(m,) share of each new mode's motion at the first touch that is along z: of a rod's bending, vertical or not."""
-    place = stands.thing.place(np.array([0.02, 0, -1.0]))
-    shape = place.shape @ stands.newton.turn
-    return np.asarray(shape[2] ** 2 / np.maximum((shape**2).sum(axis=0), 1e-30))
 
 
 def rod_on_two_points() -> Iterator[Line]:

@@ -83,12 +83,13 @@ def lossless(name: str) -> Material:
 
 def with_loss(one: Thing, loss: float) -> Thing:
     """η ω/2 more of each mode."""
-    m = one.moving
-    return replace(one, moving=replace_moving(m, m.decay_per_s + loss * m.omega_rad_s / 2))
+    decay = one.moving.decay_per_s + loss * one.moving.omega_rad_s / 2
+    return replace(one, moving=replace(one.moving, decay_per_s=decay))
 
 
-def replace_moving(m: Moving, decay: Array) -> Moving:
-    return Moving(m.omega_rad_s, decay, m.mass_kg, m.inertia_kg_m2, m.plate_m_n_s, m.half_space_m_s_n)
+def with_plate(one: Thing, mobility_m_n_s: float) -> Thing:
+    """A board that yields as a wide plate, and not as its modes."""
+    return replace(one, moving=replace(one.moving, plate_m_n_s=mobility_m_n_s))
 
 
 @cache
@@ -109,20 +110,22 @@ def bar() -> Thing:
     return thing(Shape("box", np.array([0.3, 0.03, 0.006])), load_material("steel"))
 
 
-TINE_M, GAP_M, YOKE_M, STEM_M, WIDE_M, THICK_M = 0.105, 0.010, 0.014, 0.040, 0.006, 0.008
+TINE_M, GAP_M, STEM_M, WIDE_M, THICK_M = 0.105, 0.010, 0.040, 0.006, 0.008
 
 
 @cache
-def fork() -> Thing:
-    """Steel, one outline of 8 mm: two tines of 6 mm, their yoke, a stem whose foot is at z = 0."""
+def fork(yoke_m: float) -> Thing:
+    """Steel, one outline of 8 mm: two tines of 6 mm, their yoke, whose height says how much the foot moves, a stem whose
+    foot is at z = 0.
+    """
     half, stem = GAP_M / 2 + WIDE_M, WIDE_M / 2
     x = [-half, -GAP_M / 2, -stem, stem, GAP_M / 2, half]
-    z = [0, STEM_M, STEM_M + YOKE_M, STEM_M + YOKE_M + TINE_M]
+    z = [0, STEM_M, STEM_M + yoke_m, STEM_M + yoke_m + TINE_M]
 
     def keep(x: float, y: float, z: float) -> bool:
         if z < STEM_M:
             return abs(x) < stem
-        return z < STEM_M + YOKE_M or abs(x) > GAP_M / 2
+        return z < STEM_M + yoke_m or abs(x) > GAP_M / 2
 
     made = welded(cartesian(x, [0, THICK_M], z, [1] * 5, [1], [1, 1, 1], keep))
     shape = Shape("mesh", vertex_m=made.node_m[made.skin], face=made.face.astype(np.int32))
@@ -139,6 +142,7 @@ class Stands:
     """A thing at its touches: as it runs, Newton's poles, and the eigenproblem of all: s (k,), q (N + P, k)."""
 
     thing: Thing
+    board: Thing
     runs: InPlace
     newton: InPlace
     s: Array
@@ -158,16 +162,24 @@ class Stands:
         return np.where(how.newton, near, np.nan)
 
 
-def stand(one: Thing, on: Thing, points_m: Array, springs: list[ContactSpring], at_m: tuple[float, float]) -> Stands:
-    """A thing whose points (c, 3) touch a board's top, its own origin above (x, y) of the board."""
+def stand(
+    one: Thing, on: Thing, points_m: Array, springs: list[ContactSpring], at_m: tuple[float, float], *, eigen: bool = True
+) -> Stands:
+    """A thing whose points (c, 3) touch a board's top, its own origin above (x, y) of the board. eigen: with the
+    eigenproblem, which knows no wide plate.
+    """
     top = float(on.model.vertex_m[:, 2].max())
     touches = [
         Touch(0, one.place(p), on.place(np.array([p[0] + at_m[0], p[1] + at_m[1], top])), k)
         for p, k in zip(points_m, springs, strict=True)
     ]
+    if on.moving.plate_m_n_s:  # and nothing else is known of it
+        still = replace(on.moving, omega_rad_s=np.zeros(0), decay_per_s=np.zeros(0))
+        touches = [replace(t, other=replace(t.other, shape=np.zeros((3, 0)))) for t in touches]
+        on = replace(on, moving=still)
     parts = one.moving, [on.moving], touches
-    s, q = eigenproblem(*parts)
-    return Stands(one, first_order(*parts), in_place(*parts), s, q)
+    s, q = eigenproblem(*parts) if eigen else (np.zeros(0), np.zeros((0, 0)))
+    return Stands(one, on, first_order(*parts), in_place(*parts), s, q)
 
 
 def eigenproblem(body: Moving, partners: list[Moving], touches: list[Touch]) -> tuple[Array, Array]:
