@@ -37,6 +37,7 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     value, vector = np.linalg.eigh(stiff)
     chosen = likest(vector[:m] ** 2)
     q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
+    q = q * np.where(np.diag(q[:m]) < 0, -1, 1)  # an eigenvector has no sign: the mode's, so that what passes has one
     force = spring[:, None] * (both @ q)
     kept = (force**2 / spring[:, None]).sum(axis=0)
     s = 1j * omega

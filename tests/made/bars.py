@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eig, eigh
 
 from sonic_bullet.records import Array
 from sonic_bullet.support import ContactSpring, Moving, Place, Touch
@@ -78,3 +78,18 @@ def stood(bar: Bar, nodes: tuple[int, ...], spring_n_m: complex, modes: int | No
     """Touches of a bar at these nodes with a partner without motions of its own; they slide."""
     nowhere = Place(np.zeros((3, 0)), np.zeros(3), AXES)
     return [Touch(0, bar.place(node, modes), nowhere, ContactSpring(spring_n_m, 0.0)) for node in nodes]
+
+
+def exact_poles(bar: Bar, node: int, spring_n_m: complex, plate_m_n_s: float) -> Array:
+    """Poles of Mẅ + Cẇ + Kw + Bᵀf = 0, f = k(Bw − p), ṗ = y₀f, in the bar's own coordinates."""
+    n, b = len(bar.lam), bar.row(node)
+    scale = 1e4  # 1/s
+    a, mass = np.zeros((2, 2 * n + 1, 2 * n + 1), complex)
+    mass[:n, :n], mass[n : 2 * n, n : 2 * n], mass[-1, -1] = np.eye(n), bar.mass, 1
+    a[:n, n : 2 * n] = scale * np.eye(n)
+    a[n : 2 * n, :n] = -(bar.stiffness + spring_n_m * np.outer(b, b)) / scale
+    a[n : 2 * n, n : 2 * n] = -bar.damping()
+    a[n : 2 * n, -1] = spring_n_m * b / scale
+    a[-1, :n], a[-1, -1] = plate_m_n_s * spring_n_m * b, -plate_m_n_s * spring_n_m
+    s = eig(a, mass, right=False)
+    return np.asarray(s[(s.imag > 1.0) & np.isfinite(s)])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.linalg import eig, eigh, null_space
+from scipy.linalg import eigh, null_space
 
 from sonic_bullet.records import Array
 from sonic_bullet.support import ContactSpring, InPlace, KeptPlaces, Moving, Place, Touch, in_place
-from tests.made.bars import AXES, Bar, bar, stood
+from tests.made.bars import AXES, Bar, bar, exact_poles, stood
 
 NOTHING = Moving(np.zeros(0), np.zeros(0))
 STRENGTHS = np.geomspace(1e1, 1e10, 10)  # N/m: from 1e-5 of the first mode's own stiffness to a wall
@@ -23,21 +23,6 @@ def poles_of(found: InPlace) -> Array:
     return -found.decay_per_s + 1j * found.omega_rad_s
 
 
-def exact(bar: Bar, node: int, spring_n_m: complex, plate_m_n_s: float) -> Array:
-    """Poles of Mẅ + Cẇ + Kw + Bᵀf = 0, f = k(Bw − p), ṗ = y₀f, in the bar's own coordinates."""
-    n, b = len(bar.lam), bar.row(node)
-    scale = 1e4  # 1/s
-    a, mass = np.zeros((2, 2 * n + 1, 2 * n + 1), complex)
-    mass[:n, :n], mass[n : 2 * n, n : 2 * n], mass[-1, -1] = np.eye(n), bar.mass, 1
-    a[:n, n : 2 * n] = scale * np.eye(n)
-    a[n : 2 * n, :n] = -(bar.stiffness + spring_n_m * np.outer(b, b)) / scale
-    a[n : 2 * n, n : 2 * n] = -bar.damping()
-    a[n : 2 * n, -1] = spring_n_m * b / scale
-    a[-1, :n], a[-1, -1] = plate_m_n_s * spring_n_m * b, -plate_m_n_s * spring_n_m
-    s = eig(a, mass, right=False)
-    return np.asarray(s[(s.imag > 1.0) & np.isfinite(s)])
-
-
 @pytest.mark.parametrize("node", [0, 3])
 @pytest.mark.parametrize("plate_m_n_s", [0.0, 1 / 2000, 1 / 20])
 def test_a_spring_and_a_dashpot_at_a_point(steel: Bar, node: int, plate_m_n_s: float) -> None:
@@ -47,7 +32,7 @@ def test_a_spring_and_a_dashpot_at_a_point(steel: Bar, node: int, plate_m_n_s: f
         found = in_place(
             steel.moving(), [Moving(np.zeros(0), np.zeros(0), plate_m_n_s=plate_m_n_s)], stood(steel, (node,), k)
         )
-        want, got = exact(steel, node, k, plate_m_n_s), poles_of(found)[found.newton]
+        want, got = exact_poles(steel, node, k, plate_m_n_s), poles_of(found)[found.newton]
         off = np.abs(got[:, None] - want) / np.abs(got)[:, None]
         assert off.min(axis=1).max() < 1e-6, k
         assert len(set(off.argmin(axis=1))) == len(got)

@@ -1,0 +1,22 @@
+"""A line of the table: what must hold, the figure, whether it does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """part: name of the function that measured it; holds None: reported only."""
+
+    what: str
+    bound: str
+    figure: str
+    holds: bool | None
+
+    def row(self) -> str:
+        verdict = {True: "met", False: "**missed**", None: "reported"}[self.holds]
+        return f"| {self.what} | {self.bound} | {self.figure} | {verdict} |"
+
+
+HEAD = "| what | must hold | measured | |\n|---|---|---|---|"

@@ -1,0 +1,182 @@
+"""Bodies on a wooden board of 24 mm: how long they still ring, mode by mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.in_place.lines import Line
+from benchmarks.in_place.things import Stands, Thing, asset, bar, board, lossless, rod, spring, stand, with_loss
+from sonic_bullet.presets import load_material
+from sonic_bullet.records import Array
+from sonic_bullet.support import ContactSide, Region, contact_spring, pad_spring
+
+POINT_N_M, POINT_LOSS = 1.9e6, 0.02
+"""A smooth point of steel on wood, as the proof asks."""
+AT_M = (0.11, -0.07)
+"""Where on the board, from its middle: on none of its axes of symmetry."""
+FELT_N_M, RUBBER_N_M, PAD_LOSS = 1e4, 6e4, 0.2
+NODE = 0.2242
+"""Of a free bar's length: the node of its first mode."""
+
+
+def both(stands: Stands) -> tuple[tuple[str, Array, Array], ...]:
+    """Newton and what runs: name, T60 in s, T60 over free."""
+    return tuple(
+        (name, stands.t60_s(how), stands.kept(how)) for name, how in (("Newton", stands.newton), ("run", stands.runs))
+    )
+
+
+def percents(values: Array) -> str:
+    return " ".join(f"{100 * x:.3g}" for x in np.atleast_1d(values)) + " %"
+
+
+def poles_hold(stands: Stands) -> str:
+    """How far Newton's poles are from the eigenproblem's."""
+    return f"poles {np.nanmax(stands.off(stands.newton)):.0e} from exact"
+
+
+def rod_on_two_points() -> Iterator[Line]:
+    one, on = rod(), board()
+    for where, x in (("its ends", 0.08), ("0.7 of its half-length", 0.056), ("half its half-length", 0.04)):
+        points = np.array([[-x, 0, -0.006], [x, 0, -0.006]])
+        placed = stand(one, on, points, [spring(POINT_N_M, POINT_LOSS)] * 2, AT_M)
+        turned = placed.newton.turn
+        vertical = np.array([_vertical(one, turned[:, k]) for k in range(len(one.hz))])
+        low = vertical & (one.hz < 8e3)
+        figures, holds = [], True
+        for name, t60, _ in both(placed):
+            figures.append(f"{name} {t60[low].max():.2f}, {t60[one.hz < 15e3].max():.2f} s")
+            holds &= bool(t60[low].max() <= 0.5 and t60[one.hz < 15e3].max() <= 1.3)
+        free = np.log(1000) / one.moving.decay_per_s
+        yield Line(
+            f"rod on two smooth points at {where}: T60 of vertical bending < 8 kHz, of all < 15 kHz "
+            f"(free {free[one.hz < 15e3].min():.0f} to {free.max():.0f} s)",
+            "<= 0.5, 1.3 s",
+            "; ".join([*figures, poles_hold(placed)]),
+            holds,
+        )
+
+
+def _vertical(one: Thing, mix: Array) -> bool:
+    """Whether a mixture of the rod's modes bends up and down: its surface's mean square motion is more so than not."""
+    move = (one.resonator.shape.astype(float) @ mix) ** 2
+    return bool(move[:, 2].sum() > 1.2 * move[:, 1].sum() and move[:, 2].sum() > move[:, 0].sum())
+
+
+def orders(one: Thing) -> Array:
+    """(m,) waves round the rim of a body of revolution: of the radial motion of its highest points, largest radius."""
+    vertex = one.model.vertex_m
+    radius = np.hypot(*vertex[:, :2].T)
+    rim = np.abs(np.abs(vertex[:, 2]) - np.abs(vertex[:, 2]).max()) < 0.02 * np.ptp(vertex[:, 2])
+    rim &= radius > 0.98 * radius[rim].max()
+    if np.sum(rim) < 16:
+        raise SystemExit("no rim is found")
+    outward = vertex[rim, :2] / radius[rim, None]
+    radial = np.einsum("vx,vxm->vm", outward, one.resonator.shape[rim, :2].astype(float))
+    angle = np.arctan2(vertex[rim, 1], vertex[rim, 0])
+    waves = np.abs(np.exp(-1j * np.arange(12)[:, None] * angle) @ radial)
+    return np.asarray(waves.argmax(axis=0))
+
+
+def lowest_pair(one: Thing, n: int) -> Array:
+    """Indices of the two lowest modes of n waves."""
+    return np.asarray(np.flatnonzero(orders(one) == n)[:2])
+
+
+def ring_of(radius: float, z: float, count: int, turn: float = 0.3) -> Array:
+    angle = turn + 2 * np.pi * np.arange(count) / count
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count, z)])
+
+
+def bowl_on_its_foot() -> Iterator[Line]:
+    one, on = asset("bowl", load_material("steel")), board()
+    foot = float(one.model.vertex_m[:, 2].min())
+    for normal_n_m, loss in ((POINT_N_M, POINT_LOSS), (0.38e6, 0.02), (POINT_N_M, 0.05)):
+        placed = stand(one, on, ring_of(0.03, foot, 3), [spring(normal_n_m, loss)] * 3, AT_M)
+        for name, _, kept in both(placed):
+            low = [kept[lowest_pair(one, n)] for n in (2, 3, 4, 5)]
+            yield Line(
+                f"steel bowl on three points of its foot, {normal_n_m / 1e6:g} MN/m, η {loss:g}, {name}: T60 kept in the "
+                "pairs n = 2; 3, 4, 5",
+                "<= 25 %; >= 85 %",
+                "; ".join(percents(x) for x in low),
+                bool(low[0].max() <= 0.25 and min(x.min() for x in low[1:]) >= 0.85),
+            )
+    side = ContactSide.of(load_material("steel")), ContactSide.of(load_material("wood"))
+    load_n = one.moving.mass_kg * 9.81
+    whole = contact_spring(Region((0.03, 0.03), (0.0, 0.0)), side, load_n)
+    placed = stand(one, on, ring_of(0.03, foot, 24), [whole.share(1 / 24)] * 24, AT_M)
+    for name, _, kept in both(placed):
+        low = [kept[lowest_pair(one, n)] for n in (2, 3, 4, 5)]
+        yield Line(
+            f"steel bowl on its ring, one region, {abs(whole.normal_n_m) / 1e6:.2g} MN/m in all, {name}: T60 kept, "
+            "n = 2, 3, 4, 5",
+            "",
+            "; ".join(percents(x) for x in low),
+            None,
+        )
+
+
+def bowl_upside_down() -> Iterator[Line]:
+    one, on = asset("bowl", load_material("steel"), upside_down=True), board()
+    rim = float(one.model.vertex_m[:, 2].min())
+    for normal_n_m in (POINT_N_M, 0.38e6):
+        placed = stand(one, on, ring_of(0.074, rim, 3), [spring(normal_n_m, POINT_LOSS)] * 3, AT_M)
+        low = one.hz < 7e3
+        for name, t60, _ in both(placed):
+            short = np.mean(t60[low] <= 0.5)
+            yield Line(
+                f"… upside down on three points of its rim, {normal_n_m / 1e6:g} MN/m, {name}: share of its {low.sum()} "
+                "modes below 7 kHz with T60 <= 0.5 s",
+                ">= 70 %",
+                f"{short:.0%} (T60 {t60[low].min():.2f} to {t60[low].max():.2f} s)",
+                bool(short >= 0.7),
+            )
+
+
+def glass_on_its_foot() -> Iterator[Line]:
+    one, on = with_loss(asset("tumbler", lossless("glass")), 1e-3), board()
+    foot = float(one.model.vertex_m[:, 2].min())
+    placed = stand(one, on, ring_of(0.03, foot, 3), [spring(POINT_N_M, POINT_LOSS)] * 3, AT_M)
+    for name, _, kept in both(placed):
+        low = np.concatenate([kept[lowest_pair(one, n)] for n in (2, 3, 4)])
+        yield Line(
+            f"glass on three points of its foot, η 1e-3 and air, {name}: T60 kept in its rim's pairs n = 2, 3, 4",
+            ">= 85 %",
+            percents(low),
+            bool(low.min() >= 0.85),
+        )
+
+
+def bar_on_pads() -> Iterator[Line]:
+    one, on = bar(), board()
+    node, end = 0.3 * (0.5 - NODE), 0.149
+    pads = {
+        "felt": pad_spring(FELT_N_M, 0.3, PAD_LOSS, 1.0, 1.0),
+        "rubber": pad_spring(RUBBER_N_M, 0.3, PAD_LOSS, 1.0, 1.0),
+        "hard pegs": spring(POINT_N_M, POINT_LOSS),
+    }
+    bounds = {"felt": 0.9, "rubber": 0.75}
+    for what, k in pads.items():
+        placed = stand(one, on, np.array([[-node, 0, -0.003], [node, 0, -0.003]]), [k] * 2, AT_M)
+        kept = {name: x[0] for name, _, x in both(placed)}
+        off = float(placed.off(placed.newton)[0])
+        runs = float(placed.off(placed.runs)[0])
+        bound = bounds.get(what)
+        yield Line(
+            f"steel bar on two {what} at the nodes of mode 1: T60 kept in mode 1",
+            f">= {bound:.0%}" if bound else "exact eigenproblem, 1e-6",
+            f"Newton {kept['Newton']:.1%}, run {kept['run']:.1%}; poles {off:.0e}, {runs:.0e} from exact",
+            bool(min(kept.values()) >= bound) if bound else bool(off <= 1e-6),
+        )
+    for what, k in pads.items():
+        placed = stand(one, on, np.array([[-end, 0, -0.003], [end, 0, -0.003]]), [k] * 2, AT_M)
+        kept = {name: x[0] for name, _, x in both(placed)}
+        yield Line(
+            f"… on two {what} at its ends: T60 kept in mode 1",
+            "<= 5 %",
+            f"Newton {kept['Newton']:.2%}, run {kept['run']:.2%}",
+            bool(max(kept.values()) <= 0.05),
+        )
