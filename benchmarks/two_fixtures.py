@@ -41,7 +41,10 @@ OCTAVES = 0.5
 def lines(takes: list[list[dict[str, float]]]) -> tuple[Array, Array]:
     """Frequency in Hz and T60 in s of lines that two takes have, medians."""
     rows = [
-        (x["f_hz"], x["t60_s"]) for take in takes for x in take if x["r2"] >= LEAST_R2 and x["range_db"] >= LEAST_DB
+        (x["f_hz"], x["t60_s"])
+        for take in takes
+        for x in take
+        if x.get("t60_s") and x.get("r2", 0) >= LEAST_R2 and x.get("range_db", 0) >= LEAST_DB
     ]
     found = np.array(sorted(rows))
     groups = np.split(found, np.flatnonzero(np.diff(np.log(found[:, 0])) > NEAR / 2) + 1)
