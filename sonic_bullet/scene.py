@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -28,8 +28,8 @@ from sonic_bullet.listener import (
     Finding,
     diagnose_world,
     direct_client,
-    disconnect,
     links_with_shapes,
+    own_clients,
     run_script,
     watch_settings,
 )  # fmt: skip
@@ -195,10 +195,12 @@ class _Stage:
     listener: Listener | None = None
     client: Any = None
     folder: str | None = None
+    clients: ExitStack = field(default_factory=ExitStack)
 
     def __enter__(self) -> _Stage:
         with suppress(OSError):
             self.folder = os.getcwd()
+        self.clients.enter_context(own_clients())
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -207,8 +209,7 @@ class _Stage:
                 os.chdir(self.folder)
         if self.listener is not None:
             self.listener.detach()
-        if self.client is not None:
-            disconnect(self.client)
+        self.clients.close()
 
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
         with warnings.catch_warnings():
@@ -264,7 +265,7 @@ def _stage(path: str | Path, **options: Any) -> _Stage:
 
 def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     module = scene_module(stage.path)
-    stage.client = client = direct_client()
+    stage.client = client = direct_client()  # dropped, it would end before its world is looked at
     watch_settings(client)  # build sets friction and the like
     cast = user_code(stage.path, module.build, client)
     if not isinstance(cast, dict):

@@ -46,7 +46,10 @@ def compare(a: str, b: str | None, **options: Any) -> None:
     to, page = places(options["json_to"], options["report"])
     with clean_stdout(to) as say, ExitStack() as stack:
         with quiet_stderr():
-            import sonic_bullet.comparing.compared_sides  # noqa: F401  PyBullet says when it was built
+            import sonic_bullet.comparing.compared_sides
+
+            if _of_scenes(a, b):
+                import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
         if options["ref"] is not None:
             from sonic_bullet.comparing.revisions import at_revision
 
@@ -83,7 +86,7 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
 def _check_options(a: str, b: str | None, options: Any) -> None:
     """Raise CompareError for an option that says nothing of what is given."""
     of_scenes = [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]
-    scenes = a.lower().endswith(".py") or (b or a).lower().endswith(".py") or Path(a).is_dir()
+    scenes = _of_scenes(a, b)
     if a.lower().endswith(".json"):
         if not (b or "").lower().endswith(".py"):
             raise CompareError(f"{b} is no scene to hold against a baseline", "give a scene (.py) after the baseline")
@@ -91,6 +94,11 @@ def _check_options(a: str, b: str | None, options: Any) -> None:
             raise CompareError(f"a baseline says itself what {of_scenes[0]} would", f"leave {of_scenes[0]} out")
     elif of_scenes and not scenes:
         raise CompareError(f"{of_scenes[0]} is for scenes, and these are none", f"leave {of_scenes[0]} out")
+
+
+def _of_scenes(a: str, b: str | None) -> bool:
+    """Whether what is compared may hold a scene."""
+    return a.lower().endswith(".py") or (b or a).lower().endswith(".py") or Path(a).is_dir()
 
 
 def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
@@ -197,16 +205,16 @@ def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> No
     for scene in scenes:
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
-    root = Path(folder_place(folder))
+    root = Path(folder_place(folder, ""))
     root.mkdir(parents=True, exist_ok=True)
     to = places(*(str(root / f"{Path(scene).stem}.json") for scene in scenes))
     with quiet_stderr():
+        import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
         from sonic_bullet.comparing.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
         with status(scene) as tell:
             made = make_baseline(scene, reason, tell, runs)
         write_baseline(str(place), made)
         what = f"{len(made.features)} runs" if made.features else "no ensemble"
-        click.echo(
-            f"{scene} -> {place}: {what}, commit {made.commit[:12] or 'none'}{'' if made.clean else ' with changes'}"
-        )
+        commit = f"commit {made.commit[:12]}{'' if made.clean else ' with changes'}" if made.commit else "no commit"
+        click.echo(f"{scene} -> {place}: {what}, {commit}")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         links_called,
         links_with_shapes,
         open_world,
+        own_clients,
         watch_settings,
     )
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
@@ -49,6 +50,7 @@ __all__ = [
     "links_with_shapes",
     "module_steps",
     "open_world",
+    "own_clients",
     "run_script",
     "watch_settings",
 ]
@@ -69,6 +71,7 @@ _HOME = {
     "links_with_shapes": "pybullet.clients",
     "module_steps": "pybullet.hooks",
     "open_world": "pybullet.clients",
+    "own_clients": "pybullet.clients",
     "run_script": "pybullet.script",
     "watch_settings": "pybullet.clients",
 }

@@ -112,3 +112,11 @@ def test_a_baseline_comes_back_and_one_of_another_version_is_refused(tmp_path: P
     (tmp_path / "bad.json").write_text("[1")
     with pytest.raises(FileError, match="no baseline"):
         read_baseline(tmp_path / "bad.json")
+
+
+def test_a_baseline_into_a_file_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "there").write_text("kept")
+    done = shell("baseline", scene(tmp_path, "a.py"), "-o", tmp_path / "there")
+    assert isinstance(done.exception, FileError)
+    assert "cannot make the folder" in str(done.exception)
+    assert (tmp_path / "there").read_text() == "kept"

@@ -12,7 +12,7 @@ import pybullet as p
 import pytest
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.listener import run_script
+from sonic_bullet.listener import own_clients, run_script
 from sonic_bullet.records.errors import SceneError
 
 RAW = """
@@ -48,10 +48,8 @@ def script(tmp_path: Path) -> Any:
         path.write_text(text)
         return run_script(path, (before or opened.append, after or (lambda _: None)), seconds)
 
-    yield run
-    for client in set(opened):
-        if p.isConnected(client):
-            p.disconnect(client)
+    with own_clients():
+        yield run
 
 
 @pytest.mark.parametrize("text", [RAW, OBJECT])

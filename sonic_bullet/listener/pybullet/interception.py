@@ -10,7 +10,6 @@ name before goes unnoticed; a run that leaves no trace of its inputs is seen by 
 from __future__ import annotations
 
 import functools
-import gc
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -63,7 +62,7 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
     "changeConstraint": ("userConstraintUniqueId",),
 }  # fmt: skip
 """Arguments that are given by place, by the names that PyBullet has for them."""
-BESIDES = ("stepSimulation", "setAdditionalSearchPath", "connect")
+BESIDES = ("stepSimulation", "setAdditionalSearchPath")
 """Functions that are looked at though they set nothing."""
 BODY = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
 CONSTRAINT = "userConstraintUniqueId"
@@ -95,7 +94,6 @@ class Interception:
         self._shapes: dict[int, Mapping[str, Any]] = {}
         self._count = {"body": 0, "constraint": 0}
         self._folders: list[str] = []
-        self._clients: list[int] = []
         self._real: dict[str, Any] = {}
 
     def who(self, body: int, kind: str = "body") -> Who:
@@ -105,36 +103,18 @@ class Interception:
     @contextmanager
     def watching(self) -> Iterator[None]:
         """The module's functions give way while this lasts."""
-        gc.collect()  # a BulletClient that somebody dropped before would end the run's, whose number is the same
         self._real = {name: getattr(pybullet, name) for name in (*watched(), *BESIDES)}
         ours: dict[str, Any] = {name: functools.partial(self._called, name) for name in watched()}
-        ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search, "connect": self._connect}
+        ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search}
         forward = BulletClient.__getattr__
 
         def forwarded(client: Any, name: str) -> Any:
-            if (
-                name in ours and name != "connect" and vars(pybullet)[name] is ours[name]
-            ):  # else someone put his own over it
+            if name in ours and vars(pybullet)[name] is ours[name]:  # else someone put his own over it
                 return functools.partial(ours[name], physicsClientId=client._client)
             return forward(client, name)
 
         with patch.dict(vars(pybullet), ours), patch.object(BulletClient, "__getattr__", forwarded):
-            try:
-                yield
-            finally:
-                self._disconnect()
-
-    def _connect(self, *args: Any, **kwargs: Any) -> Any:
-        self._clients.append(self._real["connect"](*args, **kwargs))
-        return self._clients[-1]
-
-    def _disconnect(self) -> None:
-        """End the clients that the run opened and left: the next run's calls would go to them."""
-        if any(client >= 0 and pybullet.isConnected(client) for client in self._clients):
-            gc.collect()  # a BulletClient that is dropped later ends whoever has its number by then
-        for client in self._clients:
-            if client >= 0 and pybullet.isConnected(client):
-                pybullet.disconnect(client)
+            yield
 
     def _step(self, *args: Any, **kwargs: Any) -> Any:
         self.look()
@@ -238,7 +218,7 @@ class Interception:
     def _handle(self, key: str, value: Any) -> Any:
         if key in SHAPES:
             if isinstance(value, Mapping):
-                index = self._real["createCollisionShape"](**self._to_ask(value))
+                index = self._ask("createCollisionShape", self._to_ask(value), self.client)
                 self._shapes[int(index)] = value
                 return index
             return [self._handle(key, one) for one in value] if isinstance(value, tuple) else value

@@ -44,7 +44,7 @@ def run_script(
     that the script opened stay connected, so that what it built can be looked at. names: a dictionary that its
     top-level names go into, there also when it breaks. progress: given the share of ``seconds`` that is done. Raises
     SceneError that names the line where the script breaks, what the hooks raise, and SceneError where the file cannot
-    be read.
+    be read or a client is stepped that the script did not open.
     """
     path = Path(path)
     try:
@@ -83,6 +83,7 @@ def _stage(
     before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None
 ) -> Iterator[None]:
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
+    opened: set[int] = set()
     observed: list[int] = []
     real_time: set[int] = set()
     sliders: list[float] = []
@@ -90,11 +91,18 @@ def _stage(
 
     def connect(method: int = pybullet.DIRECT, *_: Any, **__: Any) -> int:
         with quiet_stdout():
-            return int(real_connect(pybullet.DIRECT))
+            number = int(real_connect(pybullet.DIRECT))
+        opened.add(number)
+        return number
 
     def step(physicsClientId: int = 0) -> Any:
         nonlocal elapsed_s
         if not observed:
+            if physicsClientId not in opened:
+                raise SceneError(
+                    f"the scene steps client {physicsClientId}, which it did not open",
+                    "connect in it, and disconnect what was open before it, where its calls go that name no client",
+                )
             observed.append(physicsClientId)
         if physicsClientId != observed[0]:
             return real_step(physicsClientId=physicsClientId)
