@@ -38,7 +38,9 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
     chosen = likest(vector[:m] ** 2)
-    vector[:, chosen] *= np.where(np.diag(vector[:m, chosen]) < 0, -1, 1)  # the mode's sign, so that what passes has one
+    vector[:, chosen] *= np.where(
+        np.diag(vector[:m, chosen]) < 0, -1, 1
+    )  # the mode's sign, so that what passes has one
     q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
     every = spring[:, None] * (both @ vector)
     force = every[:, chosen]
