@@ -39,7 +39,9 @@ BANDS_HZ = 100 * 10 ** (np.arange(16) / 10)
 HEAVY_DB = [67, 67.5, 68, 68.5, 69, 69.5, 70, 70.5, 71, 71.5, 72, 72, 72, 72, 72, 72]
 """Ln,r,0 of the reference floor [ISO 717-2, table 4]: a bare slab of 120 mm, A0 = 10 m²."""
 TIMBER_DB = [78, 78, 78, 78, 78, 78, 76, 74, 72, 69, 66, 63, 60, 57, 54, 51]
-"""Lt,r,0 of the light reference floors C1 and C2 [ISO 717-2, annex on lightweight floors]: boards on joists."""
+"""Lt,r,0 of the light reference floors C1 and C2 [ISO 717-2, annex on lightweight floors]: boards on joists, under
+which hangs the ceiling that radiates.
+"""
 HAMMER_KG, DROP_M, RATE_HZ, HEAD_M = 0.5, 0.04, 10.0, 0.5
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
 
@@ -48,9 +50,9 @@ def db(ratio: float) -> float:
     return float(10 * np.log10(ratio))
 
 
-def stopped() -> Iterator[str]:
+def stopped(sr: int = 1_536_000) -> Iterator[str]:
     """Kirchhoff 1876: ρ₀/2ρ_s of the energy of a sphere that stops at once."""
-    density, radius, speed, sr = 7850.0, 0.02, 1.0, 384_000
+    density, radius, speed = 7850.0, 0.02, 1.0
     volume = 4 / 3 * np.pi * radius**3
     rate = AIR.sound_speed_m_s / radius
     weight = 2 * jerk_coefficient(volume, AIR) * rate**2 / (density * volume)
@@ -69,8 +71,9 @@ def floor_power_w(material: Material, thickness_m: float, loss: float) -> Array:
     """(16,) sound power in W of one side, of the tapping machine on a plate that is large.
 
     Hammers do not bounce: p = m v falls as the pulse of m against the plate's mass at the contact; lines 2 p f_s |F̂|,
-    of which half their square is power in the plate through Re Y = 1/(8√(Dρh)), and ρ₀cσ/(ωηρh) of it leaves
-    [Cremer, Heckl & Petersson 2005, sec. 4.3.2, 6.9]; σ = 1/√(1 − f_c/f) above f_c, at most 1 below [σ of long plates].
+    of which half their square is power in the plate through Re Y = 1/(8√(Dρh)), and η_r/(η + 2η_r) of it leaves, η_r =
+    ρ₀cσ/(ωρh), since both sides radiate [Cremer, Heckl & Petersson 2005, sec. 4.3.2, 6.9]; σ = 1/√(1 − f_c/f) above
+    f_c, at most 1 below [σ of long plates].
     """
     v = np.sqrt(2 * 9.81 * DROP_M)
     stiff, surface = material.plane_strain_pa * thickness_m**3 / 12, material.density_kg_m3 * thickness_m
@@ -89,7 +92,8 @@ def floor_power_w(material: Material, thickness_m: float, loss: float) -> Array:
             f > 1.2 * critical, 1 / np.sqrt(np.maximum(1 - critical / f, 0.1)), np.minimum(f / critical, 1)
         )
         taken = 0.5 * force**2 * mobility * lines
-        power.append(np.mean(taken * RHO_C * sigma / (2 * np.pi * f * loss * surface)))
+        radiated = RHO_C * sigma / (2 * np.pi * f * surface)
+        power.append(np.mean(taken * radiated / (loss + 2 * radiated)))
     return np.array(power)
 
 

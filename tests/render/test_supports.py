@@ -11,8 +11,10 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.files import read_log
+from sonic_bullet.records import Material
 from sonic_bullet.render import render_log
 from tests.made.models import STEEL, WOOD, box_model
+from tests.made.residuals import modes, residual
 from tests.made.worlds import EDGES_M, TONES_HZ, box, plate_model
 
 DT = 1 / 240
@@ -26,12 +28,14 @@ def board(client: Any) -> int:
     return int(body)
 
 
-def landed(client: Any, seconds: float = 1.0, turn: Any = (0.02, 0.01, 0.0), **options: Any) -> sb.Listener:
+def landed(
+    client: Any, seconds: float = 1.0, turn: Any = (0.02, 0.01, 0.0), material: Material = STEEL, **options: Any
+) -> sb.Listener:
     """A steel plate that falls flat on a wooden board."""
     client.setGravity(0, 0, -9.81)
     listener = sb.attach(client, seed=2, **options)
     listener.add(board(client), material=WOOD, model=box_model((0.8, 0.6, 0.024), (90.0, 210.0, 480.0), WOOD))
-    listener.add(box(client, (0, 0, 0.03), turn=turn), material=STEEL, model=plate_model())
+    listener.add(box(client, (0, 0, 0.03), turn=turn), material=material, model=plate_model())
     for _ in range(round(seconds / DT)):
         client.stepSimulation()
     return listener
@@ -80,6 +84,20 @@ def test_a_body_that_is_lifted_has_its_own_poles_again(client: Any) -> None:
     for _ in range(30):
         client.stepSimulation()
     assert np.array_equal(state.ringing.law[:3, lanes], bank.law[:3, lanes])
+
+
+def test_a_line_of_a_residual_loses_what_the_mode_that_it_follows_loses(client: Any) -> None:
+    lines = ((TONES_HZ[0] + 40.0, 3.0, 0.3), (TONES_HZ[2] - 30.0, 5.0, 0.5))
+    source = modes(TONES_HZ, 10.0)
+    listener = landed(client, material=replace(STEEL, residual=residual(source, lines=lines)))
+    state = listener._synth._state
+    voice, row = state.voices[1], state.bank.body[1]
+    assert voice is not None
+    assert len(voice.follows) == len(lines)
+    lanes = slice(int(row["start"]), int(row["start"] + row["columns"]))
+    more = state.ringing.law[:2, lanes] - state.bank.law[:2, lanes]
+    assert (more[0] < 0).all()
+    assert more[:, len(TONES_HZ) :] == pytest.approx(more[:, voice.follows], rel=1e-9)
 
 
 def test_what_is_quenched_is_silent_on_both_sides(client: Any) -> None:

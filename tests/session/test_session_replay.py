@@ -102,9 +102,9 @@ def test_the_same_scene_twice_is_the_same_bytes(
 
 
 def test_another_rate_sounds_alike(log_and_sound: tuple[Path, np.ndarray]) -> None:
-    """The same log at 44.1 kHz: levels within 0.5 dB (the seeded surface differs between rates, strikes do not). Without
-    supports: poles change at the bank's blocks, which begin elsewhere at another rate, and the next strike meets what
-    rings in another phase.
+    """The same log at 44.1 kHz: levels within 0.5 dB (the seeded surface differs between rates, strikes do not).
+    Without supports: poles change at the bank's blocks, which begin elsewhere at another rate, and the next strike
+    meets what rings in another phase.
     """
     from dataclasses import replace
 

@@ -66,11 +66,13 @@ def test_any_cutting_gives_the_same_bits(bent: bool) -> None:
         assert np.array_equal(played(rng.integers(1, 6000, count), bent), whole)
 
 
-def test_a_mode_whose_pole_changes_goes_on_with_the_other_from_the_next_block() -> None:
-    """Closed form: e^{s t} up to the block, then e^{s' (t − t0)} times what was there; |z| never rises."""
-    bank, state = append(
-        *empty_bank(SR, passes=PASSES), [ModeSet(np.array([3000.0]), np.array([4.0]), np.ones((1, 1)))]
-    )
+@pytest.mark.parametrize("bend", [None, np.array([1e-15])])
+def test_a_mode_whose_pole_changes_goes_on_with_the_other_from_the_next_block(bend: Array | None) -> None:
+    """Closed form: e^{s t} up to the block, then e^{s' (t − t0)} times what was there; |z| never rises. A mode that
+    depends on its level starts from the new pole too.
+    """
+    one = ModeSet(np.array([3000.0]), np.array([4.0]), np.ones((1, 1)), bend=bend)
+    bank, state = append(*empty_bank(SR, passes=PASSES), [one])
     y = advance(bank, state, 1000, [Strike(0, 0.0, 1e-12, np.array([1.0]))])[0, 0]
     set_poles(bank, state, 0, np.array([-90 + 3010j]) / SR)
     y = np.concatenate([y, advance(bank, state, 3000)[0, 0]])
