@@ -10,8 +10,18 @@ from scipy.linalg import eigh, null_space
 
 from benchmarks.in_place.lines import Line
 from sonic_bullet.records import Array
-from sonic_bullet.support import ContactSide, ContactSpring, InPlace, Moving, Place, Region, Touch
-from sonic_bullet.support import contact_spring, first_order, in_place
+from sonic_bullet.support import (
+    ContactSide,
+    ContactSpring,
+    InPlace,
+    Moving,
+    Place,
+    Region,
+    Touch,
+    contact_spring,
+    first_order,
+    in_place,
+)
 from tests.made.bars import AXES, bar, exact_poles, stood
 
 NOTHING = Moving(np.zeros(0), np.zeros(0))
@@ -115,7 +125,7 @@ def pair(
 
 
 def reciprocity() -> Iterator[Line]:
-    """Mode j's answer to mode k is minus that of k to j, K φ_j φ_k/(λ_j − λ_k), but for what is of second order in K."""
+    """Mode j's answer to mode k is minus that of k to j, K φ_j φ_k/(λ_j − λ_k), up to second order in K."""
     for name, solve in (("Newton", in_place), ("as they run", first_order)):
         offs = []
         for k in (1.0, 10.0, 100.0):

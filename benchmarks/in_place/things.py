@@ -117,8 +117,8 @@ TINE_M, GAP_M, STEM_M, WIDE_M, THICK_M = 0.105, 0.010, 0.040, 0.006, 0.008
 
 @cache
 def fork(yoke_m: float) -> Thing:
-    """Steel, one outline of 8 mm: two tines of 6 mm, their yoke, whose height says how much the foot moves, a stem whose
-    foot is at z = 0.
+    """Steel, one outline of 8 mm: two tines of 6 mm, their yoke, whose height says how much the foot moves, a stem
+    whose foot is at z = 0.
     """
     half, stem = GAP_M / 2 + WIDE_M, WIDE_M / 2
     x = [-half, -GAP_M / 2, -stem, stem, GAP_M / 2, half]

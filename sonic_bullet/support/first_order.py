@@ -1,6 +1,6 @@
-"""Poles of a body while it touches, in a few milliseconds: springs exactly, what loses and what partners yield in one step.
+"""Poles of a body while it touches, in milliseconds: springs exactly, what loses and what partners yield in one step.
 
-    (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, −Φ_r)      the body's modes and rigid motions, its light partners' rigid motions
+    (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, −Φ_r)     the body's modes and rigid motions, light partners' rigid motions
     F_n = Re(K) B q_n,  s = jω_k                   forces at the touches, of each motion
     g = Y F_k,  Y = 1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)       what gives way beside the springs, and how far
     x = F_kᵀg,  ρ = gᵀRg/x,  R = Re K − Σ_{n≠k} F_n F_nᵀ/(ω_n² − ω_k²)     what all other motions hold against it
@@ -8,8 +8,8 @@
     s² + 2 s qᵀDq + ω² − 2δ/(1 + √(1 − 4ε)) = 0     δ taken on as the one pole c²/(D + s²) that has this value and slope
 
 Of det(1 + Y(s)(Re K − Σ_n F_n F_nᵀ/(ω_n² + s²))) = 0, the springs' ends held and then let go. To first order in x it is
-Rayleigh's quotient of `in_place`, whose Newton goes on to the exact pole at many times the cost: how far the two are from
-each other is in docs/measured/in-place.md.
+Rayleigh's quotient of `in_place`, whose Newton goes on to the exact pole at many times the cost: how far the two are
+from each other is in docs/measured/in-place.md.
 """
 
 from __future__ import annotations
