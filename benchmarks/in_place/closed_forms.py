@@ -10,8 +10,18 @@ from scipy.linalg import eigh, null_space
 
 from benchmarks.in_place.lines import Line
 from sonic_bullet.records import Array
-from sonic_bullet.support import ContactSide, ContactSpring, InPlace, Moving, Place, Region, Touch
-from sonic_bullet.support import contact_spring, first_order, in_place
+from sonic_bullet.support import (
+    ContactSide,
+    ContactSpring,
+    InPlace,
+    Moving,
+    Place,
+    Region,
+    Touch,
+    contact_spring,
+    first_order,
+    in_place,
+)
 from tests.made.bars import AXES, bar, exact_poles, stood
 
 NOTHING = Moving(np.zeros(0), np.zeros(0))
@@ -69,11 +79,16 @@ def limits() -> Iterator[Line]:
     basis = null_space(body.moves(touches[0].own)[:1])
     held = np.sqrt(np.abs(eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True)))  # rigid: 0, nearly
     free = np.delete(np.arange(len(steel.lam)), 6)
-    elements = np.sqrt(np.abs(eigh(steel.stiffness[np.ix_(free, free)], steel.mass[np.ix_(free, free)], eigvals_only=True)))
+    elements = np.sqrt(
+        np.abs(eigh(steel.stiffness[np.ix_(free, free)], steel.mass[np.ix_(free, free)], eigvals_only=True))
+    )
     for name, solve in (("", in_place), (", as they run", first_order)):
         found = solve(body, [NOTHING], touches)
         got = found.omega_rad_s[found.newton]
-        for what, want in (("the basis with that motion constrained", held), ("the elements with that node held", elements)):
+        for what, want in (
+            ("the basis with that motion constrained", held),
+            ("the elements with that node held", elements),
+        ):
             off = np.abs(got[:, None] / want[want > 30] - 1).min(axis=1).max()
             yield Line(f"K = 1e15 N/m, all modes: {what}{name}", "<= 1e-6", f"{off:.1e}", bool(off <= 1e-6))
     offs, counts = [], (4, 6, 8, 12, 16)
@@ -110,7 +125,7 @@ def pair(
 
 
 def reciprocity() -> Iterator[Line]:
-    """Mode j's answer to mode k is minus that of k to j, K φ_j φ_k/(λ_j − λ_k), but for what is of second order in K."""
+    """Mode j's answer to mode k is minus that of k to j, K φ_j φ_k/(λ_j − λ_k), up to second order in K."""
     for name, solve in (("Newton", in_place), ("as they run", first_order)):
         offs = []
         for k in (1.0, 10.0, 100.0):
@@ -165,7 +180,8 @@ def loads() -> Iterator[Line]:
     off = max(np.abs(slopes(region, (steel, oak)) - 1 / 3).max() for region in points.values())
     yield Line("K ∝ N^(1/3), smooth points, 0.01 to 100 N", "± 0.02", f"± {off:.1e}", bool(off <= 0.02))
     by_roughness = [
-        slopes(points["ball"], (steel, replace(oak, roughness_m=h)))[len(newton) // 2] for h in (0, 1e-6, 1e-5, 1e-4, 1e-3)
+        slopes(points["ball"], (steel, replace(oak, roughness_m=h)))[len(newton) // 2]
+        for h in (0, 1e-6, 1e-5, 1e-4, 1e-3)
     ]
     yield Line(
         "… exponent at 1 N, rms roughness 0, 1, 10, 100, 1000 µm",

@@ -29,7 +29,7 @@ def taken_per_s(stands: Stands, k: ContactSpring) -> float:
     s, at = stands.s, np.abs(stands.s.imag - stands.newton.omega_rad_s[0]).argmin()
     q, m = stands.q[:, at], len(one.lam)
     top = float(stands.board.model.vertex_m[:, 2].max())
-    below = stands.board.place(np.array([*AT_M, top]) + [0, FOOT_M[0, 1], 0])
+    below = stands.board.place(np.array([AT_M[0], AT_M[1] + FOOT_M[0, 1], top]))
     stretch = one.moves(stands.thing.place(FOOT_M[0])) @ q[:m] - on.moves(below) @ q[m:]
     lost = np.array([k.normal_n_m.imag, *2 * [k.tangential_n_m.imag]]) @ np.abs(stretch) ** 2 / (2 * s[at].imag)
     return float((on.decay @ np.abs(q[m:]) ** 2 + lost) / np.linalg.norm(q) ** 2)
@@ -68,7 +68,9 @@ def matched_board() -> Iterator[Line]:
     for yoke in YOKES_M:
         one = fork(yoke)
         impedance = one.moving.mass_kg * one.moving.omega_rad_s[0]
-        figures, holds = [], True
+        shape = one.place(FOOT_M[0]).shape[2, 0]
+        most = shape**2 * impedance / 4  # ½|v|² mω/2 of ½|z|², v what the foot would do if free
+        figures, holds = [f"{one.moving.decay_per_s[0] / (one.moving.decay_per_s[0] + most):.0%} by hand"], True
         for share in (0.1, 1.0, 10.0):
             placed = stand(one, with_plate(board(), 1 / (share * impedance)), FOOT_M, [k], AT_M, eigen=False)
             kept = [placed.kept(how)[0] for how in (placed.newton, placed.runs)]

@@ -44,7 +44,9 @@ class Thing:
         face, weight, _ = nearest(index, np.asarray(point_m, float)[None])
         corner = self.model.face[face[0]]
         at = weight[0] @ self.model.vertex_m[corner]
-        return Place(np.einsum("c,cxm->xm", weight[0], self.resonator.shape[corner].astype(float)), at - self.centre_m, AXES)
+        return Place(
+            np.einsum("c,cxm->xm", weight[0], self.resonator.shape[corner].astype(float)), at - self.centre_m, AXES
+        )
 
     @property
     def hz(self) -> Array:
@@ -115,8 +117,8 @@ TINE_M, GAP_M, STEM_M, WIDE_M, THICK_M = 0.105, 0.010, 0.040, 0.006, 0.008
 
 @cache
 def fork(yoke_m: float) -> Thing:
-    """Steel, one outline of 8 mm: two tines of 6 mm, their yoke, whose height says how much the foot moves, a stem whose
-    foot is at z = 0.
+    """Steel, one outline of 8 mm: two tines of 6 mm, their yoke, whose height says how much the foot moves, a stem
+    whose foot is at z = 0.
     """
     half, stem = GAP_M / 2 + WIDE_M, WIDE_M / 2
     x = [-half, -GAP_M / 2, -stem, stem, GAP_M / 2, half]
@@ -163,7 +165,13 @@ class Stands:
 
 
 def stand(
-    one: Thing, on: Thing, points_m: Array, springs: list[ContactSpring], at_m: tuple[float, float], *, eigen: bool = True
+    one: Thing,
+    on: Thing,
+    points_m: Array,
+    springs: list[ContactSpring],
+    at_m: tuple[float, float],
+    *,
+    eigen: bool = True,
 ) -> Stands:
     """A thing whose points (c, 3) touch a board's top, its own origin above (x, y) of the board. eigen: with the
     eigenproblem, which knows no wide plate.
@@ -188,7 +196,9 @@ def eigenproblem(body: Moving, partners: list[Moving], touches: list[Touch]) -> 
     both = np.concatenate([np.hstack([body.moves(t.own), -partner.moves(t.other)]) for t in touches])
     stiff = np.concatenate([[t.spring.normal_n_m, *2 * [t.spring.tangential_n_m]] for t in touches])
     lam, decay = np.append(body.lam, partner.lam), np.append(body.decay, partner.decay)
-    moves = np.concatenate([np.append(np.ones(len(one.omega_rad_s)), np.full(6, one.mass_kg > 0)) for one in (body, partner)])
+    moves = np.concatenate(
+        [np.append(np.ones(len(one.omega_rad_s)), np.full(6, one.mass_kg > 0)) for one in (body, partner)]
+    )
     some = np.flatnonzero(moves)
     both, lam, decay = both[:, some], lam[some], decay[some]
     n, scale = len(lam), np.sqrt(lam.max())

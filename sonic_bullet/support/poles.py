@@ -114,9 +114,18 @@ def _step(x: Touched, s: Array, q: Array) -> tuple[Array, Array]:
     own = _apart(own, at)
     lone = turned / own
     whole = inverse + _summed(at / own, x.own_square)
-    back = np.linalg.solve(whole, (lone @ x.own.T)[..., None])[..., 0]
+    back = _solved(whole, (lone @ x.own.T)[..., None])[..., 0]
     q = lone - at * (back @ x.own) / own
     return new, q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def _solved(whole: Array, right: Array) -> Array:
+    """whole⁻¹ right; on a pole itself, to the last bit, there is no inverse, and next to it the same motion."""
+    try:
+        return np.asarray(np.linalg.solve(whole, right))
+    except np.linalg.LinAlgError:
+        off = TINY * np.abs(whole).max(axis=(1, 2), keepdims=True) * np.eye(whole.shape[1])
+        return np.asarray(np.linalg.solve(whole + off, right))
 
 
 def _newton(x: Touched, start: Array, q_start: Array) -> tuple[Array, Array, Array]:

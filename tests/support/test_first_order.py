@@ -83,3 +83,37 @@ def test_each_mode_goes_on_as_the_one_that_is_most_like_it() -> None:
     assert likest(share).tolist() == [1, 0, 2]
     turned: Array = np.eye(30)[np.random.default_rng(0).permutation(30)]
     assert (turned[np.arange(30), likest(turned)] == 1).all()
+
+
+def test_what_passes_is_reciprocal_mode_by_mode() -> None:
+    """Bodies of several modes, which an eigensolver gives any sign: what is left goes with K."""
+    off = []
+    for stiff in (1.0, 10.0, 100.0):
+        rng = np.random.default_rng(5)
+        a, b = (
+            Moving(np.sort(rng.uniform(500, 5e4, n)), np.zeros(n), kg, 1e-3 * np.eye(3))
+            for n, kg in ((4, 0.2), (3, 0.5))
+        )
+        spring, own, other = ContactSpring(stiff + 0j, stiff + 0j), place(rng, a), place(rng, b)
+        there = first_order(a, [b], [Touch(0, own, other, spring)]).passes[0]
+        back = first_order(b, [a], [Touch(0, other, own, spring)]).passes[0]
+        off.append(np.abs(there / back.T + 1).max())
+    assert off[0] < 1e-3
+    assert np.diff(np.log10(off)) == pytest.approx([1.0, 1.0], abs=0.1)
+
+
+def test_a_foot_on_a_board_that_resonates() -> None:
+    """One touch, as a fork's: a body's own mass holds against what yields. Growth of the lowest mode's decay within 1 %
+    of the exact one over 20 boards; of Rayleigh's quotient alone it is off by a factor.
+    """
+    found = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        fork, board = body(rng, 8, 0.1, 430.0), body(rng, 60, 0.0, 60.0)
+        fork = Moving(fork.omega_rad_s, np.full(8, 0.1), fork.mass_kg, fork.inertia_kg_m2)
+        board = Moving(board.omega_rad_s, 0.015 * board.omega_rad_s)
+        small = Place(0.005 * rng.normal(size=(3, 8)) / np.sqrt(0.025), np.array([0, 0, -0.085]), np.eye(3))
+        touch = Touch(0, small, place(rng, board), ContactSpring(1.9e6 * (1 + 0.02j), 0j))
+        fast, exact = (solve(fork, [board], [touch]).decay_per_s[0] for solve in (first_order, in_place))
+        found.append((fast - fork.decay_per_s[0]) / (exact - fork.decay_per_s[0]))
+    assert found == pytest.approx(np.ones(20), abs=0.01)
