@@ -27,7 +27,8 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.plots.scene_plot import find_events
 from sonic_bullet.records import Array
-from sonic_bullet.render import Synthesizer, render_log, supports
+from sonic_bullet.render import Synthesizer, render_log
+from sonic_bullet.render.standing import supports
 from sonic_bullet.scene import render_scene
 from sonic_bullet.support import contact_spring
 from sonic_bullet.synth.bank.tile import BLOCK

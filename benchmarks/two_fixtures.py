@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Array
-from sonic_bullet.render import supports
+from sonic_bullet.render.standing import supports
 from sonic_bullet.synth.strikes import SPAN
 
 NEAR = 0.006

@@ -21,7 +21,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.render.contact_rows import enter_loads, orient
 from sonic_bullet.render.friction import advance_friction
-from sonic_bullet.render.held_contacts import choose_bodies, count_lifted, hold_contacts
+from sonic_bullet.render.standing.held_contacts import choose_bodies, count_lifted, hold_contacts
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
 from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH

@@ -17,9 +17,9 @@ from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
 from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
-from sonic_bullet.render.held_contacts import HELD, SAVED_S, STAND
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
+from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
 from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path

@@ -23,7 +23,7 @@ from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
-from sonic_bullet.render.supports import settle
+from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places

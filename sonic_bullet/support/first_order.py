@@ -2,7 +2,7 @@
 
     (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, −Φ_r)     the body's modes and rigid motions, light partners' rigid motions
     F_n = Re(K) B q_n,  s = jω_k                   forces at the touches, of each motion
-    g = Y F_k,  Y = 1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)       what gives way beside the springs, and how far
+    g = Y F_k,  Y = 1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)     what gives way beside the springs, and how far
     x = F_kᵀg,  ρ = gᵀRg/x,  R = Re K − Σ_{n≠k} F_n F_nᵀ/(ω_n² − ω_k²)     what all other motions hold against it
     δ = x/(1 + ρ),  ε = dδ/ds²                      exact at one touch, or of one thing that yields
     s² + 2 s qᵀDq + ω² − 2δ/(1 + √(1 − 4ε)) = 0     δ taken on as the one pole c²/(D + s²) that has this value and slope
@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, gathered, in_place
+from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, in_place, touched_rows
 from sonic_bullet.support.moving import Moving
 
 
@@ -29,7 +29,7 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
         return in_place(body, partners, touches)
-    x, row = gathered(body, partners, touches, squared=False)
+    x, row = touched_rows(body, partners, touches, squared=False)
     light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     yields = np.flatnonzero(x.other_lam > 0)
     both = np.hstack([x.own, -x.other[:, light]])

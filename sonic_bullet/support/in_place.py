@@ -20,8 +20,8 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.support.coupled_poles import Touched, inverse_w, poles, squares, start
 from sonic_bullet.support.moving import Moving, Place
-from sonic_bullet.support.poles import Touched, inverse_w, poles, squares, start
 from sonic_bullet.support.springs import ContactSpring
 
 STOPPED = 0.99
@@ -79,14 +79,14 @@ def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch])
             np.stack([body.decay_per_s, np.zeros(m), np.zeros(m)], axis=1),
             np.ones(m, bool),
         )
-    x, row = gathered(body, partners, touches)
+    x, row = touched_rows(body, partners, touches)
     found = _described(x, m, partners, *poles(x, *start(x, m)))
     force = np.zeros((3 * len(touches), m))
     force[row] = found.force_n_s
     return replace(found, force_n_s=force[::3])
 
 
-def gathered(
+def touched_rows(
     body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], *, squared: bool = True
 ) -> tuple[Touched, Array]:
     """All springs of all touches, and which of their (3c,) directions those are: what slides has none. squared: with

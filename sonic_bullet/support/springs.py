@@ -107,7 +107,7 @@ def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_
     c = np.array([side.compliance_per_pa for side in sides])
     a, b = region.half_axes_m(1 / c.sum(), load)
     smooth = np.pi * a / (c.sum() * float(ellipkm1((b / a) ** 2)))
-    lift = PERSSON * float(np.hypot(*(side.roughness_m for side in sides)))
+    lift = PERSSON * float(np.hypot(sides[0].roughness_m, sides[1].roughness_m))
     loss = float(c @ [side.loss_factor for side in sides] / c.sum())
     normal = (1 + 1j * loss) / (1 / smooth + lift / load)
     poisson = float(c @ [side.poisson for side in sides] / c.sum())

@@ -200,9 +200,9 @@ def _drive(
             if not pushes:
                 for k in range(drive.STEP):
                     push[k] = 0.0
-            heard = weight if j < 0 else pass_weight
+            read = weight if j < 0 else pass_weight
             at_w = w if j < 0 else w - sets
-            drive.run(driven, pole, modes, lo, lanes, heard, 2 * at_w * modes + lo, push, pushes, count, partial, keep)
+            drive.run(driven, pole, modes, lo, lanes, read, 2 * at_w * modes + lo, push, pushes, count, partial, keep)
         if j >= 0 or observed[w, b]:
             drive.across(partial, count, total)
             free = sound[w, b] if j < 0 else pass_sound[w - sets, b]

@@ -78,7 +78,7 @@ def pass_on(b, j, w, i, place, values, count, passes, ringing, passed):  # pragm
     first within its block.
     """
     phase, to = passes[b, j].phase, passes[b, j].to
-    ringing[to].heard = 1
+    ringing[to].passed_to = 1
     out = passed[w, to, i : i + count]
     for k in range(count):
         x = (place + k) / BLOCK
@@ -90,8 +90,8 @@ def pass_on(b, j, w, i, place, values, count, passes, ringing, passed):  # pragm
 def add_passed(n, ringing, observed, source, passed, loud):  # pragma: no cover - compiled
     """What was passed on joins what the bodies sound themselves; loud (b, 2): those now sound."""
     for b in range(len(ringing)):
-        if ringing[b].heard:
-            ringing[b].heard, loud[b, 0] = 0, 1
+        if ringing[b].passed_to:
+            ringing[b].passed_to, loud[b, 0] = 0, 1
             for w in range(len(observed)):
                 for k in range(n):
                     value = source[w, b, k] + passed[w, b, k]

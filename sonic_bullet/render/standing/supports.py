@@ -41,7 +41,7 @@ ON = 0.02
 """Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
 NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
-HEARD = 0.3
+LEAST_PASSED = 0.3
 """Of a body's own loudest weight: what passes on with less would add 0.4 dB to it, and is left out."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
@@ -109,7 +109,7 @@ def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns:
     for p, rate in zip(partners, placed.passes, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
         weight[:, : rate.shape[1]] = np.nan_to_num(state.resonators[p].weight @ rate)
-        if np.abs(weight[0]).max(initial=0.0) > HEARD * own or np.abs(weight[1:]).max(initial=0.0) > 0:
+        if np.abs(weight[0]).max(initial=0.0) > LEAST_PASSED * own or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
 
 
