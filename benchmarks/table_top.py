@@ -30,7 +30,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.render import Synthesizer, render_log
 from sonic_bullet.render.standing import supports
 from sonic_bullet.scene import render_scene
-from sonic_bullet.support import contact_spring
+from sonic_bullet.support import Region, contact_spring
 from sonic_bullet.synth.bank.tile import BLOCK
 from sonic_bullet.synth.strikes import SPAN
 
@@ -77,10 +77,10 @@ def now_per_s(synth: Synthesizer, b: int) -> Array:
 def rough_share(state: Any, b: int, touches: Any, load_n: Array) -> float:
     """Share of the contacts' compliance that is roughness, mean over a body's touches."""
     sides = state.resonators[b].side, state.resonators[0].side
-    smooth = tuple(replace(side, roughness_m=0.0) for side in sides)
-    bare = [supports.Region((0.0, 0.0), (1 / 0.005, 1 / 0.005))] * len(load_n)
+    smooth = replace(sides[0], roughness_m=0.0), replace(sides[1], roughness_m=0.0)
+    bare = [Region((0.0, 0.0), (1 / 0.005, 1 / 0.005))] * len(load_n)
     ratio = [
-        1 - contact_spring(r, sides, n).normal_n_m.real / contact_spring(r, smooth, n).normal_n_m.real  # type: ignore[arg-type]
+        1 - contact_spring(r, sides, n).normal_n_m.real / contact_spring(r, smooth, n).normal_n_m.real
         for r, n in zip(bare, load_n.tolist(), strict=True)
     ]
     return float(np.mean(ratio))

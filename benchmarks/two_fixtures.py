@@ -48,7 +48,8 @@ def lines(takes: list[list[dict[str, float]]]) -> tuple[Array, Array]:
     ]
     found = np.array(sorted(rows))
     groups = np.split(found, np.flatnonzero(np.diff(np.log(found[:, 0])) > NEAR / 2) + 1)
-    return np.array([np.median(group, axis=0) for group in groups if len(group) >= 2]).reshape(-1, 2).T[:2]
+    medians = np.array([np.median(group, axis=0) for group in groups if len(group) >= 2]).reshape(-1, 2)
+    return medians[:, 0], medians[:, 1]
 
 
 def both(data: Path, thing: str) -> tuple[Array, Array]:

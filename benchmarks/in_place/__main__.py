@@ -37,7 +37,7 @@ def main() -> None:
     for name in parser.parse_args().only:
         for line in PARTS[name]():
             print(line.row(), flush=True)
-            missed += line.holds is False
+            missed += line.holds is not None and not line.holds
     print(f"\n{missed} missed; {time.process_time() - begun:.0f} s of processor time")
 
 

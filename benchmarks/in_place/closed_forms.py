@@ -150,16 +150,16 @@ def passive() -> Iterator[Line]:
         body = pair(rng, 1.0, 0, 0.5)[0][0]
         z = rng.normal(size=6) + 1j * rng.normal(size=6)
         begun, worst, now = np.linalg.norm(z) ** 2, -np.inf, np.eye(6)
-        slowest = np.inf
+        slowest = float(np.inf)
         for _ in range(DRAWS):
             k = 10 ** rng.uniform(1, 9) * (1 + 10 ** rng.uniform(-4, 0) * 1j)
             (_, partner), there, _ = pair(rng, k, int(rng.integers(0, 5)), 10 ** rng.uniform(-2, 2))
             placed = solve(body, [partner], there)
-            slowest = min(slowest, placed.decay_per_s.min(), placed.shares.min())
+            slowest = float(np.min([slowest, placed.decay_per_s.min(), placed.shares.min()]))
             before = np.linalg.norm(z) ** 2
             z, now = placed.turn.T @ now @ z, placed.turn
             z = z * np.exp(-placed.decay_per_s * 1e-9)
-            worst = max(worst, (np.linalg.norm(z) ** 2 - before) / begun)
+            worst = float(np.maximum(worst, (np.linalg.norm(z) ** 2 - before) / begun))
         yield Line(
             f"passive, {name}: energy that a change adds, {DRAWS} draws of contacts that come and go",
             "< 1e-9 of its start",

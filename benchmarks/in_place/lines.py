@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """part: name of the function that measured it; holds None: reported only."""
+    """holds None: reported only."""
 
     what: str
     bound: str
     figure: str
     holds: bool | None
+
+    def __post_init__(self) -> None:
+        if self.holds is not None:  # numpy's False is not Python's, and would be counted as none
+            object.__setattr__(self, "holds", bool(self.holds))
 
     def row(self) -> str:
         verdict = {True: "met", False: "**missed**", None: "reported"}[self.holds]

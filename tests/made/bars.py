@@ -29,7 +29,7 @@ class Bar:
 
     def row(self, node: int) -> Array:
         """B (2n,): what picks w of a node."""
-        return np.eye(len(self.lam))[2 * node]
+        return np.asarray(np.eye(len(self.lam))[2 * node])
 
     def place(self, node: int, modes: int | None = None) -> Place:
         shape = np.zeros((3, len(self.lam[2:][:modes])))

@@ -100,7 +100,7 @@ def _audible(new: Array, free: Array) -> Array:
     """Poles as the bank can play them: what the touches stop or make too fast is gone within a block."""
     stopped = -STOPPED + 1j * np.minimum(free.imag, FASTEST_TURN)
     fast = ~np.isfinite(new) | (new.imag > FASTEST_TURN) | (new.imag <= 1e-6) | (-new.real > new.imag)
-    return np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag)
+    return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
 
 
 def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
@@ -127,7 +127,7 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
         if other not in partners:
             partners.append(other)
         places = [_places(state, both[s], held, s, axes) for s, axes in enumerate(_axes(held, quaternion[both]))]
-        curvature = sum(c for _, c, _ in places)
+        curvature = places[0][1] + places[1][1]
         load = held["load_n"][: held["count"]]
         for i, spring in enumerate(_springs(state, both, held, curvature, load)):
             touches.append(Touch(partners.index(other), places[side][0][i], places[1 - side][0][i], spring))
