@@ -21,7 +21,7 @@ from benchmarks.peers.tools import SR
 from sonic_bullet.records import Array
 from sonic_bullet.synth.bank import FLOOR, ModeSet, append, bank_kernel, empty_bank
 from sonic_bullet.synth.pulse import pulse_table
-from tests.made.banks import Force, Strike, advance, room
+from tests.made.banks import Force, Strike, advance, passed, room
 
 FRAMES = 32  # 6400 samples: 25 of the bank's blocks
 PULSE_S = 1e-4
@@ -80,8 +80,8 @@ def ringing(sizes: list[int], repeats: int = 5) -> float:
         for _ in range(FRAMES):
             bank_kernel.advance(
                 state.at, FRAME, float(SR), bank.body, bank.law, bank.weight, bank.observed, state.ringing, state.z,
-                state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free,
-                pulse_table(), *nobody, along, *scratch, source, pushed, sounds,
+                state.driven, state.sound, state.pole, state.block, *passed(bank, state, FRAME), state.strikes,
+                state.rows, state.free, pulse_table(), *nobody, along, *scratch, source, pushed, sounds,
             )  # fmt: skip
             state.at += FRAME
 

@@ -113,6 +113,8 @@ PLANTED = (
     of("drop", "block", "euler", more(0.02, 0), "start orientation"),
     of("bar", "bar", "shape", ["box", [0.12, 0.005, 0.0051]], "shape"),
     of("rods", "rod", "material", "aluminium", "material"),
+    of("drop", "board", "modes", {"count": 60, "mounting": "on floor"}, "mounting"),
+    of("rods", "board", "modes", {"count": 60, "mounting": 0.1}, "mounting"),
 )
 DECOYS = (
     of("drop", "bystander", "friction", 0.9, ""),

@@ -23,7 +23,7 @@ def build(client):
     table = client.createMultiBody(
         0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.45, 0.3, 0.012]), basePosition=[0, 0, -0.012]
     )
-    cast = {table: {"material": "wood", "count": 120}}
+    cast = {table: {"material": "spruce", "count": 120}}
 
     def place(material, volume, shape, position, euler=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
         mass = DENSITY_KG_M3[material] * volume

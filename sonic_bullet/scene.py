@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -50,13 +50,14 @@ Say = Callable[[str], None]
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderResult:
     """sound (channels, n) in pascals, which need not lie in memory, the log it comes from, and notes a user should
-    read.
+    read. lifted: see `Listener.lifted`.
     """
 
     sound: KeptSound
     log: ContactLog
     sr: int
     notes: tuple[str, ...] = ()
+    lifted: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def samples(self) -> Array:
@@ -73,6 +74,7 @@ def render_scene(
     microphones: MicrophoneLike | None = None,
     material: str | Path | Material | None = None,
     residual: bool = True,
+    supports: bool = True,
     progress: Progress | None = None,
     say: Say | None = None,
     at_end: Callable[[Listener], object] | None = None,
@@ -80,10 +82,11 @@ def render_scene(
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the
-    bodies of a plain script. residual: whether what materials sound beside their modes is sounded. progress is given
-    the share done, say what is being computed before the first step (modes: seconds a body). at_end: is shown the
-    listener while its world is still there. Raises SonicBulletError; where the scene broke or was interrupted under
-    way, the exception carries what was rendered so far as ``partial``.
+    bodies of a plain script. residual: whether what materials sound beside their modes is sounded. supports: whether
+    what a body stands on takes of its modes, as `attach` has it. progress is given the share done, say what is being
+    computed before the first step (modes: seconds a body). at_end: is shown the listener while its world is still
+    there. Raises SonicBulletError; where the scene broke or was
+    interrupted under way, the exception carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -91,6 +94,7 @@ def render_scene(
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
         "material": None if material is None else as_material(material),
         "residual": as_flag(residual, "residual"),
+        "supports": as_flag(supports, "supports"),
     }
     seconds = None if seconds is None else as_seconds(seconds, "seconds")
     as_call(progress, "progress"), as_call(say, "say")
@@ -190,6 +194,7 @@ class _Stage:
     microphones: tuple[Sensor, ...] | None
     material: Material | None
     residual: bool = True
+    supports: bool = True
     begin: Callable[[Listener], object] | None = None
     listener: Listener | None = None
     client: Any = None
@@ -218,7 +223,8 @@ class _Stage:
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """A listener that keeps its run, unless somebody hears it at once."""
         keeps = self.begin is None
-        return attach(client, sr=self.sr, microphone=microphones, seed=self.seed, keep_log=keeps, keep_sound=keeps)
+        how: dict[str, Any] = {"sr": self.sr, "seed": self.seed, "keep_log": keeps, "keep_sound": keeps}
+        return attach(client, microphone=microphones, **how, supports=self.supports)
 
     def ready(self) -> None:
         """The listener knows its bodies: say so, once."""
@@ -234,18 +240,19 @@ class _Stage:
     def result(self, notes: tuple[str, ...]) -> RenderResult:
         listener = self.need_listener()
         notes = (*notes, *listener.notes)
-        log = replace(listener.contacts, residual=self.residual)
+        log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
         if (
             listener.sr == self.sr
             and listener.keeps_sound
             and self.microphones is None
+            and listener.supports == log.supports
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
             sound = listener.kept_sound()
-            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
+            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
         sound = render_kept(log)
-        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)))
+        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

@@ -21,6 +21,9 @@ def test_every_scene_has_measurements_and_says_where_they_come_from(name: str) -
     told = json.loads((REPO / "scenes" / f"{name}.json").read_text(encoding="utf-8"))
     assert len(told["why"]) > 20
     assert len(told) >= 4
+    low, high = told["peak_db_spl"]
+    assert high - low <= 17, "a band of levels as wide as that says nothing"
+    assert "peak" in told["why"] or "dB" in told["why"]
 
 
 @pytest.mark.parametrize("name", ["bar", "sliding", "rolling"])

@@ -100,7 +100,10 @@ cli.add_command(baseline)
 @click.option(
     "--residual/--no-residual",
     default=None,
-    help="What presets sound beside their modes. [default: sounded; of a log, as it was rendered]",
+    help="What presets sound beside their modes. [default: it sounds; of a log, as it was rendered]",
+)
+@click.option(
+    "--supports/--no-supports", default=None, help="Bodies that stand on others ring less. [default: as above]"
 )
 @soundtrack_options
 def render(**options: Any) -> None:

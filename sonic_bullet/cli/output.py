@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -179,8 +179,13 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join(line(row) for row in [head, *rows])
 
 
-def described_render(log: ContactLog, report: AudioReport, notes: tuple[str, ...]) -> dict[str, Any]:
-    """What was rendered, as JSON."""
+def described_render(
+    log: ContactLog,
+    report: AudioReport,
+    notes: tuple[str, ...],
+    lifted: Mapping[str, tuple[int, int]] | None = None,
+) -> dict[str, Any]:
+    """What was rendered, as JSON. lifted: see `Listener.lifted`; None: not counted."""
     return {
         "output": report.path,
         "format": report.format,
@@ -198,6 +203,8 @@ def described_render(log: ContactLog, report: AudioReport, notes: tuple[str, ...
         "bodies": _bodies(log),
         "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in log.events],
         "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in log.changes],
+        "supports": log.supports,
+        "lifted": None if lifted is None else {name: list(of) for name, of in lifted.items()},
         "engine": dict(log.engine),
         "versions": dict(log.versions),
         "notes": list(notes),

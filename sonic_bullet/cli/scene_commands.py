@@ -57,6 +57,7 @@ def run_render(
     seed: int | None,
     material: str | None,
     residual: bool | None,
+    supports: bool | None,
     **soundtrack: Any,
 ) -> None:
     """The `render` command. soundtrack: options of `SoundtrackWish`.
@@ -73,7 +74,7 @@ def run_render(
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
-                wish = Wish(seconds, rate, microphones, seed, material, residual, progress, tell)
+                wish = Wish(seconds, rate, microphones, seed, material, residual, supports, progress, tell)
                 result: RenderResult | _Replay = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, to, output, peak_dbfs, lufs) from error
@@ -100,7 +101,8 @@ def run_render(
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, described_render(result.log, report, notes) | (made.described if made else {}))
+    lifted = None if isinstance(result, _Replay) else result.lifted
+    write_json(json_to, described_render(result.log, report, notes, lifted) | (made.described if made else {}))
 
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
@@ -183,6 +185,7 @@ class Wish:
     seed: int | None
     material: str | None
     residual: bool | None
+    supports: bool | None
     progress: Callable[[float], None]
     say: Callable[[str], None]
     at_end: Callable[[Listener], object] | None = None
@@ -201,6 +204,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         "microphones": places,
         "material": wish.material,
         "residual": wish.residual is not False,
+        "supports": wish.supports is not False,
     }
     return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
 
@@ -229,6 +233,8 @@ def replayed(path: str, wish: Wish) -> _Replay:
         log = replace(log, seed=wish.seed)
     if wish.residual is not None:
         log = replace(log, residual=wish.residual)
+    if wish.supports is not None:
+        log = replace(log, supports=wish.supports)
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(

@@ -31,7 +31,7 @@ class ContactLog:
     own names; what is not among them is not known. versions: of sonic_bullet, the packages that its numbers hang on and
     the simulator, by name; of older logs none. changes: what was set otherwise later, of engine and bodies, in order;
     `dynamics` and `settings` give what holds at a step. residual: whether it is rendered with what materials sound
-    beside their modes.
+    beside their modes; supports: whether with what bodies stand on.
     """
 
     bodies: tuple[Body, ...]
@@ -46,6 +46,7 @@ class ContactLog:
     versions: Mapping[str, str] = field(default_factory=dict)
     changes: tuple[Change, ...] = ()
     residual: bool = True
+    supports: bool = True
 
     def __post_init__(self) -> None:
         ids = ("give ids of bodies",)
@@ -63,6 +64,7 @@ class ContactLog:
             "versions": frozen_texts(self.versions, "log: versions"),
             "changes": as_kinds(self.changes, Change, "log: changes", "give a tuple of Change", error=LogError),
             "residual": as_flag(self.residual, "log: residual"),
+            "supports": as_flag(self.supports, "log: supports"),
             "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
         }
         for name, value in checked.items():

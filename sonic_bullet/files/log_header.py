@@ -59,7 +59,7 @@ class _Body(msgspec.Struct):
     model: int | None
     dynamics: dict[str, float] = {}
     options: ModalOptions | None = None
-    mounting: str = "free"
+    mounting: str | float = "free"
 
 
 class _Change(msgspec.Struct):
@@ -100,6 +100,7 @@ class LogHeader(msgspec.Struct):
     versions: dict[str, str] = {}
     changes: list[_Change] = []
     residual: bool = True
+    supports: bool = False
 
 
 def material_key(material: Material) -> bytes:

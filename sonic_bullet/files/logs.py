@@ -29,7 +29,7 @@ their own:
                      "body": index of who was moved, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
-      of each body: dynamics, options, mounting; of all: engine, versions, residual (see `Body`, `ContactLog`)
+      of each body: dynamics, options, mounting; of all: engine, versions, residual, supports (see `Body`, `ContactLog`)
     format "sonic-bullet-contacts/2"        the same without pose_body (a step's bodies are the first of the log),
           changes and all that the last line names; models' arrays are not deflated, and of their own types
     format "sonic-bullet-contacts/1"        and without events
@@ -99,6 +99,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
         versions={as_json_text(name): as_json_text(text) for name, text in log.versions.items()},
         changes=[pack_change(change) for change in log.changes],
         residual=bool(log.residual),
+        supports=bool(log.supports),
     )
     arrays: dict[str, Array | Column] = {
         **step_entries(log._steps),
@@ -166,4 +167,5 @@ def _unpack_log(
         versions=header.versions,
         changes=tuple(unpack_change(change) for change in header.changes),
         residual=header.residual,
+        supports=header.supports,
     )

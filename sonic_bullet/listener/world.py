@@ -16,6 +16,7 @@ from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.simulated import Simulator
 
 
@@ -88,10 +89,11 @@ class World(ABC):
         model: ModalModel | None = None,
         shapes: Sequence[Shape] = (),
         options: ModalOptions | None = None,
+        mounting: Mounting | None = None,
     ) -> Body:
         """Make a link known with what it is made of; its record, which `bodies` holds from now on.
 
-        options: what was asked of its modes, for the record.
+        options: what was asked of its modes, for the record. mounting: how it is held, None: as is usual.
 
         Raises SceneError.
         """

@@ -18,11 +18,10 @@ from sonic_bullet.records.bodies import Material, ModalModel
 from sonic_bullet.records.coerce import as_kind, as_number, as_text, as_whole, shown
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mounting import Mounting, as_mounting
 
 Values = Mapping[str, float]
 """Numbers by the simulator's own names for them; what is not there is not known."""
-MOUNTINGS = ("free",)
-"""How a body is held, as far as its modes and damping go: "free", by nothing."""
 
 
 class ReadOnlyDict(dict[str, Any]):
@@ -67,7 +66,8 @@ class Body:
     partner. model None: nothing of it vibrates. since_step: the first step in which it exists for the sound;
     until_step: the first in which it does not any more, or -1. dynamics: friction, restitution, damping, mass, as the
     simulator has them when the record begins (see `Change`). options: what was asked of its modes; None where nothing
-    was, or the model was given, or an older log does not say. mounting: one of MOUNTINGS.
+    was, or the model was given, or an older log does not say. mounting: how it is held
+    (`records.mounting`).
     """
 
     body_id: int
@@ -84,7 +84,7 @@ class Body:
     until_step: int = -1
     dynamics: Values = field(default_factory=dict)
     options: ModalOptions | None = None
-    mounting: str = "free"
+    mounting: Mounting = "free"
 
     def __post_init__(self) -> None:
         where = f"body {shown(self.body_id)} link {shown(self.link)}"
@@ -99,8 +99,7 @@ class Body:
         )
         if self.options is not None:
             as_kind(self.options, ModalOptions, f"{where}: options", "give ModalOptions, or none")
-        if self.mounting not in MOUNTINGS:
-            raise RecordError(f"{where}: mounting is {shown(self.mounting)}", "use the version that wrote the log")
+        store(self, mounting=as_mounting(self.mounting, f"{where}: mounting"))
 
 
 @dataclass(frozen=True, slots=True)

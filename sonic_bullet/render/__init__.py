@@ -109,7 +109,7 @@ def _blocks(
     log: ContactLog, residual: bool, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
 ) -> Iterator[Array]:
     make_radiation_known(log, say)
-    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, keep=False)
+    synth = _synthesizer(log, residual)
     quenches = quenched_steps(log)
     done = 0
     for steps in together(log.steps, quenches):
@@ -120,6 +120,12 @@ def _blocks(
         if progress is not None:
             progress(done / len(log.steps))
     yield synth.rest()
+
+
+def _synthesizer(log: ContactLog, residual: bool) -> Synthesizer:
+    return Synthesizer(
+        sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, supports=log.supports, keep=False
+    )
 
 
 def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:
@@ -159,7 +165,7 @@ def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> 
     say is called with what is being computed before the first step.
     """
     make_radiation_known(log, say)
-    synth = Synthesizer(sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=log.residual, keep=False)
+    synth = _synthesizer(log, log.residual)
     quenches = quenched_steps(log)
     for number, step in enumerate(log.steps):
         if number in quenches:

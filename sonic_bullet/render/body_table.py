@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.tables import BODY, FACE, NODE
+from sonic_bullet.support import ContactSide
 from sonic_bullet.synth.strikes import SPAN
 
 EDGE_RADIUS_SHARE = 0.005
@@ -66,6 +67,12 @@ class _Growing:
         return at
 
 
+def pressed_pa(material: Material, side: ContactSide) -> float:
+    """E/(1 − ν²) where a material is touched: of its softest axis, for boards are pressed across their grain."""
+    soft, usual = 1 / side.compliance_per_pa, material.plane_strain_pa
+    return soft if soft < 0.99 * usual else usual  # to the bit where no axis is softer
+
+
 class BodyTable:
     """bodies (b,) of BODY; faces of FACE and nodes of NODE, shapes (float32) and frequencies in Hz, all flat and found
     by the numbers of a body's row. They are other arrays after `add`; what was in them stays where it was.
@@ -108,7 +115,7 @@ class BodyTable:
         material = body.material
         row = np.zeros(1, BODY)
         row["mass_kg"], row["inertia_kg_m2"] = body.mass_kg, body.inertia_kg_m2
-        row["modulus_pa"] = np.inf if material is None else material.plane_strain_pa
+        row["modulus_pa"] = np.inf if material is None else pressed_pa(material, resonator.side)
         row["restitution"] = np.inf if material is None else material.restitution
         row["roughness_m"] = 0.0 if material is None else material.roughness_m
         row["hurst"] = 0.7 if material is None else material.hurst

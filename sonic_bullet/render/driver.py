@@ -2,6 +2,7 @@
 
     CONTACT rows, poses of a step -> take: ROW, load histories, into a window of SPAN steps
         -> excite: PULSE (strikes), drives (friction) of the step LOOKAHEAD before
+        -> settle: contacts that are held, and bodies whose poles they change, which Python makes (supports.py)
         -> ring: modes and translations of all bodies -> source (W, b, n), pushed (b, 3, n)
         -> hear: through the air to the microphones; other sensors sum their weight set over the bodies
 
@@ -20,6 +21,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.render.contact_rows import enter_loads, orient
 from sonic_bullet.render.friction import advance_friction
+from sonic_bullet.render.standing.held_contacts import choose_bodies, count_lifted, hold_contacts
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
 from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
@@ -31,10 +33,12 @@ from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
 
-TO_GROW, PAUSED, BROKEN = -1, -2, -3
+TO_GROW, PAUSED, BROKEN, TO_SETTLE = -1, -2, -3, -4
 """Why the driver came back early: a table is too small; asked to stop before `hear`; what must not happen, a sum that
-is no number or a strike without a place. Else it is DONE, or what `path_kernel.hear` said.
+is no number or a strike without a place; poles are to be made. Else it is DONE, or what `path_kernel.hear` said.
 """
+ANEW, RINGS, EXCITED = 0, 1, 2
+"""How far the first step is: nothing is done; it rings, and is to be heard; its pulses and drives are there."""
 STEP = np.dtype(
     [
         ("dt_s", "f8"),  # of the step taken in
@@ -120,10 +124,24 @@ def excite(
 
 
 @njit(nogil=True, error_model="numpy")
+def settle(
+    number, window, rows, pairs, active, counts, held, stand, credit_s, bodies, bank_body, ringing, law, z, driven,
+    pulses, found, drive_body, drives,
+):  # fmt: skip  # pragma: no cover - compiled
+    """What carries whom in step ``number``: how many bodies' poles are to be made."""
+    here = window[number % SPAN]
+    hold_contacts(pairs, active, counts[0], held, stand, bodies, rows, here.row[0], here.row[1], here.dt_s)
+    count_lifted(stand, bank_body, ringing, law, z, driven)
+    return choose_bodies(
+        pairs, active, counts[0], held, stand, bodies, ringing, pulses, found, drive_body, drives, here.dt_s, credit_s
+    )
+
+
+@njit(nogil=True, error_model="numpy")
 def ring(
     step, sr, found, pulses, push, drives, drive_body, force, gain0, gain1, direction0, direction1, x, bank_body, law,
-    weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz, source, pushed,
-    sounds,
+    weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight, pass_sound, passed, strikes,
+    phasors, free_strikes, hertz, source, pushed, sounds,
 ):  # fmt: skip  # pragma: no cover - compiled
     """The step's pulses and drives on the bank: source (W, b, n or more) and pushed (b, 3, n or more). False where a
     pulse found no place.
@@ -134,8 +152,9 @@ def ring(
     )  # fmt: skip
     n = step.count
     bank_kernel.advance(
-        step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
-        free_strikes, hertz, drives, drive_body, force, gain0, gain1, direction0, direction1, x,
+        step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
+        pass_weight, pass_sound, passed, strikes, phasors, free_strikes, hertz, drives, drive_body, force, gain0,
+        gain1, direction0, direction1, x,
         np.empty(len(bank_body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
         np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source,
         pushed, sounds,
@@ -166,26 +185,28 @@ def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - 
 
 
 @njit(nogil=True, error_model="numpy")
-def advance_steps(
-    first, taken, start, pause, resume, sr, steps, contacts, position, quaternion, teleported,
+def advance_steps(  # noqa: PLR0911 - one return a reason to come back
+    first, taken, start, pause, resume, found, drives, sr, steps, contacts, position, quaternion, teleported,
     window, window_position, window_quaternion, window_teleported, rows,
     bodies, faces, nodes, shapes, frequency_hz, spectrum, pairs, active, counts, free, gain,
-    pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
-    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors, free_strikes, hertz,
-    source, pushed, sounds, microphone_m, samples_per_m, sources, places, lines, memory, taps, reads, apart, pressure,
-    out,
+    held, stand, credit_s, pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
+    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight, pass_sound,
+    passed, strikes, phasors, free_strikes, hertz, source, pushed, sounds, microphone_m, samples_per_m, sources, places,
+    lines, memory, taps, reads, apart, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Steps ``first`` … of the table into out (channels, samples of all of them): how many are done, why it came back,
     and how many pulses and drives the last one has.
 
     taken: number of the first step of the table; start: sample of out's first. contacts: of all steps; position (k, b,
     3), quaternion (k, b, 4), teleported (k, b). pressure (microphones, as out). pause: come back before the first step
-    is heard; resume: the first step rings already, and is to be heard. apart 1: out is (bodies·channels, …) and
-    pressure (bodies·microphones, …), body by body, nothing summed.
+    is heard; resume: how far that step is; found, drives: its pulses and drives, where it is EXCITED. credit_s (1,),
+    (0,) where nothing supports. apart 1: out is (bodies·channels, …)
+    and pressure (bodies·microphones, …), body by body, nothing summed.
     """
-    found, drives, done = 0, 0, 0
+    done = 0
     for i in range(first, len(steps)):
-        step, number, anew = steps[i], taken + i, i > first or not resume
+        step, number, far = steps[i], taken + i, resume if i == first else ANEW
+        anew = far == ANEW
         if anew:
             new = step.row[1] - step.row[0]
             bound = counts[0] + new
@@ -203,21 +224,27 @@ def advance_steps(
             x = np.empty(n)
             for k in range(n):
                 x[k] = min(max((k + step.offset) / (dt_s * sr), 0.0), 1.0)
+            signal = force[: len(drive_slot) * n].reshape((len(drive_slot), n))
             if anew:
-                signal = force[: len(drive_slot) * n].reshape((len(drive_slot), n))
                 found, drives = excite(
                     number, step.quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces,
                     nodes, shapes, frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, signal, gain0,
                     gain1, direction0, direction1, drive_body, drive_slot,
                 )  # fmt: skip
+                if len(credit_s) > 0 and settle(
+                    number, window, rows, pairs, active, counts, held, stand, credit_s, bodies, bank_body, ringing, law,
+                    z, driven, pulses, found, drive_body, drives,
+                ):  # fmt: skip
+                    return done, TO_SETTLE, found, drives
+            if far != RINGS:
                 if not ring(
                     step, sr, found, pulses, push, drives, drive_body, signal, gain0, gain1, direction0, direction1, x,
-                    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, phasors,
-                    free_strikes, hertz, source, pushed, sounds,
+                    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
+                    pass_weight, pass_sound, passed, strikes, phasors, free_strikes, hertz, source, pushed, sounds,
                 ):  # fmt: skip
                     return done, BROKEN, found, drives
-            if pause and anew:
-                return done, PAUSED, found, drives
+                if pause:
+                    return done, PAUSED, found, drives
             status = finish(
                 number, step, start, x, window_position, window_teleported, source, pushed, microphone_m,
                 samples_per_m, sources, places, lines, memory, taps, reads, apart, pressure, out,

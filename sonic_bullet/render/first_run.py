@@ -18,7 +18,7 @@ from numba import types
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.render import driver
 
-STAGES = (driver.excite, driver.ring, driver.finish, driver.take)
+STAGES = (driver.excite, driver.ring, driver.finish, driver.take, driver.settle)
 """Those that take longest first. Whatever types they are given, the driver has those compiled that it needs."""
 SAMPLES = types.Array(types.float64, 1, "C")
 INNER = {

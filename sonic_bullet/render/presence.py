@@ -85,7 +85,22 @@ def release(state: State) -> None:
     stays[[grain.body for grain in state.grains]] = True
     stays[[body for low, high, _ in state.rubs for body in (low, high)]] = True
     if not stays.all():
+        state.lifted = lifted(state, np.flatnonzero(~stays))
         subset(state, np.flatnonzero(stays))
+
+
+def lifted(state: State, who: Array | None = None) -> dict[str, tuple[int, int]]:
+    """By name of each body so far: steps that it rang on contacts, and those of them in which Σ|F| of what rings
+    exceeded some contact's load, so that it would lift: beyond the contacts' law. who: of the tables, None: all of
+    them, beside those who left.
+    """
+    found = dict(state.lifted)
+    for b in range(len(state.stand)) if who is None else who.tolist():
+        rang, beyond = int(state.stand["steps"][b]), int(state.stand["lifted"][b])
+        if rang:
+            before = found.get(state.resonators[b].body.name, (0, 0))
+            found[state.resonators[b].body.name] = before[0] + rang, before[1] + beyond
+    return found
 
 
 def subset(state: State, keep: Array) -> None:
@@ -97,6 +112,7 @@ def subset(state: State, keep: Array) -> None:
     follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in state.voices]
     state.table = state.table.subset(keep, list(zip(state.resonators, follows, strict=True)))
     state.bank, state.ringing = bank.subset(state.bank, state.ringing, keep)
+    state.stand = state.stand[keep]
     state.travelling = path.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
     state.pairs.subset(number)

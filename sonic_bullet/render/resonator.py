@@ -22,8 +22,12 @@ from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
+from sonic_bullet.records.mounting import Mounting, loss_factor, radiating_share
+from sonic_bullet.support import ContactSide, Moving
 from sonic_bullet.synth.bank import Translation, audible
 
+RIGID = ContactSide(np.inf, 0.3, 0.0, 0.0)
+"""Of a partner of which nobody said what it is made of."""
 FASTEST_RIGID = 0.6
 """Share of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer hangs on w."""
 
@@ -33,7 +37,8 @@ class Resonator:
     """omega_rad_s, decay_per_s (m,): with the air's damping, once. weight (w, m): complex, one row a weight set (row 0:
     pressure at 1 m). bend, damping_growth (m,): of frequency per |z|², of decay by
     (damping_growth·|z|)^damping_growth_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
-    size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played.
+    size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played. moving,
+    side: what it yields where it is pushed, and what it is there.
     """
 
     body: Body
@@ -46,6 +51,8 @@ class Resonator:
     radius_m: float
     translation: Translation | None
     dropped: int
+    moving: Moving
+    side: ContactSide
     bend: Array | None = None
     damping_growth: Array | None = None
     damping_growth_power: float = 1.0
@@ -69,6 +76,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     """
     model = body.model
     readers = weight_sets(sensors)
+    side = RIGID if body.material is None else ContactSide.of(body.material)
     if model is None:
         none = np.zeros(0)
         return Resonator(
@@ -82,8 +90,10 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             0.0,
             None,
             0,
+            Moving(none, none, body.mass_kg, body.inertia_kg_m2),
+            side,
         )
-    keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr)
+    keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr, body.mounting)
     weight = np.zeros((1 + len(readers), len(omega)), complex)
     weight[0] = pressure
     for row, sensor in enumerate(readers, start=1):
@@ -112,6 +122,8 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         radius,
         translation,
         dropped,
+        Moving(omega, decay, body.mass_kg, body.inertia_kg_m2),
+        side,
         bend,
         damping_growth,
         model.damping_growth_power,
@@ -134,12 +146,14 @@ class _Played(NamedTuple):
 
 
 @WhileAlive
-def _played(model: ModalModel, air: Air, sr: int) -> _Played:
-    """Once for all bodies that share a model (records are compared by identity)."""
+def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played:
+    """Once for all bodies that share a model and are held alike (records are compared by identity)."""
     pressure, extra = radiation_of(model, air)
+    pressure, extra = np.sqrt(radiating_share(mounting)) * pressure, radiating_share(mounting) * extra
     omega0_squared = model.omega0_squared_per_s2
     own = np.nan_to_num(model.decay_per_s)
     decay = own if model.includes_radiation else own + extra
+    decay = decay + loss_factor(mounting) / 2 * np.sqrt(omega0_squared)
     omega = np.sqrt(np.maximum(omega0_squared - decay**2, 0.0))
     keep = audible(omega, decay, sr)
     shape = np.ascontiguousarray(model.shape[:, :, keep])

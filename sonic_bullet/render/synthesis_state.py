@@ -19,6 +19,7 @@ from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
+from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
 from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
@@ -33,7 +34,8 @@ from sonic_bullet.synth.strikes import SPAN
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
     """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium; residual: whether
-    those of materials are heard; apart: whether frames are (b·channels, n), body by body, instead of their sum.
+    those of materials are heard; supports: whether what bodies stand on acts on their modes; apart: whether frames are
+    (b·channels, n), body by body, instead of their sum.
     """
 
     sr: int
@@ -42,6 +44,7 @@ class Setup:
     air: Air
     residual: bool = True
     apart: bool = False
+    supports: bool = True
 
     @property
     def microphone_m(self) -> Array:
@@ -105,7 +108,8 @@ class Window:
 @dataclass(slots=True, eq=False)
 class TouchingPairs:
     """Bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many are in
-    use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body.
+    use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body; held (slots,)
+    HELD.
     """
 
     pair: Array
@@ -113,6 +117,7 @@ class TouchingPairs:
     count: Array
     free: Array
     gain: Array
+    held: Array
 
     def subset(self, number: Array) -> None:
         """number (b,): the new one of each body."""
@@ -133,6 +138,7 @@ class TouchingPairs:
         gain = np.zeros((old + more, 2, max(columns, width)))
         gain[:old, :, :width] = self.gain
         self.gain = gain
+        self.held = np.concatenate([self.held, np.zeros(more, HELD)])
 
     def copy(self) -> TouchingPairs:
         return TouchingPairs(*(getattr(self, name).copy() for name in self.__slots__))
@@ -142,7 +148,7 @@ class TouchingPairs:
 class StepScratch:
     """What one step is made in; nothing of it is needed for the next. pulse (p,) PULSE with push (p, 2, columns);
     drives d: force (d·n,), gain0, gain1 (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source
-    (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these are not zero.
+    (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
     """
 
     pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
@@ -155,6 +161,7 @@ class StepScratch:
     body: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     slot: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
+    passed: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
     sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     samples: int = -1  # that there is room for
@@ -172,7 +179,7 @@ class StepScratch:
             self.force = np.zeros(len(self.slot) * samples)
         if self.source.shape[:2] != shape or self.source.shape[2] < samples:
             self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
-            self.sounds = np.zeros((shape[1], 2), np.int64)
+            self.sounds, self.passed = np.zeros((shape[1], 2), np.int64), np.zeros((*shape, samples))
 
 
 @dataclass(slots=True, eq=False)
@@ -182,6 +189,8 @@ class State:
     the step taken in last (the others are gone, and ring on where they were); newest: the highest so far. quenches:
     steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
     witness: is shown every step once it rings (`Witness`), one at a time then.
+    stand (b,) STAND: how bodies stand on others; credit_s (1,): time left for new poles, (0,) where nothing supports.
+    lifted: of bodies that left the tables, by name, the steps that they rang on contacts, and those beyond these' law.
     """
 
     window: Window
@@ -206,6 +215,9 @@ class State:
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
     witness: Witness | None = None
+    stand: Array = field(default_factory=lambda: np.zeros(0, STAND))
+    credit_s: Array = field(default_factory=lambda: np.zeros(0))
+    lifted: dict[str, tuple[int, int]] = field(default_factory=dict)
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -225,11 +237,12 @@ class State:
             self._tables = (
                 window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
                 bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
-                pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain,
+                pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain, pairs.held, self.stand, self.credit_s,
                 room.pulse, room.push, room.force, room.gain0, room.gain1, room.direction0, room.direction1,
-                room.body, room.slot, bank.body, bank.law, bank.weight, bank.observed,
+                room.body, room.slot, bank.body, ringing.law, bank.weight, bank.observed,
                 ringing.ringing, ringing.z, ringing.driven, ringing.sound, ringing.pole, ringing.block,
-                ringing.strikes, ringing.rows, ringing.free, pulse_table(), room.source, room.pushed, room.sounds,
+                ringing.coming, ringing.passes, ringing.pass_weight, ringing.pass_sound, room.passed, ringing.strikes,
+                ringing.rows, ringing.free, pulse_table(), room.source, room.pushed, room.sounds,
                 path_.microphone_m, path_.samples_per_m, travelling.sources, travelling.places, travelling.lines,
                 travelling.memory, tap_polynomials(), self.reads,
             )  # fmt: skip
@@ -246,7 +259,7 @@ class State:
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
-            self.reads, self.has_residual, self.witness,
+            self.reads, self.has_residual, self.witness, self.stand.copy(), self.credit_s.copy(), dict(self.lifted),
         )  # fmt: skip
 
 
@@ -258,7 +271,9 @@ class Witness(Protocol):
 
 def start(setup: Setup) -> State:
     """Silence at time 0, nobody there."""
-    instrument, ringing = bank.empty_bank(setup.sr, 1 + len(weight_sets(setup.sensors)))
+    instrument, ringing = bank.empty_bank(
+        setup.sr, 1 + len(weight_sets(setup.sensors)), passes=bank.PASSES if setup.supports else 0
+    )
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
     none = np.zeros(0, np.int64)
     window = Window(
@@ -268,8 +283,9 @@ def start(setup: Setup) -> State:
         np.zeros((SPAN, 0), bool),
         np.zeros(0, ROW),
     )
-    pairs = TouchingPairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)))
-    return State(window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads)
+    pairs = TouchingPairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)), np.zeros(0, HELD))
+    credit_s = np.full(1 if setup.supports else 0, SAVED_S)
+    return State(window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads, credit_s=credit_s)
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
@@ -286,6 +302,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices
     state.has_residual = any(voice is not None for voice in state.voices)
+    state.stand = np.concatenate([state.stand, np.zeros(len(new), STAND)])
     state.scratch = StepScratch()
     state.changed()
 

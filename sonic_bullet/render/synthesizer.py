@@ -21,8 +21,9 @@ from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
-from sonic_bullet.render.presence import Records, admit, in_tables, release
+from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
+from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places
@@ -92,20 +93,23 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
-    done, resume, taken = 0, False, state.taken
+    done, resume, taken, found, drives = 0, driver.ANEW, state.taken, 0, 0
     while done < len(steps):
         arguments = (
-            done, taken, begin, pause, resume, float(sr), table, contacts, *poses, *state.tables(), int(setup.apart),
-            pressure, out,
+            done, taken, begin, pause, resume, found, drives, float(sr), table, contacts, *poses, *state.tables(),
+            int(setup.apart), pressure, out,
         )  # fmt: skip
         if not getattr(driver.advance_steps, "overloads", True):
             make_driver(arguments)
         more, status, found, drives = driver.advance_steps(*arguments)
-        done, resume = done + more, status not in (driver.TO_GROW, path_places.DONE)
+        done, resume = done + more, driver.ANEW if status in (driver.TO_GROW, path_places.DONE) else driver.RINGS
         if status == path_places.DONE:
             continue
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
+        elif status == driver.TO_SETTLE:
+            settle(state, taken + done - LOOKAHEAD)
+            resume = driver.EXCITED
         elif status == driver.PAUSED:
             if state.has_residual:
                 _add_residuals(setup, state, table[done], found, drives)
@@ -198,9 +202,17 @@ class Synthesizer:
     """
 
     def __init__(
-        self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True, keep: bool = True
+        self,
+        *,
+        sr: int,
+        sensors: tuple[Sensor, ...],
+        seed: int,
+        air: Air,
+        residual: bool = True,
+        supports: bool = True,
+        keep: bool = True,
     ) -> None:
-        self._setup, self._keep = Setup(sr, sensors, seed, air, residual), keep
+        self._setup, self._keep = Setup(sr, sensors, seed, air, residual, supports), keep
         self.reset()
 
     def reset(self) -> None:
@@ -219,6 +231,11 @@ class Synthesizer:
     def time_s(self) -> float:
         """Physics time taken in."""
         return self._clock.time_s
+
+    @property
+    def lifted(self) -> dict[str, tuple[int, int]]:
+        """See `presence.lifted`."""
+        return lifted(self._state)
 
     def feed(self, step: Step, bodies: Records) -> Array:
         """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: by index, those at

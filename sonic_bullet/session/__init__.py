@@ -23,6 +23,7 @@ def attach(
     microphone: MicrophoneLike = (0.0, -1.0, 0.5),
     seed: int = 0,
     air: Air | None = None,
+    supports: bool = True,
     keep_log: bool = True,
     keep_sound: bool = True,
 ) -> Listener:
@@ -32,7 +33,8 @@ def attach(
     a client id (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another
     simulator. sr: sample rate in Hz, 8000 … 384000. microphone: a point in the world in m, several points (one channel
     each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts alone, no sound. seed: of the
-    surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default.
+    surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. supports: whether what a body stands on
+    takes of its ringing and passes some on; without, it rings as if it hung in the air, and costs less.
     keep_log, keep_sound: whether `contacts`, and `sound` and `write`, will be asked for; what is kept of a long run
     lies in a nameless temporary file (where TMPDIR says, else in /tmp), gone with the listener.
 
@@ -43,7 +45,7 @@ def attach(
     director = direction()
     if director is not None:
         how = director.attached(how)
-    made = Listener(client, sr=sr, **how, keep_log=keep_log, keep_sound=keep_sound)
+    made = Listener(client, sr=sr, **how, supports=supports, keep_log=keep_log, keep_sound=keep_sound)
     if director is not None:
         director.listens(made)
     return made

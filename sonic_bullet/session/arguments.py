@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -72,3 +74,8 @@ def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
     if isinstance(mesh, (str, Path)):
         return (read_mesh(as_path(mesh, "mesh", "give a mesh file in metres")),)
     return as_kinds(mesh, Shape, "mesh", "give a mesh file in metres, a Shape or several", error=MeshError)
+
+
+def keywords(call: Callable[..., Any]) -> list[str]:
+    """Names of the arguments that are given by name alone."""
+    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]

@@ -9,7 +9,6 @@ not.
 
 from __future__ import annotations
 
-import inspect
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +23,6 @@ import numpy as np
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
-from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.machine.terminal import status
@@ -40,10 +38,10 @@ from sonic_bullet.records.coerce import (
 )
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
-from sonic_bullet.session.arguments import as_sensors
+from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, checked, solved_bodies, wanted_body
+from sonic_bullet.session.wanted_bodies import WantedBody, checked, oversize_notes, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:
@@ -56,13 +54,8 @@ def _wanted(world: World, who: Any, how: Any) -> WantedBody:
     """One entry of a cast."""
     body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
     given = how if isinstance(how, Mapping) else {"material": how}
-    check_options(map(str, given), [name for name in _keywords(Listener.add) if name != "progress"], "add_all")
+    check_options(map(str, given), [name for name in keywords(Listener.add) if name != "progress"], "add_all")
     return wanted_body(world, body, link, **{"material": None, **given})
-
-
-def _keywords(call: Callable[..., Any]) -> list[str]:
-    """Names of the arguments that are given by name alone."""
-    return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]
 
 
 class Listener:
@@ -78,6 +71,7 @@ class Listener:
         sensors: tuple[Sensor, ...],
         seed: int,
         air: Air,
+        supports: bool = True,
         keep_log: bool = True,
         keep_sound: bool = True,
     ) -> None:
@@ -87,7 +81,9 @@ class Listener:
         self.world = client if isinstance(client, World) else _opened(client)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
-        self._synth = Synthesizer(sr=self.sr, sensors=self.sensors, seed=self.seed, air=self.air, keep=keep)
+        how: dict[str, Any] = {"sr": self.sr, "sensors": self.sensors, "seed": self.seed, "air": self.air}
+        how["supports"] = self.supports = as_flag(supports, "supports")
+        self._synth = Synthesizer(**how, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
         self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
@@ -142,6 +138,7 @@ class Listener:
         to_hz: float = 20_000.0,
         count: int | None = None,
         accuracy: float = 0.01,
+        mounting: str | float | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; returns the modal models of its links.
@@ -152,15 +149,16 @@ class Listener:
         roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
         of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
-        relative, of the highest frequency; the models' notes tell what is reached. progress: called now and then with
-        which link's modes are computed, how far that is, and that it is their radiation next (seconds a link the first
-        time, then the cache has both); without one, a terminal shows it. Warns
-        (`errors.SizeWarning`) of a link larger than anything that is struck to sound. Raises SceneError (unknown body
-        or link, a name that another has), MaterialError, MeshError, ModalError naming body and link, RecordError.
+        relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
+        building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
+        progress: called now and then with which link's modes or radiation are computed and how far that is; without
+        one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
+            "mounting": mounting,
         }  # fmt: skip
         return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 
@@ -190,16 +188,11 @@ class Listener:
                 self.world.call(one.body, link, name)
         for one, mine in zip(wanted, models, strict=True):
             how: dict[str, Any] = {"material": one.material, "options": one.options if one.model is None else None}
+            how |= {} if one.mounting is None else {"mounting": one.mounting}
             for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
                 self.world.add(one.body, link, model=model, shapes=shapes, **how)
-        for one, mine in zip(wanted, models, strict=True):
-            for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
-                if large := oversize(model.vertex_m, model.mass_kg):
-                    remedy = (
-                        "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-                    )
-                    said = f"body {one.body} link {link} ({name}) {large}; {remedy}"
-                    warnings.warn(said, SizeWarning, stacklevel=3)
+        for said in oversize_notes(wanted, models):
+            warnings.warn(said, SizeWarning, stacklevel=3)
         return [tuple(mine) for mine in models]
 
     def step(self) -> Array:
@@ -293,6 +286,7 @@ class Listener:
             simulator.engine,
             {**package_versions(), **simulator.versions},
             simulator.changes,
+            supports=self.supports,
         )
 
     @property
@@ -301,6 +295,12 @@ class Listener:
         happened.
         """
         return (*self.world.notes, *self._kept.notes)
+
+    @property
+    def lifted(self) -> dict[str, tuple[int, int]]:
+        """By name of each body that rang on something: in how many steps, and in how many of them so loud that its
+        contacts would lift off and chatter, of which their law knows nothing."""
+        return self._synth.lifted
 
     @property
     def time_s(self) -> float:
@@ -325,7 +325,7 @@ class Listener:
         It goes to the file by blocks, however long it is; lufs= alone needs all of it in memory. Raises FileError,
         AudioError.
         """
-        check_options(options, _keywords(write_audio), "write", error=AudioError)
+        check_options(options, keywords(write_audio), "write", error=AudioError)
         place = as_path(path, "path", "name a file, such as out.wav")
         if not self.sensors:
             raise AudioError(

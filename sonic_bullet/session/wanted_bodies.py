@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.compiled import folder as code_folder
@@ -28,6 +29,7 @@ from sonic_bullet.records.coerce import as_kind, as_number, shown
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.directed import direction
@@ -39,7 +41,7 @@ Say = Callable[[str], None]
 class WantedBody:
     """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given.
     names: what they shall be called, none: as the simulator calls them. own_shapes: the shapes were given, not asked
-    of the world.
+    of the world. mounting: None: as is usual.
     """
 
     body: int
@@ -50,6 +52,7 @@ class WantedBody:
     model: ModalModel | None
     names: tuple[str, ...] = ()
     own_shapes: bool = False
+    mounting: Mounting | None = None
 
 
 def wanted_body(
@@ -62,6 +65,7 @@ def wanted_body(
     model: ModalModel | None = None,
     roughness_m: float | None = None,
     name: str | None = None,
+    mounting: str | float | None = None,
     **options: Any,
 ) -> WantedBody:
     """What `Listener.add` was asked for. options: of modal.ModalOptions. Raises what add raises."""
@@ -82,7 +86,8 @@ def wanted_body(
     for one, label in zip(links, names or [world.name_of(number, one) for one in links], strict=True):
         with _naming(label, len(links)):
             parts.append((label, world.shapes_of(number, one) if given is None else given))
-    return WantedBody(number, links, tuple(parts), made, asked, model, names, given is not None)
+    held = None if mounting is None else as_mounting(mounting, error=SceneError)
+    return WantedBody(number, links, tuple(parts), made, asked, model, names, given is not None, held)
 
 
 def _names(world: World, body: int, links: Sequence[int], name: str, every: bool) -> Iterator[str]:
@@ -137,6 +142,15 @@ def solved_bodies(
             shared += mine
             models.append(mine)
     return models
+
+
+def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
+    """A line for each link larger than anything that is struck to sound."""
+    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
+    for one, mine in zip(wanted, models, strict=True):
+        for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
+            if large := oversize(model.vertex_m, model.mass_kg):
+                yield f"body {one.body} link {link} ({name}) {large}; {remedy}"
 
 
 def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:

@@ -33,6 +33,7 @@ CHANGES = {
         "ball",
         "material",
     ),
+    "mounting": (('"name": "bar"}', '"name": "bar", "mounting": "placed"}'), "bar", "mounting"),
     "a call that is gone": (("    client.resetBaseVelocity(ball, [0.1, 0, -1.0])\n", ""), "ball", "start velocity"),
     "length": (("SECONDS = 0.12", "SECONDS = 0.14"), "", "seconds"),
 }

@@ -76,13 +76,19 @@ def advance(
         pushed = np.zeros((bank.body_count, 3, n))
     pushed[...] = 0.0
     bank_kernel.advance(
-        state.at, n, float(bank.sr), bank.body, bank.law, bank.weight, bank.observed,
-        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, state.strikes, state.rows,
-        state.free, pulse_table(), drives, body, signal, gain[0], gain[1], direction[0], direction[1], along,
-        *room(bank.body_count, drives, n), out, pushed, np.zeros((bank.body_count, 2), np.int64),
+        state.at, n, float(bank.sr), bank.body, state.law, bank.weight, bank.observed,
+        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, *passed(bank, state, n),
+        state.strikes, state.rows, state.free, pulse_table(), drives, body, signal, gain[0], gain[1], direction[0],
+        direction[1], along, *room(bank.body_count, drives, n), out, pushed, np.zeros((bank.body_count, 2), np.int64),
     )  # fmt: skip
     state.at += n
     return out
+
+
+def passed(bank: Bank, state: BankState, n: int) -> tuple[Array, ...]:
+    """Arguments of the kernel for what touching bodies do to each other."""
+    heard = np.zeros((*bank.observed.shape, n if state.passes.shape[1] else 0))
+    return state.coming, state.passes, state.pass_weight, state.pass_sound, heard
 
 
 @lru_cache(maxsize=8)
@@ -103,7 +109,7 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
         x, y, z = (float(value) for value in strike.shove_n_s)
         enter_strike(
             strike.body, float(strike.start), float(strike.length_s), int(strike.flat), 1.0, _padded(bank, strike.gain),
-            x, y, z, state.at, float(bank.sr), bank.body, bank.law, state.ringing, state.strikes, state.rows,
+            x, y, z, state.at, float(bank.sr), bank.body, state.law, state.ringing, state.strikes, state.rows,
             state.free, pulse_table(),
         )  # fmt: skip
 

@@ -103,6 +103,7 @@ LOG = {
     "versions": {},
     "changes": (),
     "residual": True,
+    "supports": True,
 }
 
 
@@ -134,6 +135,7 @@ def adding(client: Any, _: Path) -> Made:
         "to_hz": 20_000,
         "count": None,
         "accuracy": 0.01,
+        "mounting": None,
         "progress": None,
     }
     return listener.add, {"body": body, "link": -1, "material": STEEL, "model": plate_model(), **rest}
@@ -165,6 +167,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "microphones": None,
         "material": None,
         "residual": True,
+        "supports": True,
         "progress": None,
         "say": None,
     }
@@ -190,7 +193,7 @@ def of_log(name: str) -> Callable[[Any, Path], Made]:
     return make
 
 
-KEEPS = {"keep_log": True, "keep_sound": True}
+KEEPS = {"supports": True, "keep_log": True, "keep_sound": True}
 DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Air": lambda *_: (sb.Air, {"density_kg_m3": 1, "sound_speed_m_s": 343}),
     "ContactLog": lambda *_: (sb.ContactLog, LOG),
@@ -276,6 +279,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "versions": ["x", 5, None, object(), [3], {1: "2"}, {"numpy": 2.0}, {"numpy": None}],
         "changes": ["x", 5, None, object(), [3]],
         "residual": FLAG,
+        "supports": FLAG,
     },
     "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
@@ -316,6 +320,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "to_hz": [*NUMBER, 0, -1, 1e308],
         "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
         "accuracy": [*NUMBER, 0, -1, 0.6],
+        "mounting": ["glued", b"free", object(), ["free"], -1, 1.5, math.nan, True],
         "progress": CALL,
     },
     "Listener.add_all": {"cast": [None, 5, "steel", b"steel", object(), ["steel"], [(0, "steel")]], "progress": CALL},
@@ -419,6 +424,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "microphones": ["here", 5, object(), [(0, 0)]],
         "material": [5, b"steel", object(), ["steel"]],
         "residual": FLAG,
+        "supports": FLAG,
         "progress": CALL,
         "say": CALL,
     },

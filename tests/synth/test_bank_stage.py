@@ -10,7 +10,7 @@ from sonic_bullet.render.tables import PULSE
 from sonic_bullet.synth.bank import Bank, BankState, ModeSet, Translation, append, bank_kernel, empty_bank
 from sonic_bullet.synth.bank.strike_pool import enter_pulses
 from sonic_bullet.synth.pulse import pulse_table
-from tests.made.banks import Strike, advance, room
+from tests.made.banks import Strike, advance, passed, room
 
 SR = 48_000
 
@@ -94,9 +94,9 @@ def test_rows_of_silent_bodies_are_zero_and_are_told_from_those_that_sound(dirty
     for step in range(600):
         bank_kernel.advance(
             step * 300, 300, float(SR), bank.body, bank.law, bank.weight, bank.observed, state.ringing, state.z,
-            state.driven, state.sound, state.pole, state.block, state.strikes, state.rows, state.free, pulse_table(),
-            0, none, np.zeros((0, 300)), gain, gain, along, along, np.zeros(300), *scratch,
-            source, pushed, sounds,
+            state.driven, state.sound, state.pole, state.block, *passed(bank, state, 300), state.strikes,
+            state.rows, state.free, pulse_table(), 0, none, np.zeros((0, 300)), gain, gain, along, along, np.zeros(300),
+            *scratch, source, pushed, sounds,
         )  # fmt: skip
         loud.append(sounds[0].copy())
         assert not source[0, 1].any()

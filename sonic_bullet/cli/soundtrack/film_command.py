@@ -107,7 +107,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     with clean_stdout(json_to) as say:
         with progress_bar(Path(scene).name) as (progress, tell):
             wish = Wish(
-                options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, progress,
+                options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, None, progress,
                 tell, at_end,
             )  # fmt: skip
             try:

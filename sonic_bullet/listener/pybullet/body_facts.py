@@ -23,6 +23,7 @@ from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import LISTED, shown
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mounting import Mounting, usual_mounting
 from sonic_bullet.records.simulated import Simulator, Values, finite
 
 HEAVIEST_KG = 1e12
@@ -207,13 +208,16 @@ def added_body(
     volume_m3: float | None,
     shapes: Sequence[Shape],
     options: ModalOptions | None,
+    mounting: Mounting | None = None,
 ) -> Body:
     """The record of a link that exists, with what it is made of. volume_m3 None: the model's, or 0; shapes: in place of
-    its collision shape; a lone sphere tells its curvature. Raises SceneError on absurd mass or inertia.
+    its collision shape; a lone sphere tells its curvature. mounting: how it is held, None: as is usual for its mass.
+    Raises SceneError on absurd mass or inertia.
     """
     record = describe(client_id, body, link, epoch)
     volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
-    record = replace(record, material=material, model=model, volume_m3=volume, options=options)
+    held = usual_mounting(record.mass_kg) if mounting is None else mounting
+    record = replace(record, material=material, model=model, volume_m3=volume, options=options, mounting=held)
     if shapes:
         alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
         record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else math.nan)

@@ -140,12 +140,12 @@ class PyBulletWorld(facts.AskedLinks):
         volume_m3: float | None = None,
         shapes: Sequence[Shape] = (),
         options: ModalOptions | None = None,
+        mounting: str | float | None = None,
     ) -> Body:
         """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
 
-        A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins.
-        volume_m3 None: the model's volume, or 0. shapes: its true geometry where that is not its collision shape; a
-        lone sphere tells its curvature. A body that was muted is listened to again. Raises SceneError for an unknown
+        A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins. A
+        body that was muted is listened to again. Arguments: see `facts.added_body`. Raises SceneError for an unknown
         body or link, a soft body, a mass, pose or speed that is not one, or a body that came while a step was made.
         """
         check_connected(self.client_id)
@@ -159,7 +159,7 @@ class PyBulletWorld(facts.AskedLinks):
             self._census.stale()
         self._census.read()
         how: dict[str, Any] = {"material": material, "model": model, "volume_m3": volume_m3, "shapes": tuple(shapes)}
-        how["options"] = options
+        how |= {"options": options, "mounting": mounting}
         record = replace(facts.added_body(self.client_id, body, link, self.epoch, **how), since_step=self.step_count)
         self._close([code])
         record = self._append(code, record)

@@ -9,7 +9,8 @@
 time, and nothing aliases.)
 
     layout (tables) | strike_pool, phasors (pulses under way) | drive (what is driven) | tile (what rings free) |
-    translation (the rigid body) -> bank_kernel.advance;   instrument: bodies in, tables out
+    translation (the rigid body) | poles, passing (what touches) -> bank_kernel.advance
+    instrument: bodies in, tables out
 
 A body below the floor costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of
 cutting the calls gives the same bits. All work in place: `copy()` a state first to look ahead and come back.
@@ -28,9 +29,12 @@ from sonic_bullet.synth.bank.instrument import (
     subset,
 )
 from sonic_bullet.synth.bank.layout import FLOOR
+from sonic_bullet.synth.bank.passing import PASSES, set_passes
+from sonic_bullet.synth.bank.poles import set_poles
 
 __all__ = [
     "FLOOR",
+    "PASSES",
     "Bank",
     "BankState",
     "ModeSet",
@@ -38,6 +42,8 @@ __all__ = [
     "append",
     "audible",
     "empty_bank",
+    "set_passes",
+    "set_poles",
     "silence",
     "silent",
     "subset",

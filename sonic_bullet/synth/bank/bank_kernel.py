@@ -5,10 +5,10 @@ Strict IEEE arithmetic, and stated multiply-adds in `tile` and `drive`: one set 
     block start:  tile[n] = Σ Re(w z p^n),  z <- z p^256           all modes of a ringing body at once (tile.py)
     32 samples:   f <- f p + (strikes + forces) (1 + i d/ω),  y = tile[n] + Σ Re(w f)     driven bodies only (drive.py)
     block end:    z <- z + f p,  f <- 0
-    bent bodies:  p of each block by |z| at its start, and of what is driven within it every 32 samples (bend_poles)
+    bent bodies:  p of each block by |z| at its start, and of what is driven within it every 32 samples
 
 Blocks lie on a fixed grid of absolute samples, and f runs sample by sample: where a frame ends changes nothing. Whoever
-gives a body other poles does so where one of the 32 begins (pole) or a block (block, too), as `bend_poles` does.
+gives a body other poles does so where one of the 32 begins (pole) or a block (block, too): see `poles`.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.synth.bank import drive, tile
+from sonic_bullet.synth.bank import drive, passing, poles, tile
 from sonic_bullet.synth.bank.kernels import uncounted
 from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM
 from sonic_bullet.synth.bank.strike_pool import begins, plan_nodes, release_done
@@ -30,59 +30,40 @@ DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
 @uncounted
-def _ring(b, start, columns, z, pole, block, weight, modes, observed, sound, scratch):  # pragma: no cover
-    """Tile of body b for the block that starts: sound (W, b, BLOCK). Turns z to the next block. False where all modes
-    are below the floor.
+def _ring(
+    b, start, columns, z, pole, block, weight, modes, observed, sound, ringing, passes, pass_weight, pass_sound, scratch
+):  # pragma: no cover - compiled
+    """Tiles of body b for the block that starts: sound (W, b, BLOCK), pass_sound (J·W, b, BLOCK). Turns z to the next
+    block. False where all modes are below the floor.
     """
     now, powers = scratch[: 2 * CHUNK], scratch[2 * CHUNK : 12 * CHUNK]
     table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
     column = scratch[(12 + 2 * ROW) * CHUNK : RING_SCRATCH]
-    ringing = False
+    alive, sets = False, len(observed)
     end = start + -(-columns // LANES) * LANES
     for lo in range(start, end, CHUNK):
         count = min(CHUNK, end - lo)
         if tile.turn(z, pole, block, modes, lo, count, FLOOR**2, now, powers) == 0:
             continue
-        if not ringing:
-            ringing = True
-            for w in range(len(observed)):
+        if not alive:
+            alive = True
+            for w in range(sets):
                 if observed[w, b]:
                     sound[w, b, :] = 0.0
+            for j in range(passes.shape[1] if ringing[b].passes else 0):
+                pass_sound[j * sets : (j + 1) * sets, b, :] = 0.0
         real = min(count, start + columns - lo)  # spare lanes need no table
         tile.rows(powers, real, table)
-        for w in range(len(observed)):
+        for w in range(sets):
             if observed[w, b]:
                 tile.columns(now, weight[w], modes, lo, powers, count, column)
                 tile.outer(column, table, real, sound[w, b])
-    return ringing
-
-
-@uncounted
-def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
-    """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
-    strikes them.
-
-    a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),
-        ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
-    (Nayfeh & Mook 1979, eq. 2.3.35 and section 3.3), d' the block's mean decay; exact in amplitude, and in phase for c
-    = 0.
-    """
-    modes = law.shape[1]
-    for m in range(start, stop):
-        bend, damping_growth, power = law[3, m], law[4, m], law[5, m]
-        if bend == 0.0 and damping_growth == 0.0:
-            continue
-        d, w = -law[0, m] * span, law[1, m]
-        level = np.sqrt(z[m] ** 2 + z[modes + m] ** 2 + driven[m] ** 2 + driven[modes + m] ** 2)
-        c = (damping_growth * level) ** power
-        fall = np.log(max((1.0 + c) * np.exp(power * d) - c, 1.0)) / power
-        mean = -np.expm1(-2.0 * fall) / (2.0 * fall) if fall > 1e-9 else 1.0
-        turn = min(max(w * (1.0 + bend * level * level * mean), 0.0), 3.141)
-        p = np.exp(-fall / span)
-        pole[m], pole[modes + m] = p * np.cos(turn), p * np.sin(turn)
-        if span == BLOCK:
-            q = np.exp(-fall)
-            block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
+        for j in range(passes.shape[1] if ringing[b].passes else 0):
+            if passing.sounds(passes[b, j].phase):
+                for w in range(j * sets, (j + 1) * sets):
+                    tile.columns(now, pass_weight[w], modes, lo, powers, count, column)
+                    tile.outer(column, table, real, pass_sound[w, b])
+    return alive
 
 
 @uncounted
@@ -162,15 +143,6 @@ def list_forces(
 
 
 @uncounted
-def _is_last(w, b, observed):  # pragma: no cover - compiled
-    """Whether no weight set after w reads body b."""
-    for v in range(w + 1, len(observed)):  # noqa: SIM110  numba knows no all()
-        if observed[v, b]:
-            return False
-    return True
-
-
-@uncounted
 def _press_strikes(
     sample, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
 ):  # pragma: no cover - compiled
@@ -193,8 +165,8 @@ def _press_strikes(
 
 @uncounted
 def _drive(
-    at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes, rows, hertz,
-    f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+    at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, passes, pass_weight,
+    pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
     """``count`` samples from ``i`` on, within one of the DRIVEN: strikes and forces enter, free and driven part are
     heard together.
@@ -204,10 +176,12 @@ def _drive(
     total = scratch[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
     due = scratch[PUSH_SCRATCH + DRIVEN * LANES + DRIVEN : DRIVE_SCRATCH]
     ringing[b].driven = 1
-    for w in range(len(observed)):  # what of the body is heard, set after set: the state goes on with the last
-        if w > 0 and not observed[w, b]:
+    sets, last = len(observed), passing.last_set(b, ringing, observed, passes)
+    for w in range(last + 1):  # what of the body is heard, set after set: the state goes on with the last
+        j, v = w // sets - 1, w % sets  # of partner j, where it is 0 or above
+        if w > 0 and not (observed[v, b] if j < 0 else passing.sounds(passes[b, j].phase)):
             continue
-        keep = _is_last(w, b, observed)
+        keep = w == last
         for k in range(count * LANES):
             partial[k] = 0.0
         for lo in range(start, stop, COLUMNS):
@@ -226,17 +200,24 @@ def _drive(
             if not pushes:
                 for k in range(drive.STEP):
                     push[k] = 0.0
-            drive.run(driven, pole, modes, lo, lanes, weight, 2 * w * modes + lo, push, pushes, count, partial, keep)
-        if observed[w, b]:
+            read = weight if j < 0 else pass_weight
+            at_w = w if j < 0 else w - sets
+            drive.run(driven, pole, modes, lo, lanes, read, 2 * at_w * modes + lo, push, pushes, count, partial, keep)
+        if j >= 0 or observed[w, b]:
             drive.across(partial, count, total)
-            if ringing[b].tiled:
-                for k in range(count):
-                    total[k] += sound[w, b, place + k]
-            _copy_flushed(total, source[w, b, i : i + count])
+            free = sound[w, b] if j < 0 else pass_sound[w - sets, b]
+            for k in range(count if ringing[b].tiled else 0):
+                total[k] += free[place + k]
+            if j < 0:
+                _copy_flushed(total, source[w, b, i : i + count])
+            else:
+                passing.pass_on(b, j, v, i, place, total, count, passes, ringing, passed)
 
 
 @uncounted
-def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: no cover - compiled
+def _sound_free(
+    b, i, end, place, observed, ringing, sound, passes, pass_sound, passed, source
+):  # pragma: no cover - compiled
     """Samples i … end - 1 of a body that only rings, or is silent."""
     for w in range(len(observed)):
         if observed[w, b]:
@@ -244,25 +225,35 @@ def _sound_free(b, i, end, place, observed, ringing, sound, source):  # pragma: 
                 _copy_flushed(sound[w, b, place : place + end - i], source[w, b, i:end])
             else:
                 source[w, b, i:end] = 0.0
+    sets = len(observed)
+    for j in range(passes.shape[1] if ringing[b].passes and ringing[b].tiled else 0):
+        if passing.sounds(passes[b, j].phase):
+            for w in range(sets):
+                free = pass_sound[j * sets + w, b, place : place + end - i]
+                passing.pass_on(b, j, w, i, place, free, end - i, passes, ringing, passed)
 
 
 @uncounted
 def _open_block(
-    b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, scratch
-):  # pragma: no cover - compiled
-    """Begin of a block: its poles where they go with the level, and its free sound."""
+    b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
+    pass_sound, scratch,
+):  # fmt: skip  # pragma: no cover - compiled
+    """Begin of a block: its poles where they go with the level or are new, and its free sound."""
+    poles.take_coming(b, start, stop, ringing, law, pole, block, coming)
+    passing.move_on(b, ringing, passes)
     if bodies[b].bent and ringing[b].ringing:
-        bend_poles(z, driven, np.int64(BLOCK), law, start, stop, pole, block)
+        poles.bend_poles(z, driven, np.int64(BLOCK), law, start, stop, pole, block)
     alive = ringing[b].ringing != 0 and _ring(
-        b, start, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, scratch
-    )
+        b, start, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, ringing, passes,
+        pass_weight, pass_sound, scratch,
+    )  # fmt: skip
     ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
 
 
 @uncounted
 def _advance_modes(
-    at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
-    f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+    at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
+    pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
     start, stop, modes = bodies[b].start, bodies[b].stop, law.shape[1]
@@ -270,20 +261,24 @@ def _advance_modes(
     while i < n:
         place = (at + i) % BLOCK
         if place == 0:
-            _open_block(b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, scratch)
+            _open_block(
+                b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
+                pass_weight, pass_sound, scratch,
+            )  # fmt: skip
         end = min(n, i + BLOCK - place)
         if ringing[b].driven or f1 > f0 or ringing[b].strike >= 0:
             end = min(end, i + DRIVEN - (at + i) % DRIVEN)
         if ringing[b].driven or f1 > f0 or begins(b, at + end, ringing, strikes):
             # what begins to be driven begins with the poles of what rings then
             if bodies[b].bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
-                bend_poles(z, driven, np.int64(DRIVEN), law, start, stop, pole, block)
+                poles.bend_poles(z, driven, np.int64(DRIVEN), law, start, stop, pole, block)
             _drive(
-                at, i, end - i, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, strikes,
-                rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+                at, i, end - i, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, passes,
+                pass_weight, pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan,
+                scratch, source,
             )  # fmt: skip
         else:
-            _sound_free(b, i, end, place, observed, ringing, sound, source)
+            _sound_free(b, i, end, place, observed, ringing, sound, passes, pass_sound, passed, source)
         if place + end - i == BLOCK:
             ringing[b].tiled = 0
             if ringing[b].driven:
@@ -295,9 +290,9 @@ def _advance_modes(
 
 @uncounted
 def advance(
-    at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, free, hertz,
-    drive_count, drive_body, force_n, gain0, gain1, direction0, direction1, progress, first, side, signal, kick, plan,
-    scratch, source, pushed, sounds,
+    at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
+    pass_sound, passed, strikes, rows, free, hertz, drive_count, drive_body, force_n, gain0, gain1, direction0,
+    direction1, progress, first, side, signal, kick, plan, scratch, source, pushed, sounds,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Samples at … at + n - 1 into source (W, b, n or more) and pushed (b, 3, n or more).
 
@@ -312,8 +307,9 @@ def advance(
         loud = bodies[b].columns > 0 and (loud or begins(b, at + n, ringing, strikes))
         if loud:
             _advance_modes(
-                at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, strikes, rows, hertz,
-                f0, f1, side, gain0, gain1, signal, plan, scratch, source,
+                at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
+                pass_weight, pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan,
+                scratch, source,
             )  # fmt: skip
         elif sounds[b, 0]:
             for w in range(len(observed)):
@@ -327,3 +323,5 @@ def advance(
         sounds[b, 1] = 1 if moves else 0
         if ringing[b].strike >= 0:
             release_done(b, ringing, strikes, free)
+    if passes.shape[1]:
+        passing.add_passed(n, ringing, observed, source, passed, sounds)

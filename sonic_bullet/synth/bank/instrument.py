@@ -7,7 +7,7 @@ translations, which share one pole. b bodies, m lanes of all of them, W weight s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.bank.layout import BANK_BODY, FLUSH, PAIR, RINGING, STRIKE
+from sonic_bullet.synth.bank.passing import OFF, PASS
 from sonic_bullet.synth.bank.tile import BLOCK
 
 FASTEST_DECAY_PER_SAMPLE = 2.0
@@ -39,7 +40,7 @@ class ModeSet:
     """One body for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex.
 
     All `audible`. bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 +
-    (damping_growth·|z|)^damping_growth_power); None: linear. See `bank_kernel.bend_poles`. translation: None where only
+    (damping_growth·|z|)^damping_growth_power); None: linear. See `poles.bend_poles`. translation: None where only
     the modes sound.
     """
 
@@ -82,8 +83,9 @@ class Bank:
 class BankState:
     """What the bank remembers. at: the next sample. z, driven (2·m,): free state at the next block's start, and what
     was driven since this block's. sound (W, b, 256): the block's free ringing. pole, block (2·m,): e^s and e^{256 s},
-    bent by level where a body is. ringing (b,) RINGING; strikes (pool,) STRIKE, rows (pool, 8, columns) their phasors,
-    free (pool + 1,): how many rows are free, and which.
+    bent by level where a body is. law (7, m): the bank's, with poles as they are now; coming (8, m): see `poles`.
+    passes (b, J) PASS, pass_weight (J·W, 2·m), pass_sound (J·W, b, 256): see `passing`. ringing (b,) RINGING; strikes
+    (pool,) STRIKE, rows (pool, 8, columns) their phasors, free (pool + 1,): how many rows are free, and which.
     """
 
     at: int
@@ -92,6 +94,11 @@ class BankState:
     sound: Array
     pole: Array
     block: Array
+    law: Array
+    coming: Array
+    passes: Array
+    pass_weight: Array
+    pass_sound: Array
     ringing: Array
     strikes: Array
     rows: Array
@@ -99,7 +106,7 @@ class BankState:
 
     def copy(self) -> BankState:
         """A state of its own: advancing one leaves the other."""
-        names = ("z", "driven", "sound", "pole", "block", "ringing", "strikes", "rows", "free")
+        names = (field.name for field in fields(self) if field.name != "at")
         arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in names}
         return BankState(at=self.at, **arrays)
 
@@ -142,8 +149,11 @@ def flushed(values: Array) -> Array:
     return np.asarray(np.where(np.abs(values) < FLUSH, 0, values))
 
 
-def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankState]:
-    """A bank without bodies and its state at absolute sample ``at``. Raises AudioError on a rate outside 1 … 10 MHz."""
+def empty_bank(sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0) -> tuple[Bank, BankState]:
+    """A bank without bodies and its state at absolute sample ``at``; passes: partners that each may pass on to.
+
+    Raises AudioError on a rate outside 1 … 10 MHz.
+    """
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
     bank = Bank(
@@ -156,7 +166,11 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0) -> tuple[Bank, BankSt
     z, driven, pole, block = np.zeros((4, 0))
     silent, none = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
     rows, free = np.zeros((0, 8, PAIR)), np.zeros(1, np.int64)
-    state = BankState(int(at), z, driven, silent, pole, block, np.zeros(0, RINGING), none, rows, free)
+    state = BankState(
+        int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)), np.zeros((0, passes), PASS),
+        np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)), np.zeros(0, RINGING), none,
+        rows, free,
+    )  # fmt: skip
     return bank, state
 
 
@@ -214,6 +228,13 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         sound=np.concatenate([state.sound, np.zeros((sets, len(bodies), BLOCK))], axis=1),
         pole=_joined(state.pole, pole),
         block=_joined(state.block, block),
+        law=np.concatenate([state.law, np.vstack([law, np.zeros(total)])], axis=1),
+        coming=np.concatenate([state.coming, np.zeros((8, total))], axis=1),
+        passes=np.concatenate([state.passes, np.zeros((len(bodies), state.passes.shape[1]), PASS)]),
+        pass_weight=np.stack([_joined(one, silent) for one in state.pass_weight]).reshape(len(state.pass_weight), -1)
+        if len(state.pass_weight)
+        else np.zeros((0, 2 * grown.law.shape[1])),
+        pass_sound=np.concatenate([state.pass_sound, np.zeros((len(state.pass_sound), len(bodies), BLOCK))], axis=1),
         ringing=np.concatenate([state.ringing, ringing]),
         rows=rows,
     )
@@ -232,7 +253,15 @@ def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
     law, weight = np.take(bank.law, lane, axis=1), np.take(bank.weight, both, axis=1)
     few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1))
     flat = {name: getattr(state, name)[both] for name in ("z", "driven", "pole", "block")}
-    return few, replace(state, **flat, sound=np.take(state.sound, keep, axis=1), ringing=state.ringing[keep])
+    flat |= {name: np.take(getattr(state, name), lane, axis=1) for name in ("law", "coming")}
+    flat |= {name: np.take(getattr(state, name), keep, axis=1) for name in ("sound", "pass_sound")}
+    number = np.full(bank.body_count, -1)
+    number[keep] = np.arange(len(keep))
+    passes = state.passes[keep]
+    passes["to"] = number[passes["to"]]
+    passes["phase"][passes["to"] < 0] = OFF
+    weights = np.take(state.pass_weight, both, axis=1)
+    return few, replace(state, **flat, passes=passes, pass_weight=weights, ringing=state.ringing[keep])
 
 
 def silent(state: BankState) -> Array:
@@ -245,9 +274,10 @@ def silent(state: BankState) -> Array:
 def silence(state: BankState) -> BankState:
     """The state at the same sample with nothing ringing and no strike under way."""
     state = state.copy()
-    for name in ("z", "driven", "sound"):
+    for name in ("z", "driven", "sound", "pass_sound"):
         getattr(state, name)[...] = 0
-    state.ringing[...] = np.zeros((), RINGING)
+    for name in ("ringing", "driven", "tiled", "moving", "motion"):  # poles and passes stay: what touches does
+        state.ringing[name] = 0
     state.ringing["strike"] = -1
     pool = len(state.strikes)
     state.free[...] = np.concatenate([[pool], np.arange(pool - 1, -1, -1)])

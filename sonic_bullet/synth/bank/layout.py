@@ -59,6 +59,9 @@ RINGING = np.dtype(
         ("driven", "i8"),  # 1: driven is not zero
         ("tiled", "i8"),  # 1: the block's free sound is
         ("moving", "i8"),  # 1: a translation's state is not zero
+        ("fresh", "i8"),  # 1: other poles at the next block's start
+        ("passes", "i8"),  # passes that are not off
+        ("passed_to", "i8"),  # 1: within a call, somebody passed something on to it
         ("strike", "i8"),  # slot of its first strike, -1 for none
         ("motion", "f8", (3, 2)),  # state of the translations
     ],

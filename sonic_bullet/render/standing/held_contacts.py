@@ -1,0 +1,279 @@
+"""What carries a body, without the flicker of a simulator's points: points that are held, loads that are smoothed.
+
+    rows of the step being rendered, load less what strikes -> each row to the held point near it, or a new one
+        -> n += a (load of its rows − n),   a = 1 − e^{−dt/SMOOTH_S}
+        -> HELD: up to MOST points a pair, sum and moment those of the rows, smoothed
+    sets or loads that are others than when poles were last made -> STAND.stale of both bodies
+
+A resting box shows two, three or four of its corners, another choice each step; sum and moment alone are right. Each
+point keeps the mean of what its rows carried, so sum and moment of the held points are the smoothed ones exactly, and
+the set changes only where a point was not loaded for long, or lies elsewhere. Which of both bodies the point keeps its
+place on decides nothing: a box that slides keeps its own corners, a ball that rolls on keeps none.
+"""
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.machine.compiled import njit
+from sonic_bullet.synth.strikes import NOW, SPAN
+
+MOST = 4
+"""Points of a pair: a solver of convex shapes gives no more at a time."""
+SMOOTH_S = 0.03
+"""Time constant of loads: of 20 to 50 ms, seven steps at 240 Hz, within which each corner of a box is loaded."""
+NEAR = 0.15
+"""Of the smaller body's size: rows nearer than this to a held point are the same point."""
+LEAST = 0.02
+"""Share of a pair's load below which a point is let go."""
+FAR_OFF, OFF = 1.6, 1.1
+"""Factors by which a load differs from the one that poles were made for before they are made anew: at once, 17 % of a
+Hertz spring, and after REST_S, 3 %.
+"""
+REST_S = 0.2
+
+HELD = np.dtype(
+    [
+        ("count", "i8"),
+        ("point_m", "f8", (MOST, 2, 3)),  # in either body's frame
+        ("load_n", "f8", (MOST,)),
+        ("outward", "f8", (2, 3)),  # of either body's surface, its frame, mean over the points
+        ("used", "i8"),  # of the set that poles were made for: how many points
+        ("used_m", "f8", (MOST, 3)),  # on the body that keeps them best
+        ("used_n", "f8", (MOST,)),
+        ("used_s", "f8"),  # since then
+    ],
+    align=True,
+)
+"""What of a pair carries; beside its row of PAIR, in the same slot."""
+
+STAND = np.dtype(
+    [
+        ("stale", "i8"),  # 1 where its poles are not those of its contacts
+        ("stale_s", "f8"),  # since when
+        ("wait_s", "f8"),  # until they may be made again
+        ("wanted", "i8"),  # 1: they are to be made before this step rings
+        ("points", "i8"),  # held points that its poles are of
+        ("steps", "i8"),  # steps that it rang on them, and of those, in how many some contact was beyond its law
+        ("lifted", "i8"),
+    ],
+    align=True,
+)
+"""How a body stands."""
+
+SHARE = 0.08
+"""Of simulated time that may go into new poles: with it, a pile of a hundred boxes costs 40 % more, and live sound is
+never late for it. Who waits longest is served first, what moves before what does not.
+"""
+SAVED_S = 0.03
+"""Most of it that is saved up for a moment in which many come to rest."""
+AGAIN_S = 0.02
+"""A body's poles stay at least so long, four blocks of the bank."""
+
+
+@njit(nogil=True, error_model="numpy")
+def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, dt_s):
+    """All pairs move on by the step whose rows are first … stop - 1; pairs without them for SPAN steps let go."""
+    row = first
+    for i in range(count):
+        slot = active[i]
+        pair, one = pairs[slot], held[slot]
+        while row < stop and rows[row].key < pair.key:
+            row += 1
+        begin = row
+        while row < stop and rows[row].key == pair.key:
+            row += 1
+        carries = pair.support_n[0] > 0.0
+        if one.count == 0 and not carries:
+            continue
+        touches = False
+        for column in range(NOW, NOW + SPAN):
+            touches = touches or pair.force_n[column] > 0.0
+        if not touches:
+            let_go(one, pair, stand)
+            continue
+        size = np.inf
+        for side in range(2):
+            if bodies[pair.body[side]].volume_m3 > 0.0:
+                size = min(size, bodies[pair.body[side]].size_m)
+        near = NEAR * size if size < np.inf else np.inf
+        share = min(pair.support_n[0] / pair.force_n[NOW], 1.0) / dt_s if pair.force_n[NOW] > 0.0 else 0.0
+        _smooth(one, rows, begin, row, share, near, 1.0 - np.exp(-dt_s / SMOOTH_S))
+        one.used_s += dt_s
+        if _differs(one, near):
+            one.used, one.used_s = one.count, 0.0
+            for k in range(one.count):
+                one.used_n[k] = one.load_n[k]
+                for x in range(3):
+                    one.used_m[k, x] = one.point_m[k, 0, x]
+            stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
+
+
+@njit(nogil=True, error_model="numpy")
+def let_go(one, pair, stand):
+    """Nothing of a pair carries any more."""
+    if one.used:
+        stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
+    one.count = one.used = 0
+    one.used_s = 0.0
+
+
+@njit(nogil=True, error_model="numpy")
+def _nearest(one, point, count):
+    """The held point nearest to a row's (2, 3), by the body on which it moved less, and how near."""
+    best, least = 0, np.inf
+    for k in range(count):
+        for side in range(2):
+            square = 0.0
+            for x in range(3):
+                off = one.point_m[k, side, x] - point[side, x]
+                square += off * off
+            if square < least:
+                best, least = k, square
+    return best, np.sqrt(least)
+
+
+@njit(nogil=True, error_model="numpy")
+def _smooth(one, rows, begin, end, share, near, follow):
+    """The held points take in rows begin … end - 1, whose loads in N·s times ``share`` are newtons."""
+    target, place, old = np.zeros(MOST), np.zeros((MOST, 2, 3)), one.count
+    total, outward = 0.0, np.zeros((2, 3))
+    for r in range(begin, end):
+        load = rows[r].load_n_s * share
+        if load <= 0.0:
+            continue
+        k, off = _nearest(one, rows[r].point_m, one.count)
+        if off > near and one.count < MOST:
+            k = one.count
+            one.count += 1
+            one.load_n[k] = 0.0
+            one.point_m[k] = rows[r].point_m
+        target[k] += load
+        total += load
+        place[k] += load * rows[r].point_m
+        outward += load * rows[r].outward
+    if total > 0.0:
+        _lean(one, outward, follow if old else 1.0)
+    whole = 0.0
+    for k in range(one.count):
+        one.load_n[k] += follow * (target[k] - one.load_n[k])
+        whole += one.load_n[k]
+        if target[k] > 0.0:  # what it adds to the load it brings its place with: the moment is smoothed as the load is
+            share = follow * target[k] / one.load_n[k]
+            one.point_m[k] += share * (place[k] / target[k] - one.point_m[k])
+    kept = 0
+    for k in range(one.count):
+        if one.load_n[k] >= LEAST * whole or target[k] > 0.0:
+            one.load_n[kept] = one.load_n[k]
+            one.point_m[kept] = one.point_m[k]
+            kept += 1
+    one.count = kept
+
+
+@njit(nogil=True, error_model="numpy")
+def _lean(one, outward, follow):
+    """The pair's normals follow those of a step, weighted (2, 3)."""
+    for side in range(2):
+        length = np.sqrt((outward[side] ** 2).sum())
+        mean = one.outward[side] + follow * (outward[side] / max(length, 1e-300) - one.outward[side])
+        one.outward[side] = mean / max(np.sqrt((mean**2).sum()), 1e-300)
+
+
+@njit(nogil=True, error_model="numpy")
+def _differs(one, near):
+    """Whether the points are others than those that poles were made for, or loaded otherwise."""
+    if one.count != one.used:
+        return True
+    off = OFF if one.used_s > REST_S else FAR_OFF
+    for k in range(one.count):
+        if not one.used_n[k] / off <= one.load_n[k] <= one.used_n[k] * off:
+            return True
+        square = 0.0
+        for x in range(3):
+            square += (one.point_m[k, 0, x] - one.used_m[k, x]) ** 2
+        if np.sqrt(square) > near:
+            return True
+    return False
+
+
+@njit(nogil=True, error_model="numpy")
+def price_s(modes, points):
+    """What new poles cost, in s of a processor of 2025, by what they are made of: the same on every machine."""
+    return 5e-4 + 1.5e-4 * points + 2e-7 * (modes + 6) ** 2
+
+
+@njit(nogil=True, error_model="numpy")
+def choose_bodies(
+    pairs, active, count, held, stand, bodies, ringing, pulses, found, drive_body, drives, dt_s, credit_s
+):
+    """Mark as wanted those whose poles are to be made before this step rings; their number. credit_s (1,): what is
+    left of the time for it. Silent bodies wait: nothing of them is heard.
+    """
+    credit_s[0] = min(credit_s[0] + SHARE * dt_s, SAVED_S)
+    some = False
+    for b in range(len(stand)):
+        one = stand[b]
+        one.wait_s = max(one.wait_s - dt_s, 0.0)
+        if one.stale:
+            one.stale_s += dt_s
+            some = some or (one.wait_s == 0.0 and bodies[b].modes > 0)
+    if not some or credit_s[0] <= 0.0:
+        return 0
+    sounds, points = np.zeros(len(stand), np.int64), np.zeros(len(stand), np.int64)
+    for side in range(2):
+        for i in range(found):
+            sounds[pulses[i].body[side]] = 1
+        for i in range(drives):
+            sounds[drive_body[i, side]] = 1
+        for i in range(count):
+            points[pairs[active[i]].body[side]] += held[active[i]].count
+    for b in range(len(stand)):
+        now = ringing[b]
+        sounds[b] |= now.ringing | now.driven | now.tiled | (now.strike >= 0)
+        sounds[b] &= stand[b].stale & (stand[b].wait_s == 0.0) & (bodies[b].modes > 0)
+    wanted = 0
+    while credit_s[0] > 0.0:
+        best = _longest_stale(stand, bodies, sounds)
+        if best < 0:
+            break
+        one = stand[best]
+        sounds[best] = one.stale = 0
+        one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, AGAIN_S, points[best]
+        credit_s[0] -= price_s(bodies[best].modes, points[best])
+        wanted += 1
+    return wanted
+
+
+@njit(nogil=True, error_model="numpy")
+def _longest_stale(stand, bodies, waits):
+    """Who of those that wait comes first: of those that move, the one stale longest, then of those that do not; -1 for
+    nobody.
+    """
+    best = -1
+    for b in range(len(stand)):
+        if waits[b]:
+            if best < 0:
+                best = b
+                continue
+            fixed, best_fixed = bodies[b].mass_kg <= 0.0, bodies[best].mass_kg <= 0.0
+            if (best_fixed and not fixed) or (fixed == best_fixed and stand[b].stale_s > stand[best].stale_s):
+                best = b
+    return best
+
+
+@njit(nogil=True, error_model="numpy")
+def count_lifted(stand, bank_body, ringing, law, z, driven):
+    """Count the steps in which what rings would lift a body off: Σ_k lift_k |z_k| > 1, law[6]: lift, newtons per unit
+    of z over the load, at the point that lifts first.
+    """
+    modes = law.shape[1]
+    for b in range(len(stand)):
+        if stand[b].points and (ringing[b].ringing or ringing[b].driven):
+            total = 0.0
+            for m in range(bank_body[b].start, bank_body[b].stop):
+                if law[6, m] > 0.0:
+                    x, y = z[m] + driven[m], z[modes + m] + driven[modes + m]
+                    total += law[6, m] * np.sqrt(x * x + y * y)
+            stand[b].steps += 1
+            stand[b].lifted += total > 1.0

@@ -1,0 +1,221 @@
+"""What bodies stand on acts on their modes: other poles while they touch, and what passes on to whom they touch.
+
+    HELD of a body's pairs -> touches: places on both bodies, springs of the regions that touch     (support)
+        -> first_order -> poles, what passes to each partner, when it lifts -> the bank, from its next block on
+
+The driver says who (`held_contacts.choose_bodies`): whose contacts are others than those its poles were made for, and
+who is heard. The modes of each body stay its own, with its poles; what little the touches turn them into each other is
+left out. Lines of a residual take the change of the mode that they follow. Chains of bodies are not claimed: a body's
+poles know its partners as they are when nothing touches these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet.geometry.nearest_point import nearest
+from sonic_bullet.records import Array
+from sonic_bullet.render.contact_place import CREASE_COS, FLAT_CURVATURE, SIZELESS_M
+from sonic_bullet.render.strike_pulses import STRUCK_FLAT
+from sonic_bullet.render.synthesis_state import State
+from sonic_bullet.support import (
+    ContactSpring,
+    InPlace,
+    Place,
+    Region,
+    Touch,
+    contact_spring,
+    first_order,
+)
+from sonic_bullet.synth import bank
+from sonic_bullet.synth.strikes import SPAN
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
+ON = 0.02
+"""Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
+NARROW = 0.1
+"""Least width of a face that touches over its length: where two corners alone are known."""
+LEAST_PASSED = 0.3
+"""Of a body's own loudest weight: what passes on with less would add 0.4 dB to it, and is left out."""
+FASTEST_TURN, STOPPED = 3.0, 0.05
+"""Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """On matrices of a hundred more threads take seconds, and give other bits on other machines."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def settle(state: State, number: int) -> None:
+    """New poles for the bodies that the driver wants, before step ``number`` rings."""
+    with _blas().limit(limits=1, user_api="blas"):
+        for b in np.flatnonzero(state.stand["wanted"]).tolist():
+            state.stand["wanted"][b] = 0
+            _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
+
+
+def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
+    """Partners of a body, its touches, the load (c,) on each, and what it becomes. quaternion (b, 4): all bodies'."""
+    partners, touches, load_n = _touches(state, b, quaternion)
+    moving = [state.resonators[p].moving for p in partners]
+    return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches)
+
+
+def _stand(state: State, b: int, quaternion: Array) -> None:
+    partners, touches, load_n, placed = standing(state, b, quaternion)
+    free = _lanes(state, b)
+    m = state.resonators[b].mode_count
+    if not touches:
+        bank.set_poles(state.bank, state.ringing, b, free)
+        bank.set_passes(state.bank, state.ringing, b, {})
+        return
+    new = _audible((-placed.decay_per_s + 1j * placed.omega_rad_s) / state.bank.sr, free[:m])
+    voice = state.voices[b]
+    if voice is not None:
+        new = np.concatenate([new, free[m:] + (new - free[:m])[voice.follows]])
+    lift = np.zeros(len(free))
+    lift[:m] = np.nan_to_num(np.abs(placed.force_n_s) / load_n[:, None]).max(axis=0)
+    bank.set_poles(state.bank, state.ringing, b, new, lift)
+    bank.set_passes(state.bank, state.ringing, b, dict(_passed(state, b, partners, placed, len(free))))
+
+
+def _lanes(state: State, b: int) -> Array:
+    """s a sample (m + lines,) of a body that nothing touches."""
+    row = state.bank.body[b]
+    lanes = slice(int(row["start"]), int(row["start"] + row["columns"]))
+    step: Array = state.bank.law[0, lanes] + 1j * state.bank.law[1, lanes]
+    return step
+
+
+def _audible(new: Array, free: Array) -> Array:
+    """Poles as the bank can play them: what the touches stop or make too fast is gone within a block."""
+    stopped = -STOPPED + 1j * np.minimum(free.imag, FASTEST_TURN)
+    fast = ~np.isfinite(new) | (new.imag > FASTEST_TURN) | (new.imag <= 1e-6) | (-new.real > new.imag)
+    return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
+
+
+def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
+    """Weights (W, columns) of what passes to each partner that is heard."""
+    own = np.abs(state.resonators[b].weight[0]).max(initial=0.0)
+    for p, rate in zip(partners, placed.passes, strict=True):
+        weight = np.zeros((len(state.bank.observed), columns), complex)
+        weight[:, : rate.shape[1]] = np.nan_to_num(state.resonators[p].weight @ rate)
+        if np.abs(weight[0]).max(initial=0.0) > LEAST_PASSED * own or np.abs(weight[1:]).max(initial=0.0) > 0:
+            yield p, weight
+
+
+def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array]:
+    """Partners of a body, its touches, and the load on each (c,)."""
+    partners: list[int] = []
+    touches, loads = [], []
+    pairs = state.pairs
+    for slot in pairs.active[: pairs.count[0]].tolist():
+        held, both = pairs.held[slot], pairs.pair["body"][slot].tolist()
+        if b not in both or not held["count"]:
+            continue
+        side = both.index(b)
+        other = both[1 - side]
+        if other not in partners:
+            partners.append(other)
+        places = [_places(state, both[s], held, s, axes) for s, axes in enumerate(_axes(held, quaternion[both]))]
+        curvature = places[0][1] + places[1][1]
+        load = held["load_n"][: held["count"]]
+        for i, spring in enumerate(_springs(state, both, held, curvature, load)):
+            touches.append(Touch(partners.index(other), places[side][0][i], places[1 - side][0][i], spring))
+            loads.append(load[i])
+    return partners, touches, np.array(loads)
+
+
+def _axes(held: Array, quaternion: Array) -> Array:
+    """Normal and two tangents (2, 3, 3) as rows in either side's frame, the same directions for both. quaternion (2,
+    4).
+    """
+    turn = [_rotation(one) for one in quaternion]
+    normal = turn[0] @ held["outward"][0]
+    x, y, z = normal.tolist()
+    across = np.array([0.0, z, -y] if abs(x) < 0.6 else [-z, 0.0, x])
+    across /= np.sqrt(across @ across)
+    u, v, w = across.tolist()
+    axes = np.array([normal, across, [y * w - z * v, z * u - x * w, x * v - y * u]])
+    return np.stack([axes @ one for one in turn])
+
+
+def _rotation(quaternion: Array) -> Array:
+    """(3, 3) from a body's frame into space."""
+    x, y, z, w = quaternion.tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[list[Place], Array, Array]:
+    """Places of a pair's points on one body, the surface's curvature there (c,), and whether each was found (c,)."""
+    one, row = state.resonators[b], state.table.bodies[b]
+    point = held["point_m"][: held["count"], side]
+    shape, curvature = np.zeros((len(point), 3, one.mode_count)), np.zeros(len(point))
+    if one.index is not None and one.body.model is not None:
+        outward = np.broadcast_to(held["outward"][side], point.shape)
+        face, weight, _ = nearest(one.index, point, outward)
+        corner = one.body.model.face[face]
+        shape = np.einsum("pc,pcxm->pxm", weight, one.shape[corner].astype(float))
+        vertex = one.body.model.vertex_m[corner]
+        normal = np.cross(vertex[:, 1] - vertex[:, 0], vertex[:, 2] - vertex[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        leans = (normal * outward).sum(axis=1) < CREASE_COS
+        curvature = np.where(leans, row["edge_per_m"], one.body.model.curvature_per_m[face])
+    if np.isfinite(row["curvature_per_m"]):
+        curvature = np.full(len(point), row["curvature_per_m"])
+    return [Place(s, p, axes) for s, p in zip(shape, point, strict=True)], curvature, point
+
+
+def _springs(state: State, both: list[int], held: Array, curvature: Array, load: Array) -> Iterator[ContactSpring]:
+    """The spring of each of a pair's points: of its part of one region, or of a region of its own."""
+    sides = state.resonators[both[0]].side, state.resonators[both[1]].side
+    sizes = [float(row["size_m"]) for row in state.table.bodies[both] if row["volume_m3"] > 0]
+    size = min(sizes, default=SIZELESS_M)
+    region = _one_region(state, both, held, curvature, size) if len(load) > 1 else None
+    whole = float(load.sum())
+    if region is not None:
+        spring = contact_spring(region, sides, whole)
+        yield from (spring.share(float(n) / whole) for n in load)
+        return
+    for n, bent in zip(load.tolist(), curvature.tolist(), strict=True):
+        small = STRUCK_FLAT * size
+        point = (
+            Region((small, small), (0.0, 0.0)) if bent * size <= FLAT_CURVATURE else Region((0.0, 0.0), (bent, bent))
+        )
+        yield contact_spring(point, sides, n)
+
+
+def _one_region(state: State, both: list[int], held: Array, curvature: Array, size: float) -> Region | None:
+    """The line or face that touches between a pair's points; None where nothing does there."""
+    point = held["point_m"][: held["count"]]
+    span = np.ptp(point[:, 0], axis=0)
+    if np.linalg.norm(span) < STRUCK_FLAT * size:
+        return None
+    for side, b in enumerate(both):
+        index = state.resonators[b].index
+        if index is not None:
+            off = nearest(index, point[:, side].mean(axis=0)[None], held["outward"][side][None])[2][0]
+            if off > ON * np.linalg.norm(span):
+                return None
+    middle = point[:, 0] - point[:, 0].mean(axis=0)
+    along = np.linalg.svd(middle)[2]
+    half = np.abs(middle @ along.T).max(axis=0)
+    bent = float(curvature.mean())
+    if bent * size > FLAT_CURVATURE:  # mean of both principal curvatures, of which a line has one
+        return Region((float(half[0]), 0.0), (0.0, 2 * bent))
+    return Region((float(half[0]), float(max(half[1], NARROW * half[0]))), (0.0, 0.0))

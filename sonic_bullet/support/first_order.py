@@ -1,0 +1,111 @@
+"""Poles of a body while it touches, in milliseconds: springs exactly, what loses and what partners yield in one step.
+
+    (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, −Φ_r)     the body's modes and rigid motions, light partners' rigid motions
+    F_n = Re(K) B q_n,  s = jω_k                   forces at the touches, of each motion
+    g = Y F_k,  Y = 1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)     what gives way beside the springs, and how far
+    x = F_kᵀg,  ρ = gᵀRg/x,  R = Re K − Σ_{n≠k} F_n F_nᵀ/(ω_n² − ω_k²)     what all other motions hold against it
+    δ = x/(1 + ρ),  ε = dδ/ds²                      exact at one touch, or of one thing that yields
+    s² + 2 s qᵀDq + ω² − 2δ/(1 + √(1 − 4ε)) = 0     δ taken on as the one pole c²/(D + s²) that has this value and slope
+
+Of det(1 + Y(s)(Re K − Σ_n F_n F_nᵀ/(ω_n² + s²))) = 0, the springs' ends held and then let go. To first order in x it is
+Rayleigh's quotient of `in_place`, whose Newton goes on to the exact pole at many times the cost: how far the two are
+from each other is in docs/measured/in-place.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, in_place, touched_rows
+from sonic_bullet.support.moving import Moving
+
+
+def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
+    """See `in_place`; `turn` is the identity: modes are told by the motion that most resembles theirs when free."""
+    m = len(body.omega_rad_s)
+    if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
+        return in_place(body, partners, touches)
+    x, row = touched_rows(body, partners, touches, squared=False)
+    light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
+    yields = np.flatnonzero(x.other_lam > 0)
+    both = np.hstack([x.own, -x.other[:, light]])
+    spring = x.spring.real
+    stiff = both.T @ (spring[:, None] * both)
+    stiff[np.diag_indices(len(x.lam))] += x.lam
+    value, vector = np.linalg.eigh(stiff)
+    chosen = likest(vector[:m] ** 2)
+    vector[:, chosen] *= np.where(
+        np.diag(vector[:m, chosen]) < 0, -1, 1
+    )  # the mode's sign, so that what passes has one
+    q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
+    every = spring[:, None] * (both @ vector)
+    force = every[:, chosen]
+    s = 1j * omega
+    along = x.other[:, yields].T @ force
+    below = x.other_lam[yields, None] + 2 * x.other_decay[yields, None] * s + s**2
+    plate = (x.plate[:, None] - x.half_space[:, None] * s**2) / np.where(s == 0, 1, s)
+    lossy, gives = (1 / x.spring - 1 / spring)[:, None] * force, x.other[:, yields] @ (along / below) + plate * force
+    contact, partner = (force * lossy).sum(axis=0), (force * gives).sum(axis=0)
+    held_against = _held_against(spring, every, value, chosen, lossy + gives)
+    yielded = contact + partner
+    part = 1 / (1 + held_against / np.where(np.abs(yielded) > 0, yielded, 1))
+    shift = part * yielded
+    slope = -(part**2) * (along**2 / below**2).sum(axis=0)
+    shift *= 2 / (1 + np.sqrt(1 - 4 * slope))
+    shift = shift.real + 1j * np.minimum(shift.imag, 0)  # no mode gains
+    own = (q[:m] ** 2).T @ x.decay[:m]
+    new = -own + 1j * np.sqrt(omega**2 - shift - own**2)
+    held = (omega > HELD * np.sqrt(x.lam[:m].max())) | (-new.real > STOPPED * np.abs(new)) | ~(new.imag > 0)
+    root = np.sqrt(x.lam[:m])
+    new = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), new)
+    force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
+    lifts = np.zeros((3 * len(touches), m))
+    lifts[row] = np.abs(force)
+    rate = part / below
+    passed = np.where(held, 0, along * rate / (1 + shift * rate))
+    passed /= 1 + (np.abs(passed) ** 2).sum(axis=0)
+    ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
+    decay = np.maximum(-new.real, 0.0)
+    power = np.stack([own, -contact.imag, -partner.imag], axis=1)
+    power[:, 1:] *= (np.abs(part) ** 2 / np.maximum(2 * omega, 1e-300))[:, None]
+    power = np.maximum(power, 0.0)
+    whole = np.maximum(power.sum(axis=1, keepdims=True), 1e-300)
+    return InPlace(
+        new.imag,
+        decay,
+        np.eye(m),
+        tuple(passed[a:b] for a, b in pairwise(ends)),
+        lifts[::3],
+        decay[:, None] * power / whole,
+        ~held,
+    )
+
+
+def _held_against(spring: Array, every: Array, value: Array, chosen: Array, gives: Array) -> Array:
+    """gᵀRg (m,) of forces F (r, n) of all motions and what gives way under the chosen ones', g (r, m). Two motions of
+    nearly one frequency would each need the other's: what they hold against each other is bounded by their product.
+    """
+    product = every.T @ gives  # F_nᵀ g_k
+    product[chosen, np.arange(len(chosen))] = 0
+    apart = value[:, None] - value[chosen]
+    bound = apart**2 + np.abs(product) ** 2
+    others = (product**2 * apart / np.where(bound > 0, bound, 1)).sum(axis=0)
+    return np.asarray((gives**2 * spring[:, None]).sum(axis=0) - others)
+
+
+def likest(share: Array) -> Array:
+    """Which column (m,) each row of shares (m, n) is, each column once, the largest share first."""
+    best = share.argmax(axis=1)
+    order = np.argsort(-share[np.arange(len(best)), best], kind="stable")
+    chosen = np.full(len(best), -1)
+    first = order[np.sort(np.unique(best[order], return_index=True)[1])]  # of those who want one column, who wants most
+    chosen[first] = best[first]
+    rest = np.flatnonzero(chosen < 0)
+    if len(rest):
+        left = np.setdiff1d(np.arange(share.shape[1]), chosen)
+        chosen[rest] = left[likest(share[np.ix_(rest, left)])]
+    return chosen

@@ -1,0 +1,188 @@
+"""A body while it touches others: its modes there, and what passes on to those that it touches.
+
+    Moving (body, partners) + Touch (points, springs) -> Touched -> poles -> InPlace
+
+One body is solved at a time, its partners as they are when nothing else touches them: what lies on what lies on a
+table yields as if on the table's own modes alone; longer chains are not claimed.
+
+Energy: ½|z|² of the new modes is that of the body and its touches' springs. A change of touches is an orthogonal map
+of z, and no decay is below zero: nothing that comes or goes adds energy. A touch begins unstretched, and what one held
+when it goes stays with the body. (A spring attached at an old length would add without bound.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from hashlib import blake2b
+from itertools import pairwise
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.support.coupled_poles import Touched, inverse_w, poles, squares, start
+from sonic_bullet.support.moving import Moving, Place
+from sonic_bullet.support.springs import ContactSpring
+
+STOPPED = 0.99
+"""d over |s| of what no longer swings: a touch holds that motion."""
+LOST = 0.05
+"""Of a new mode's motion, in the lane it is given: below this nothing of it passes on."""
+HELD = 2.0
+"""A new mode above so many times the highest own one is the touches' own stiffness: its motion is stopped."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Touch:
+    """One point at which a body touches partner number ``partner``. own, other: the point on either; spring: of this
+    point alone.
+    """
+
+    partner: int
+    own: Place
+    other: Place
+    spring: ContactSpring
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InPlace:
+    """A body while it touches: m modes as before, mixed.
+
+    turn (m, m) real, orthogonal: new modes in old ones, by columns; column k is what old mode k became (the identity
+    where they do not mix). State z, gains Uᵀj and shapes of the free modes become turnᵀ z, turnᵀ Uᵀj, Φ turn: ½|z|²
+    stays what it is. omega_rad_s, decay_per_s (m,): poles of the new modes; no decay is below 0. passes: for each
+    partner (m_p, m) complex, its modes' velocity per velocity of each new mode, at most ½ in all: of two that meet at
+    one frequency, each has the other's half. force_n_s (c, m): amplitude of the normal force at each touch in N, for a
+    velocity amplitude z of 1 of a new mode: where Σ|force z| exceeds the load the touch lifts. shares (m, 3): parts of
+    decay_per_s that are its own, the contacts' loss, the partners'. newton (m,): whether Newton's pole stands.
+    """
+
+    omega_rad_s: Array
+    decay_per_s: Array
+    turn: Array
+    passes: tuple[Array, ...]
+    force_n_s: Array
+    shares: Array
+    newton: Array
+
+
+def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
+    """What a body becomes at these touches. None of them: what it is when free."""
+    m = len(body.omega_rad_s)
+    if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
+        return InPlace(
+            body.omega_rad_s,
+            body.decay_per_s,
+            np.eye(m),
+            tuple(np.zeros((len(p.omega_rad_s), m), complex) for p in partners),
+            np.zeros((len(touches), m)),
+            np.stack([body.decay_per_s, np.zeros(m), np.zeros(m)], axis=1),
+            np.ones(m, bool),
+        )
+    x, row = touched_rows(body, partners, touches)
+    found = _described(x, m, partners, *poles(x, *start(x, m)))
+    force = np.zeros((3 * len(touches), m))
+    force[row] = found.force_n_s
+    return replace(found, force_n_s=force[::3])
+
+
+def touched_rows(
+    body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], *, squared: bool = True
+) -> tuple[Touched, Array]:
+    """All springs of all touches, and which of their (3c,) directions those are: what slides has none. squared: with
+    φφᵀ, which Newton needs.
+    """
+    begin = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
+    own = np.concatenate([body.moves(touch.own) for touch in touches])
+    other, under = np.zeros((len(own), int(begin[-1]))), np.zeros((2, len(touches), 3))
+    for i, touch in enumerate(touches):
+        p = touch.partner
+        other[3 * i : 3 * i + 3, begin[p] : begin[p + 1]] = partners[p].moves(touch.other)
+        under[:, i, 0] = partners[p].plate_m_n_s, partners[p].half_space_m_s_n
+    spring = np.array([(t.spring.normal_n_m, *2 * (t.spring.tangential_n_m,)) for t in touches], complex).ravel()
+    row = np.flatnonzero(spring)
+    of = Touched(
+        own[row],
+        other[row],
+        spring[row],
+        body.lam,
+        body.decay,
+        np.concatenate([p.lam for p in partners]),
+        np.concatenate([p.decay for p in partners]),
+        under[0].ravel()[row],
+        under[1].ravel()[row],
+        squares(own[row] if squared else own[:0]),
+        squares(other[row] if squared else other[:0]),
+    )
+    return of, row
+
+
+def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Array, stands: Array) -> InPlace:
+    """The record of poles s (m,) and motions q (m, N)."""
+    modes = q[:, :m]
+    q = q / np.exp(0.5j * np.angle((modes * modes).sum(axis=1)))[:, None]  # as real as can be
+    q *= np.where(np.diag(q.real) < 0, -1, 1)[:, None]
+    left, _, right = np.linalg.svd(q[:, :m].real.T)
+    turn = left @ right  # the orthogonal matrix nearest to them [Schönemann 1966]
+    along = (turn.T * q[:, :m]).sum(axis=1)
+    lost = np.where(np.abs(along) > LOST, along, np.inf)
+    v = q / lost[:, None]  # velocities where the lane's is 1
+    root = np.sqrt(x.lam[:m])
+    held = (s.imag > HELD * root.max()) | ~(-s.real < STOPPED * np.abs(s)) | (s.imag <= 0)
+    s = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), s)
+    v[held] = 0
+    decay = np.maximum(-s.real, 0.0)
+    force = np.linalg.solve(inverse_w(x, s)[0], (v @ x.own.T)[..., None])[..., 0]
+    at = s[:, None]
+    passed = at * (force @ x.other) / (at**2 + 2 * x.other_decay * at + x.other_lam)
+    passed /= 1 + (np.abs(passed) ** 2).sum(axis=1, keepdims=True)
+    ends = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
+    return InPlace(
+        s.imag,
+        decay,
+        turn,
+        tuple(passed[:, a : b - 6].T for a, b in pairwise(ends)),
+        np.abs(force).T,
+        _shares(x, m, s.imag, decay, v, force),
+        stands & ~held,
+    )
+
+
+def _shares(x: Touched, m: int, omega: Array, decay: Array, v: Array, force: Array) -> Array:
+    """Parts (m, 3) of the decays, by the mean powers Σ d|v|², ½ F* Re(jω/K) F and ½ F* Re(Y_p) F."""
+    spring = 0.5 * (np.abs(force) ** 2 * (1j * omega[:, None] / x.spring).real).sum(axis=1)
+    both = 0.5 * np.einsum("ki,kij,kj->k", force.conj(), inverse_w(x, 1j * omega)[0].real, force).real
+    own = (np.abs(v[:, :m]) ** 2 * x.decay[:m]).sum(axis=1)
+    power = np.maximum(np.stack([own, spring, both - spring], axis=1), 0.0)
+    whole = power.sum(axis=1, keepdims=True)
+    return np.asarray(decay[:, None] * np.where(whole > 0, power / np.where(whole > 0, whole, 1), [1.0, 0.0, 0.0]))
+
+
+class KeptPlaces:
+    """`in_place`, its last results kept: a body that gets the same touches and loads again, as its loads are quantised
+    (`quantised`), is not solved again.
+    """
+
+    def __init__(self, most: int = 512) -> None:
+        self._most, self._kept = most, dict[bytes, InPlace]()
+
+    def __call__(self, body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
+        """See `in_place`."""
+        name = blake2b()
+        for one in (body, *partners):
+            numbers = np.array([len(one.omega_rad_s), one.mass_kg, one.plate_m_n_s, one.half_space_m_s_n])
+            for array in (numbers, one.omega_rad_s, one.decay_per_s, one.inertia_kg_m2):
+                name.update(np.ascontiguousarray(array, float).tobytes())
+        for touch in touches:
+            name.update(np.array([touch.partner, touch.spring.normal_n_m, touch.spring.tangential_n_m]).tobytes())
+            for place in (touch.own, touch.other):
+                for array in (place.shape, place.arm_m, place.axes):
+                    name.update(np.ascontiguousarray(array, float).tobytes())
+        key = name.digest()
+        found = self._kept.pop(key, None)
+        if found is None:
+            found = in_place(body, partners, touches)
+            while len(self._kept) >= self._most:
+                del self._kept[next(iter(self._kept))]
+        self._kept[key] = found  # the last asked for stands last
+        return found

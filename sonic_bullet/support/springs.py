@@ -1,0 +1,128 @@
+"""Stiffness and loss of a contact, from the region of touching, the materials and the load.
+
+    K_c = π E* a / 𝐊(e),  e² = 1 − (b/a)²     a region with half-axes a >= b acts as the flat punch of its outline
+        [Green & Sneddon 1950; of a circle 2E*a: Johnson 1985, Contact Mechanics, eq. 3.36]
+    point  √(ab) = (3N/4E*√(κ₁κ₂))^{1/3}, b/a = (κ₁/κ₂)^{2/3}          K_c = (6 E*² R N)^{1/3} where κ₁ = κ₂ = 1/R
+        [Johnson 1985, eq. 4.22, 4.28]
+    line   b = √(4N/πE*Lκ),  a = L/2                                   [Johnson 1985, eq. 4.43]
+    face   a, b of the geometry; rectangles as the ellipse of their area and aspect
+    K_r = N/u₀,  u₀ = h/2                     roughness in series, h rms of both    [Persson 2007, PRL 99, 125502]
+    1/K = (1/K_c + 1/K_r)/(1 + jη),  K_t/K = 2(1 − ν)/(2 − ν)          [Mindlin 1949; Johnson 1985, eq. 7.42, 7.44]
+    η = Σ η_i c_i/Σ c_i,  c_i = (1 − ν_i²)/E_i             loss by each material's share of the compliance, 1/E* = Σ c_i
+    pad    K = EA/h, sideways GA/h
+
+Increments about a load see the region of that load stay as it is [Barber 2003, Proc. R. Soc. A 459, 53]. Asperities are
+of the same two materials, and lose as they do. η is a constant, as in the handbooks: the Rayleigh law of wood, made for
+an object's modes, would lose a third of a cycle's energy at 17 kHz.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records import Material
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.errors import RecordError
+
+PERSSON = 0.5
+"""u₀ over rms roughness: 0.4 to 0.5 of self-affine surfaces [Persson 2007; Akarapu, Sharp & Robbins 2011, PRL 106]."""
+SQUARE = 2 / np.sqrt(np.pi)
+"""Half-axes of an ellipse over those of the rectangle that has its area."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSide:
+    """One body's part in a contact. modulus_pa: E as it is pressed (wood: across the grain); loss_factor: η."""
+
+    modulus_pa: float
+    poisson: float
+    loss_factor: float
+    roughness_m: float
+
+    @classmethod
+    def of(cls, material: Material) -> ContactSide:
+        """What a material is where it is touched: its softest axis, and its least Rayleigh loss, 2√(αβ)."""
+        softest = float(1 / np.diag(np.linalg.inv(material.stiffness_pa))[:3].max())
+        loss = 2 * float(np.sqrt((material.alpha_per_s or 0.0) * (material.beta_s or 0.0)))
+        return cls(softest, material.poisson, loss, material.roughness_m)
+
+    @property
+    def compliance_per_pa(self) -> float:
+        """(1 − ν²)/E"""
+        return (1 - self.poisson**2) / self.modulus_pa
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Where two bodies touch, along two axes in their tangent plane. half_m: how far they conform, 0 where they curve
+    apart at once; curvature_per_m: κ of both together, of no matter where they conform. A ball on a plane: (0, 0), (κ,
+    κ); a rod that lies on it: (L/2, 0), (0, 1/R); a box: (l/2, w/2), (0, 0).
+    """
+
+    half_m: tuple[float, float]
+    curvature_per_m: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for half, curvature in zip(self.half_m, self.curvature_per_m, strict=True):
+            if not (0 < half < np.inf or (half == 0 and 0 < curvature < np.inf)):
+                raise RecordError(
+                    f"a region of touching with half-length {half} m and curvature {curvature} 1/m along one axis",
+                    "give a half-length above zero, or 0 and a curvature above zero",
+                )
+
+    def half_axes_m(self, modulus_pa: float, load_n: float) -> tuple[float, float]:
+        """a >= b in m of the ellipse that touches under a load. modulus_pa: E*."""
+        if not any(self.half_m):
+            small, large = sorted(self.curvature_per_m)
+            mean = (3 * load_n / (4 * modulus_pa * np.sqrt(small * large))) ** (1 / 3)
+            longer = (large / small) ** (1 / 3)
+            return mean * longer, mean / longer
+        a, b = self.half_m
+        if not all(self.half_m):
+            curved = self.curvature_per_m[0 if a == 0 else 1]
+            b = float(np.sqrt(2 * load_n / (np.pi * modulus_pa * max(a, b) * curved)))
+            a = max(self.half_m)
+        return SQUARE * max(a, b), SQUARE * min(a, b)
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSpring:
+    """Complex stiffness in N/m for e^{jωt}, ω > 0: along the normal, and across it."""
+
+    normal_n_m: complex
+    tangential_n_m: complex
+
+    def share(self, part: float) -> ContactSpring:
+        """The spring of a part of the region: what several points share."""
+        return ContactSpring(self.normal_n_m * part, self.tangential_n_m * part)
+
+
+def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_n: float) -> ContactSpring:
+    """The whole region's spring under the whole load in N. Raises RecordError for a load that is not above zero."""
+    from scipy.special import ellipkm1
+
+    load = as_number(load_n, "load of a contact", "give a load above zero", above=0)
+    c = np.array([side.compliance_per_pa for side in sides])
+    a, b = region.half_axes_m(1 / c.sum(), load)
+    smooth = np.pi * a / (c.sum() * float(ellipkm1((b / a) ** 2)))
+    lift = PERSSON * float(np.hypot(sides[0].roughness_m, sides[1].roughness_m))
+    loss = float(c @ [side.loss_factor for side in sides] / c.sum())
+    normal = (1 + 1j * loss) / (1 / smooth + lift / load)
+    poisson = float(c @ [side.poisson for side in sides] / c.sum())
+    return ContactSpring(normal, normal * 2 * (1 - poisson) / (2 - poisson))
+
+
+def pad_spring(modulus_pa: float, poisson: float, loss_factor: float, area_m2: float, height_m: float) -> ContactSpring:
+    """The spring of a pad of felt or rubber: EA/h along its height, GA/h across: a short column that does not bulge."""
+    area = as_number(area_m2, "area of a pad", "give an area above zero", above=0)
+    height = as_number(height_m, "height of a pad", "give a height above zero", above=0)
+    normal = as_number(modulus_pa, "modulus of a pad", "give a modulus above zero", above=0) * area / height
+    lossy = normal * (1 + 1j * as_number(loss_factor, "loss factor of a pad", "give 0 or above", least=0))
+    return ContactSpring(lossy, lossy / (2 * (1 + poisson)))
+
+
+def quantised(load_n: float, step: float = 1.1) -> float:
+    """The nearest power of ``step``: a Hertz spring of it is within 1.6 % of that of the load itself."""
+    return float(step ** np.round(np.log(load_n) / np.log(step)))

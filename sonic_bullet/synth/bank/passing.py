@@ -1,0 +1,115 @@
+"""What of one body's modes sounds at another that it touches.
+
+    passes (b, J) PASS: up to J partners of each body;  set j·W + w of weights at the lanes of body b:
+        y[w, to, n] += ramp[n] Σ Re(weight z[n])
+
+A mode of coupled bodies moves all of them; its shape on the others is the weight here, its pole the coupled one
+(`poles`), so a pass has no memory of its own. It begins and ends where a block of absolute time does, fading in over
+its first block and out over its last: nothing jumps, and any cutting of calls gives the same bits.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet.records import Array
+from sonic_bullet.synth.bank.kernels import uncounted
+from sonic_bullet.synth.bank.layout import FLUSH
+from sonic_bullet.synth.bank.tile import BLOCK
+
+if TYPE_CHECKING:
+    from sonic_bullet.synth.bank.instrument import Bank, BankState
+
+PASSES = 8
+"""Partners of a body to which it passes on at a time, those that fade out among them."""
+OFF, STEADY, COMING, RISING, LEAVING, FALLING, BRIEF = range(7)
+"""States of a pass. COMING, LEAVING: from the next block on RISING, FALLING; BRIEF: rises and is to fall."""
+PASS = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
+LEAVES = np.array([OFF, LEAVING, OFF, BRIEF, LEAVING, FALLING, BRIEF])
+"""What each becomes where it is to end."""
+
+
+@uncounted
+def move_on(b, ringing, passes):  # pragma: no cover - compiled
+    """Begin of body b's block: its passes move on."""
+    left = 0
+    for j in range(passes.shape[1] if ringing[b].passes else 0):
+        phase = passes[b, j].phase
+        if phase == COMING:
+            phase = RISING
+        elif phase == RISING:
+            phase = STEADY
+        elif phase in (LEAVING, BRIEF):
+            phase = FALLING
+        elif phase == FALLING:
+            phase = OFF
+        passes[b, j].phase = phase
+        left += phase != OFF
+    ringing[b].passes = left
+
+
+@uncounted
+def sounds(phase):  # pragma: no cover - compiled
+    """Whether a pass is heard."""
+    return phase not in (OFF, COMING)
+
+
+@uncounted
+def last_set(b, ringing, observed, passes):  # pragma: no cover - compiled
+    """The last set of weights that reads body b; 0 where none does."""
+    last, sets = 0, len(observed)
+    for w in range(sets):
+        if observed[w, b]:
+            last = w
+    if ringing[b].passes:
+        for j in range(passes.shape[1]):
+            if sounds(passes[b, j].phase):
+                last = (j + 2) * sets - 1
+    return last
+
+
+@uncounted
+def pass_on(b, j, w, i, place, values, count, passes, ringing, passed):  # pragma: no cover - compiled
+    """Add ``count`` values of body b's j-th pass, set w, to what its partner hears from sample i on; place: of the
+    first within its block.
+    """
+    phase, to = passes[b, j].phase, passes[b, j].to
+    ringing[to].passed_to = 1
+    out = passed[w, to, i : i + count]
+    for k in range(count):
+        x = (place + k) / BLOCK
+        ramp = x if phase in (RISING, BRIEF) else (1.0 - x if phase == FALLING else 1.0)
+        out[k] += ramp * values[k]
+
+
+@uncounted
+def add_passed(n, ringing, observed, source, passed, loud):  # pragma: no cover - compiled
+    """What was passed on joins what the bodies sound themselves; loud (b, 2): those now sound."""
+    for b in range(len(ringing)):
+        if ringing[b].passed_to:
+            ringing[b].passed_to, loud[b, 0] = 0, 1
+            for w in range(len(observed)):
+                for k in range(n):
+                    value = source[w, b, k] + passed[w, b, k]
+                    source[w, b, k] = value if abs(value) >= FLUSH else 0.0
+                    passed[w, b, k] = 0.0
+
+
+def set_passes(bank: Bank, state: BankState, b: int, wanted: Mapping[int, Array]) -> None:
+    """What body b passes on from the next block's start, at once where nothing of it sounds: weights (W, m) complex by
+    partner. What it passed on till then ends. Where places are wanting, the first of ``wanted`` have them.
+    """
+    start, m, modes = int(bank.body[b]["start"]), int(bank.body[b]["columns"]), bank.law.shape[1]
+    now, mine, sets = state.ringing[b], state.passes[b], len(bank.observed)
+    loud = now["ringing"] or now["driven"] or now["tiled"] or now["strike"] >= 0
+    mine["phase"] = LEAVES[mine["phase"]] if loud else OFF
+    places = np.flatnonzero(mine["phase"] == OFF)
+    for j, (to, weight) in zip(places, wanted.items(), strict=False):
+        mine[j] = to, COMING if loud else STEADY
+        rows = state.pass_weight[j * sets : (j + 1) * sets]
+        rows[:, start : start + m], rows[:, modes + start : modes + start + m] = weight.real, weight.imag
+    now["passes"] = np.count_nonzero(mine["phase"])

@@ -1,0 +1,111 @@
+"""Bodies in place, in the run time: live as replayed, what is held, what takes new poles, what passes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pybullet as p
+import pytest
+
+import sonic_bullet as sb
+from sonic_bullet.files import read_log
+from sonic_bullet.records import Material
+from sonic_bullet.render import render_log
+from tests.made.models import STEEL, WOOD, box_model
+from tests.made.residuals import modes, residual
+from tests.made.worlds import EDGES_M, TONES_HZ, box, plate_model
+
+DT = 1 / 240
+
+
+def board(client: Any) -> int:
+    """A wooden table-top of mass 0, top at z = 0."""
+    shape = client.createCollisionShape(p.GEOM_BOX, halfExtents=[0.4, 0.3, 0.012])
+    body = client.createMultiBody(0, shape, basePosition=[0, 0, -0.012])
+    client.changeDynamics(body, -1, restitution=0.5, contactProcessingThreshold=0)
+    return int(body)
+
+
+def landed(
+    client: Any, seconds: float = 1.0, turn: Any = (0.02, 0.01, 0.0), material: Material = STEEL, **options: Any
+) -> sb.Listener:
+    """A steel plate that falls flat on a wooden board."""
+    client.setGravity(0, 0, -9.81)
+    listener = sb.attach(client, seed=2, **options)
+    listener.add(board(client), material=WOOD, model=box_model((0.8, 0.6, 0.024), (90.0, 210.0, 480.0), WOOD))
+    listener.add(box(client, (0, 0, 0.03), turn=turn), material=material, model=plate_model())
+    for _ in range(round(seconds / DT)):
+        client.stepSimulation()
+    return listener
+
+
+def test_live_is_replayed_to_the_bit_whatever_stands_on_what(client: Any, tmp_path: Any) -> None:
+    """Live a step at a time, replayed 64 at a time, from memory and from the file; without supports another sound."""
+    listener = landed(client)
+    sound = listener.sound()
+    listener.contacts.save(tmp_path / "log.npz")
+    log = read_log(tmp_path / "log.npz")
+    assert log.supports
+    assert np.array_equal(render_log(log), sound)
+    hung = render_log(replace(log, supports=False))
+    late = slice(-9600, None)
+    assert np.mean(sound[:, late] ** 2) < 0.5 * np.mean(hung[:, late] ** 2), "it rings as if it hung in the air"
+
+
+def test_who_does_not_ask_for_supports_hears_bodies_that_hang(client: Any) -> None:
+    listener = landed(client, supports=False)
+    assert not listener.contacts.supports
+    assert np.array_equal(render_log(listener.contacts), listener.sound())
+
+
+def test_the_held_points_carry_the_weight_while_the_simulators_flicker(client: Any) -> None:
+    """Smoothed load and its moment: m g within 2 %, its centre under the body's within 2 % of its length."""
+    listener = landed(client, seconds=2.0)
+    state = listener._synth._state
+    (slot,) = state.pairs.active[: state.pairs.count[0]]
+    held = state.pairs.held[slot]
+    load, point = held["load_n"][: held["count"]], held["point_m"][: held["count"], 1]
+    assert load.sum() == pytest.approx(0.4 * 9.81, rel=0.02)
+    centre = load @ point / load.sum()
+    assert np.abs(centre[:2]).max() < 0.02 * EDGES_M[0]
+    assert 3 <= held["count"] <= 4
+
+
+def test_a_body_that_is_lifted_has_its_own_poles_again(client: Any) -> None:
+    listener = landed(client)
+    state, bank = listener._synth._state, listener._synth._state.bank
+    lanes = slice(int(bank.body["start"][1]), int(bank.body["start"][1]) + len(TONES_HZ))
+    assert (state.ringing.law[0, lanes] < bank.law[0, lanes]).all(), "what touches takes energy"
+    client.resetBasePositionAndOrientation(1, (0, 0, 2.0), (0, 0, 0, 1))
+    client.setGravity(0, 0, 0)
+    client.resetBaseVelocity(1, (0, 0, 0), (0, 0, 0))
+    for _ in range(30):
+        client.stepSimulation()
+    assert np.array_equal(state.ringing.law[:3, lanes], bank.law[:3, lanes])
+
+
+def test_a_line_of_a_residual_loses_what_the_mode_that_it_follows_loses(client: Any) -> None:
+    lines = ((TONES_HZ[0] + 40.0, 3.0, 0.3), (TONES_HZ[2] - 30.0, 5.0, 0.5))
+    source = modes(TONES_HZ, 10.0)
+    listener = landed(client, material=replace(STEEL, residual=residual(source, lines=lines)))
+    state = listener._synth._state
+    voice, row = state.voices[1], state.bank.body[1]
+    assert voice is not None
+    assert len(voice.follows) == len(lines)
+    lanes = slice(int(row["start"]), int(row["start"] + row["columns"]))
+    more = state.ringing.law[:2, lanes] - state.bank.law[:2, lanes]
+    assert (more[0] < 0).all()
+    assert more[:, len(TONES_HZ) :] == pytest.approx(more[:, voice.follows], rel=1e-9)
+
+
+def test_what_is_quenched_is_silent_on_both_sides(client: Any) -> None:
+    listener = landed(client, seconds=0.4)
+    listener.quench()
+    client.stepSimulation()
+    for _ in range(60):
+        client.stepSimulation()
+    at = int(0.4 * 48_000)
+    tail = listener.sound()[:, at + 8 :]
+    assert np.abs(tail).max() < 1e-3 * np.abs(listener.sound()).max()
