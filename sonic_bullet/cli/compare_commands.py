@@ -205,7 +205,7 @@ def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> No
     for scene in scenes:
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
-    root = Path(folder_place(folder, ""))
+    root = Path(folder_place(folder))
     root.mkdir(parents=True, exist_ok=True)
     to = places(*(str(root / f"{Path(scene).stem}.json") for scene in scenes))
     with quiet_stderr():

@@ -102,11 +102,11 @@ def folder_place(asked: str, *inside: str) -> str:
         place for place in (*(folder / name for name in inside), folder, *folder.parents) if not os.path.lexists(place)
     ]
     try:
-        for name in inside:
+        for name in inside or ("",):
             (folder / name).mkdir(parents=True, exist_ok=True)
             check_output(folder / name / "sound.wav")
     except OSError as error:
-        raise cannot("make the folder", os.path.join(asked, name), error) from error
+        raise cannot("make the folder", str(Path(asked, name)), error) from error
     finally:
         for place in missing:
             with suppress(OSError):

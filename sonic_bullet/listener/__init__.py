@@ -25,13 +25,12 @@ if TYPE_CHECKING:
         links_called,
         links_with_shapes,
         open_world,
-        own_clients,
         watch_settings,
     )
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
     from sonic_bullet.listener.pybullet.hooks import module_steps
     from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
-    from sonic_bullet.listener.pybullet.script import run_script
+    from sonic_bullet.listener.pybullet.script import own_clients, run_script
     from sonic_bullet.listener.world import World
 
 __all__ = [
@@ -71,7 +70,7 @@ _HOME = {
     "links_with_shapes": "pybullet.clients",
     "module_steps": "pybullet.hooks",
     "open_world": "pybullet.clients",
-    "own_clients": "pybullet.clients",
+    "own_clients": "pybullet.script",
     "run_script": "pybullet.script",
     "watch_settings": "pybullet.clients",
 }

@@ -124,7 +124,7 @@ class Elements:
         nothing coarser tells.
         """
         coarser, ratio = self._coarser()
-        if coarser is None:
+        if coarser is None or not len(fine):
             return np.full((3, len(fine)), np.nan)
         name = np.asarray(tensor).tobytes()
         if len(coarser.known.get(name, ())) < len(fine):

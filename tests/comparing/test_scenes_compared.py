@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pybullet
 import pytest
 
 import sonic_bullet
 from sonic_bullet.comparing import SceneSide, compare
 from sonic_bullet.comparing.compared_sides import compared
 from sonic_bullet.comparing.sides import Side, run
+from sonic_bullet.listener import own_clients
 from sonic_bullet.records.errors import CompareError, SceneError
 from tests.comparing.made import scene
 
@@ -62,6 +64,14 @@ def test_the_cause_is_what_was_changed(folder: Path, first: Side, name: str) -> 
     assert [(one.who, one.what) for one in found.causes] == [(who, what)]
     assert found.exact
     assert found.verdict.endswith("put back, the scene is A to the bit")
+
+
+def test_a_shape_is_put_back_beside_a_client_that_somebody_left(folder: Path) -> None:
+    with own_clients():
+        pybullet.connect(pybullet.DIRECT)
+        found = compare(scene(folder, "a.py"), scene(folder, "b.py", CHANGES["shape"][0]))
+    assert [one.what for one in found.causes] == ["shape radius"]
+    assert found.exact
 
 
 def test_two_changes_are_both_named_and_a_decoy_is_not(folder: Path, first: Side) -> None:

@@ -49,6 +49,11 @@ def apart(shape: Shape, to_hz: float, fixed: tuple[tuple[float, float, float, fl
     return float(np.abs(np.sqrt(whole[: len(scene)]) / (2 * np.pi) / scene - 1).max())
 
 
+def test_a_body_of_elements_without_a_mode_in_the_band_has_none() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.015)  # its first mode is near 100 kHz
+    assert analyse((Shape("mesh", vertex_m=ball.vertices, face=ball.faces),), BRASS, cache=None).mode_count == 0
+
+
 @pytest.mark.parametrize("path", ASSETS, ids=lambda path: path.stem)
 def test_scene_and_diagnosis_agree_on_what_comes_with_the_project(path: Path) -> None:
     assert apart(read_mesh(path), 10_000.0) < AGREE

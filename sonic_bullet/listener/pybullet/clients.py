@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import numbers
-import weakref
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
-from unittest.mock import patch
 
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
@@ -20,9 +16,6 @@ from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.coerce import as_whole, nearest, shown
 from sonic_bullet.records.errors import MeshError, SceneError
-
-MOST_CLIENTS = 1024
-"""As many as PyBullet has room for (its MAX_PHYSICS_CLIENTS)."""
 
 
 def direct_client() -> BulletClient:
@@ -50,31 +43,6 @@ def disconnect(client: BulletClient) -> None:
     client_id, client._client = client._client, -1
     if client_id >= 0 and pybullet.isConnected(client_id):
         pybullet.disconnect(client_id)
-
-
-@contextmanager
-def own_clients() -> Iterator[None]:
-    """Clients that are opened while this lasts end with it: a script's that stays open would be client 0 to the next
-    script's calls, which name none.
-    """
-    before, objects, init = _open_clients(), weakref.WeakSet[BulletClient](), BulletClient.__init__
-
-    def made(client: Any, *args: Any, **kwargs: Any) -> None:
-        init(client, *args, **kwargs)
-        objects.add(client)
-
-    try:
-        with patch.object(BulletClient, "__init__", made):
-            yield
-    finally:
-        for client in list(objects):
-            disconnect(client)
-        for number in _open_clients() - before:
-            pybullet.disconnect(number)
-
-
-def _open_clients() -> set[int]:
-    return {number for number in range(MOST_CLIENTS) if pybullet.isConnected(number)}
 
 
 def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[int, int], ...]:

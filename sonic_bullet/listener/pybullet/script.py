@@ -11,6 +11,7 @@ import functools
 import sys
 import time
 import traceback
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,16 +19,44 @@ from typing import Any
 from unittest.mock import patch
 
 import pybullet
-from pybullet_utils import bullet_client
+from pybullet_utils.bullet_client import BulletClient
 
+from sonic_bullet.listener.pybullet.clients import disconnect as end
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.errors import SceneError, SonicBulletError
 
 ClientHook = Callable[[int], None]
+MOST_CLIENTS = 1024
+"""As many as PyBullet has room for (its MAX_PHYSICS_CLIENTS)."""
 
 
 class _TimeIsUp(BaseException):
     """Unwinds the user's script; no `except Exception` of theirs catches it."""
+
+
+@contextmanager
+def own_clients() -> Iterator[None]:
+    """Clients that are opened while this lasts end with it: a script's that stays open would be client 0 to the next
+    script's calls, which name none.
+    """
+    before, objects, init = _open_clients(), weakref.WeakSet[BulletClient](), BulletClient.__init__
+
+    def made(client: Any, *args: Any, **kwargs: Any) -> None:
+        init(client, *args, **kwargs)
+        objects.add(client)
+
+    try:
+        with patch.object(BulletClient, "__init__", made):
+            yield
+    finally:
+        for client in list(objects):
+            end(client)
+        for number in _open_clients() - before:
+            pybullet.disconnect(number)
+
+
+def _open_clients() -> set[int]:
+    return {number for number in range(MOST_CLIENTS) if pybullet.isConnected(number)}
 
 
 def run_script(
@@ -150,7 +179,7 @@ def _stage(
         "addUserDebugParameter": add_slider,
         "readUserDebugParameter": read_slider,
     }
-    forward = bullet_client.BulletClient.__getattr__
+    forward = BulletClient.__getattr__
 
     def forward_stand_ins(self: Any, name: str) -> Any:
         """BulletClient passes its client id to built-in functions only, and ours are none."""
@@ -160,7 +189,7 @@ def _stage(
 
     with (
         patch.dict(vars(pybullet), stand_ins),
-        patch.object(bullet_client.BulletClient, "__getattr__", forward_stand_ins),
+        patch.object(BulletClient, "__getattr__", forward_stand_ins),
         patch.object(time, "sleep", sleep),
     ):
         yield
