@@ -40,7 +40,7 @@ def render_apart(
 
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     make_radiation_known(log, say)
-    setup = Setup(log.sr, log.sensors, log.seed, log.air, log.residual, apart=True, supports=log.supports)
+    setup = Setup(log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports)
     state = start(setup)
     state.witness = witness
     quenches, done, looked, last = quenched_steps(log), 0, 0, None

@@ -8,7 +8,7 @@ translations (see resonator.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -42,6 +42,7 @@ class Setup:
     sensors: tuple[Sensor, ...]
     seed: int
     air: Air
+    _: KW_ONLY
     residual: bool = True
     apart: bool = False
     supports: bool = True

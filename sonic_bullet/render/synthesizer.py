@@ -212,7 +212,7 @@ class Synthesizer:
         supports: bool = True,
         keep: bool = True,
     ) -> None:
-        self._setup, self._keep = Setup(sr, sensors, seed, air, residual, supports), keep
+        self._setup, self._keep = Setup(sr, sensors, seed, air, residual=residual, supports=supports), keep
         self.reset()
 
     def reset(self) -> None:

@@ -107,8 +107,8 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     with clean_stdout(json_to) as say:
         with progress_bar(Path(scene).name) as (progress, tell):
             wish = Wish(
-                options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, None, progress,
-                tell, at_end,
+                options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, None,
+                progress, tell, at_end,
             )  # fmt: skip
             try:
                 result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
