@@ -76,7 +76,7 @@ def limits() -> Iterator[Line]:
         worst = max(worst, np.abs(poles_of(found) / poles_of(in_place(body, [], [])) - 1).max())
     yield Line("K → 0: free poles", "<= 1e-6", f"{worst:.1e}", bool(worst <= 1e-6))
     body, touches = steel.moving(0.0), stood(steel, (3,), 1e15)
-    basis = null_space(body.moves(touches[0].own)[:1])
+    basis = null_space(body.moves([touches[0].own])[:1])
     held = np.sqrt(np.abs(eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True)))  # rigid: 0, nearly
     free = np.delete(np.arange(len(steel.lam)), 6)
     elements = np.sqrt(

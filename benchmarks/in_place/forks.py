@@ -30,7 +30,7 @@ def taken_per_s(stands: Stands, k: ContactSpring) -> float:
     q, m = stands.q[:, at], len(one.lam)
     top = float(stands.board.model.vertex_m[:, 2].max())
     below = stands.board.place(np.array([AT_M[0], AT_M[1] + FOOT_M[0, 1], top]))
-    stretch = one.moves(stands.thing.place(FOOT_M[0])) @ q[:m] - on.moves(below) @ q[m:]
+    stretch = one.moves([stands.thing.place(FOOT_M[0])]) @ q[:m] - on.moves([below]) @ q[m:]
     lost = np.array([k.normal_n_m.imag, *2 * [k.tangential_n_m.imag]]) @ np.abs(stretch) ** 2 / (2 * s[at].imag)
     return float((on.decay @ np.abs(q[m:]) ** 2 + lost) / np.linalg.norm(q) ** 2)
 

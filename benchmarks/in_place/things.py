@@ -193,7 +193,7 @@ def stand(
 def eigenproblem(body: Moving, partners: list[Moving], touches: list[Touch]) -> tuple[Array, Array]:
     """s and q of q̈ + 2Dq̇ + (Λ + BᵀKB)q = 0 of all bodies at once, their rigid motions among them, B = (Φ, −Φ_p)."""
     (partner,) = partners
-    both = np.concatenate([np.hstack([body.moves(t.own), -partner.moves(t.other)]) for t in touches])
+    both = np.hstack([body.moves([t.own for t in touches]), -partner.moves([t.other for t in touches])])
     stiff = np.concatenate([[t.spring.normal_n_m, *2 * [t.spring.tangential_n_m]] for t in touches])
     lam, decay = np.append(body.lam, partner.lam), np.append(body.decay, partner.decay)
     moves = np.concatenate(

@@ -6,19 +6,18 @@
                                                               first_order  the same in a tenth of the time, nearly
 
 Values in, values out; nothing here knows a scene, a step or a sample. The run time asks anew when a body's set of
-touches or their loads change; what it asks twice is kept (`KeptPlaces`).
+touches or their loads change; till then poles stay.
 """
 
 from sonic_bullet.support.first_order import first_order
-from sonic_bullet.support.in_place import InPlace, KeptPlaces, Touch, in_place
+from sonic_bullet.support.in_place import InPlace, Touch, in_place
 from sonic_bullet.support.moving import Moving, Place, wide_plate_m_n_s
-from sonic_bullet.support.springs import ContactSide, ContactSpring, Region, contact_spring, pad_spring, quantised
+from sonic_bullet.support.springs import ContactSide, ContactSpring, Region, contact_spring, pad_spring
 
 __all__ = [
     "ContactSide",
     "ContactSpring",
     "InPlace",
-    "KeptPlaces",
     "Moving",
     "Place",
     "Region",
@@ -27,6 +26,5 @@ __all__ = [
     "first_order",
     "in_place",
     "pad_spring",
-    "quantised",
     "wide_plate_m_n_s",
 ]

@@ -58,16 +58,17 @@ def start(x: Touched, m: int) -> tuple[Array, Array]:
     stiff = both.T @ (x.spring.real[:, None] * both)
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
-    chosen = _most_alike(vector[:m] ** 2)
+    chosen = likest(vector[:m] ** 2)
     return (1j - OFF) * np.sqrt(np.maximum(value[chosen], 0)), vector[: len(x.lam), chosen].T.astype(complex)
 
 
-def _most_alike(share: Array) -> Array:
-    """The new (m,) of each old by their shares (m, n), the largest first; -1 where none is left."""
-    share, chosen = share.copy(), np.full(len(share), -1)
-    for _ in range(min(share.shape)):
-        old, new = divmod(int(share.argmax()), share.shape[1])
-        chosen[old], share[old], share[:, new] = new, -1.0, -1.0
+def likest(share: Array) -> Array:
+    """Which column each row of shares (m, n) is, each column once, the most in all; -1 (m,) where none is left."""
+    from scipy.optimize import linear_sum_assignment  # a fifth of a second, for those who need it
+
+    row, column = linear_sum_assignment(share, maximize=True)
+    chosen = np.full(len(share), -1)
+    chosen[row] = column
     return chosen
 
 
@@ -151,7 +152,7 @@ def poles(x: Touched, s_start: Array, q_start: Array) -> tuple[Array, Array, Arr
         value, vector = _coupled(x)
         free = np.min(np.abs(value[:, None] - s[~again]), axis=1, initial=np.inf) > SPLIT * np.abs(value)
         value, vector = value[free], vector[free]
-        new = _most_alike(np.abs(q_start[again].conj() @ vector.T) ** 2)
+        new = likest(np.abs(q_start[again].conj() @ vector.T) ** 2)
         found = np.flatnonzero(again)[new >= 0]
         s[found], q[found], stands[found] = value[new[new >= 0]], vector[new[new >= 0]], True
         stands[again & ~np.isin(np.arange(len(s)), found)] = False

@@ -20,6 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.support.coupled_poles import likest
 from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, in_place, touched_rows
 from sonic_bullet.support.moving import Moving
 
@@ -32,29 +33,29 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     x, row = touched_rows(body, partners, touches, squared=False)
     light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     yields = np.flatnonzero(x.other_lam > 0)
+    modes = x.other[:, yields]
     both = np.hstack([x.own, -x.other[:, light]])
     spring = x.spring.real
     stiff = both.T @ (spring[:, None] * both)
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
     chosen = likest(vector[:m] ** 2)
-    vector[:, chosen] *= np.where(
-        np.diag(vector[:m, chosen]) < 0, -1, 1
-    )  # the mode's sign, so that what passes has one
+    vector[:, chosen] *= np.where(vector[np.arange(m), chosen] < 0, -1, 1)  # the mode's, so that what passes has one
     q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
     every = spring[:, None] * (both @ vector)
     force = every[:, chosen]
     s = 1j * omega
-    along = x.other[:, yields].T @ force
-    below = x.other_lam[yields, None] + 2 * x.other_decay[yields, None] * s + s**2
+    along = modes.T @ force
+    yielding = 1 / (x.other_lam[yields, None] + 2 * x.other_decay[yields, None] * s + s**2)
+    moved = along * yielding
     plate = (x.plate[:, None] - x.half_space[:, None] * s**2) / np.where(s == 0, 1, s)
-    lossy, gives = (1 / x.spring - 1 / spring)[:, None] * force, x.other[:, yields] @ (along / below) + plate * force
+    lossy, gives = (1 / x.spring - 1 / spring)[:, None] * force, times(modes, moved) + plate * force
     contact, partner = (force * lossy).sum(axis=0), (force * gives).sum(axis=0)
     held_against = _held_against(spring, every, value, chosen, lossy + gives)
     yielded = contact + partner
     part = 1 / (1 + held_against / np.where(np.abs(yielded) > 0, yielded, 1))
     shift = part * yielded
-    slope = -(part**2) * (along**2 / below**2).sum(axis=0)
+    slope = -(part**2) * (moved**2).sum(axis=0)
     shift *= 2 / (1 + np.sqrt(1 - 4 * slope))
     shift = shift.real + 1j * np.minimum(shift.imag, 0)  # no mode gains
     own = (q[:m] ** 2).T @ x.decay[:m]
@@ -65,9 +66,8 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
     lifts = np.zeros((3 * len(touches), m))
     lifts[row] = np.abs(force)
-    rate = part / below
-    passed = np.where(held, 0, along * rate / (1 + shift * rate))
-    passed /= 1 + (np.abs(passed) ** 2).sum(axis=0)
+    passed = np.where(held, 0, moved * part / (1 + shift * part * yielding))
+    passed /= 1 + size_squared(passed).sum(axis=0)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
     decay = np.maximum(-new.real, 0.0)
     power = np.stack([own, -contact.imag, -partner.imag], axis=1)
@@ -89,23 +89,20 @@ def _held_against(spring: Array, every: Array, value: Array, chosen: Array, give
     """gᵀRg (m,) of forces F (r, n) of all motions and what gives way under the chosen ones', g (r, m). Two motions of
     nearly one frequency would each need the other's: what they hold against each other is bounded by their product.
     """
-    product = every.T @ gives  # F_nᵀ g_k
+    product = times(every.T, gives)  # F_nᵀ g_k
     product[chosen, np.arange(len(chosen))] = 0
     apart = value[:, None] - value[chosen]
-    bound = apart**2 + np.abs(product) ** 2
-    others = (product**2 * apart / np.where(bound > 0, bound, 1)).sum(axis=0)
-    return np.asarray((gives**2 * spring[:, None]).sum(axis=0) - others)
+    bound = apart**2 + size_squared(product)
+    others = (product**2 * (apart / np.where(bound > 0, bound, 1))).sum(axis=0)
+    return np.asarray(spring @ gives**2 - others)
 
 
-def likest(share: Array) -> Array:
-    """Which column (m,) each row of shares (m, n) is, each column once, the largest share first."""
-    best = share.argmax(axis=1)
-    order = np.argsort(-share[np.arange(len(best)), best], kind="stable")
-    chosen = np.full(len(best), -1)
-    first = order[np.sort(np.unique(best[order], return_index=True)[1])]  # of those who want one column, who wants most
-    chosen[first] = best[first]
-    rest = np.flatnonzero(chosen < 0)
-    if len(rest):
-        left = np.setdiff1d(np.arange(share.shape[1]), chosen)
-        chosen[rest] = left[likest(share[np.ix_(rest, left)])]
-    return chosen
+def times(matrix: Array, z: Array) -> Array:
+    """A real matrix times a complex one, in half the time."""
+    both: Array = matrix @ np.ascontiguousarray(z).view(float)
+    return both.view(complex)
+
+
+def size_squared(z: Array) -> Array:
+    """|z|²"""
+    return np.asarray(z.real**2 + z.imag**2)

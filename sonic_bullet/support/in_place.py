@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from hashlib import blake2b
 from itertools import pairwise
 
 import numpy as np
@@ -93,15 +92,17 @@ def touched_rows(
     φφᵀ, which Newton needs.
     """
     begin = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
-    own = np.concatenate([body.moves(touch.own) for touch in touches])
+    own, of = body.moves([touch.own for touch in touches]), np.array([touch.partner for touch in touches])
     other, under = np.zeros((len(own), int(begin[-1]))), np.zeros((2, len(touches), 3))
-    for i, touch in enumerate(touches):
-        p = touch.partner
-        other[3 * i : 3 * i + 3, begin[p] : begin[p + 1]] = partners[p].moves(touch.other)
-        under[:, i, 0] = partners[p].plate_m_n_s, partners[p].half_space_m_s_n
+    under[:, :, 0] = np.array([(p.plate_m_n_s, p.half_space_m_s_n) for p in partners]).T[:, of]
+    for p, partner in enumerate(partners):
+        at = np.flatnonzero(of == p)
+        if len(at):
+            here = (3 * at[:, None] + np.arange(3)).ravel()
+            other[here, begin[p] : begin[p + 1]] = partner.moves([touches[i].other for i in at])
     spring = np.array([(t.spring.normal_n_m, *2 * (t.spring.tangential_n_m,)) for t in touches], complex).ravel()
     row = np.flatnonzero(spring)
-    of = Touched(
+    made = Touched(
         own[row],
         other[row],
         spring[row],
@@ -114,7 +115,7 @@ def touched_rows(
         squares(own[row] if squared else own[:0]),
         squares(other[row] if squared else other[:0]),
     )
-    return of, row
+    return made, row
 
 
 def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Array, stands: Array) -> InPlace:
@@ -156,33 +157,3 @@ def _shares(x: Touched, m: int, omega: Array, decay: Array, v: Array, force: Arr
     power = np.maximum(np.stack([own, spring, both - spring], axis=1), 0.0)
     whole = power.sum(axis=1, keepdims=True)
     return np.asarray(decay[:, None] * np.where(whole > 0, power / np.where(whole > 0, whole, 1), [1.0, 0.0, 0.0]))
-
-
-class KeptPlaces:
-    """`in_place`, its last results kept: a body that gets the same touches and loads again, as its loads are quantised
-    (`quantised`), is not solved again.
-    """
-
-    def __init__(self, most: int = 512) -> None:
-        self._most, self._kept = most, dict[bytes, InPlace]()
-
-    def __call__(self, body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
-        """See `in_place`."""
-        name = blake2b()
-        for one in (body, *partners):
-            numbers = np.array([len(one.omega_rad_s), one.mass_kg, one.plate_m_n_s, one.half_space_m_s_n])
-            for array in (numbers, one.omega_rad_s, one.decay_per_s, one.inertia_kg_m2):
-                name.update(np.ascontiguousarray(array, float).tobytes())
-        for touch in touches:
-            name.update(np.array([touch.partner, touch.spring.normal_n_m, touch.spring.tangential_n_m]).tobytes())
-            for place in (touch.own, touch.other):
-                for array in (place.shape, place.arm_m, place.axes):
-                    name.update(np.ascontiguousarray(array, float).tobytes())
-        key = name.digest()
-        found = self._kept.pop(key, None)
-        if found is None:
-            found = in_place(body, partners, touches)
-            while len(self._kept) >= self._most:
-                del self._kept[next(iter(self._kept))]
-        self._kept[key] = found  # the last asked for stands last
-        return found

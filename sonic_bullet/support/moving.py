@@ -7,6 +7,7 @@ y₀ = 1/(8√(Dρh)),  D = Eh³/12(1 − ν²)       a wide plate         [Crem
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,14 +46,17 @@ class Moving:
         """d (m + 6,)"""
         return np.append(self.decay_per_s, np.zeros(6))
 
-    def moves(self, place: Place) -> Array:
-        """Φ (3, m + 6): motion along a place's axes of each mode and of each rigid motion; 0 where it has none."""
-        rigid = np.zeros((3, 6))
+    def moves(self, places: Sequence[Place]) -> Array:
+        """Φ (3c, m + 6): motion along each place's axes of each mode and of each rigid motion; 0 where it has none."""
+        rigid = np.zeros((len(places), 3, 6))
         if self.mass_kg > 0:
-            x, y, z = place.arm_m
-            rigid[:, :3] = np.eye(3) / np.sqrt(self.mass_kg)
-            rigid[:, 3:] = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]]) @ self.turn  # turn × arm
-        return np.asarray(place.axes @ np.hstack([place.shape, rigid]))
+            x, y, z = np.array([place.arm_m for place in places]).T
+            turn = np.zeros((len(places), 3, 3))  # turn × arm
+            turn[:, 0, 1], turn[:, 1, 2], turn[:, 2, 0] = z, x, y
+            rigid[:, :, :3] = np.eye(3) / np.sqrt(self.mass_kg)
+            rigid[:, :, 3:] = (turn - turn.transpose(0, 2, 1)) @ self.turn
+        whole = np.concatenate([np.stack([place.shape for place in places]), rigid], axis=2)
+        return np.asarray((np.stack([place.axes for place in places]) @ whole).reshape(3 * len(places), -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -43,9 +43,12 @@ class ContactSide:
 
     @classmethod
     def of(cls, material: Material) -> ContactSide:
-        """What a material is where it is touched: its softest axis, and its least Rayleigh loss, 2√(αβ)."""
+        """What a material is where it is touched: its softest axis, and its least Rayleigh loss, 2√(αβ), none where
+        nobody knows it.
+        """
         softest = float(1 / np.diag(np.linalg.inv(material.stiffness_pa))[:3].max())
-        loss = 2 * float(np.sqrt((material.alpha_per_s or 0.0) * (material.beta_s or 0.0)))
+        alpha, beta = material.alpha_per_s, material.beta_s
+        loss = 0.0 if alpha is None or beta is None else 2 * float(np.sqrt(alpha * beta))
         return cls(softest, material.poisson, loss, material.roughness_m)
 
     @property
@@ -121,8 +124,3 @@ def pad_spring(modulus_pa: float, poisson: float, loss_factor: float, area_m2: f
     normal = as_number(modulus_pa, "modulus of a pad", "give a modulus above zero", above=0) * area / height
     lossy = normal * (1 + 1j * as_number(loss_factor, "loss factor of a pad", "give 0 or above", least=0))
     return ContactSpring(lossy, lossy / (2 * (1 + poisson)))
-
-
-def quantised(load_n: float, step: float = 1.1) -> float:
-    """The nearest power of ``step``: a Hertz spring of it is within 1.6 % of that of the load itself."""
-    return float(step ** np.round(np.log(load_n) / np.log(step)))

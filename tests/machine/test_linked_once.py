@@ -149,7 +149,7 @@ def test_another_process_may_write_a_part(folder: Path) -> None:
 
 def test_the_run_time_is_made_of_the_stages_that_two_processes_wrote(tmp_path: Path) -> None:
     (tmp_path / "cache").mkdir()
-    assert run(tmp_path, FIRST_RUN) == "1 1 1 1"
+    assert run(tmp_path, FIRST_RUN) == "1 1 1 1 1"
     kept = {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")}
     assert "driver.advance_steps" in kept
     assert not kept & {"driver.excite", "driver.ring", "driver.finish", "driver.take"}

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eigh, null_space
 
 from sonic_bullet.records import Array
-from sonic_bullet.support import ContactSpring, InPlace, KeptPlaces, Moving, Place, Touch, in_place
+from sonic_bullet.support import ContactSpring, InPlace, Moving, Place, Touch, in_place
 from tests.made.bars import AXES, Bar, bar, exact_poles, stood
 
 NOTHING = Moving(np.zeros(0), np.zeros(0))
@@ -60,7 +60,7 @@ def test_a_wall_constrains(steel: Bar) -> None:
     body = steel.moving(loss=0.0)
     touches = stood(steel, (3,), 1e16)
     found = in_place(body, [NOTHING], touches)
-    motions = body.moves(touches[0].own)[:1]
+    motions = body.moves([touches[0].own])[:1]
     basis = null_space(motions)
     held = eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True)
     free = np.delete(np.arange(len(steel.lam)), 6)
@@ -106,7 +106,7 @@ def test_two_bodies_at_once(k: float) -> None:
     """Poles and what passes against the eigenproblem of both, in their modes and rigid motions."""
     (a, b), there, _ = pair(np.random.default_rng(3), 5, 4, k * (1 + 0.03j), touches=2)
     found = in_place(a, [b], there)
-    both = np.concatenate([np.hstack([a.moves(t.own), -b.moves(t.other)]) for t in there])
+    both = np.hstack([a.moves([t.own for t in there]), -b.moves([t.other for t in there])])
     spring = np.array([[t.spring.normal_n_m, *2 * [t.spring.tangential_n_m]] for t in there]).ravel()
     lam, decay = np.append(a.lam, b.lam), np.append(a.decay, b.decay)
     n = len(lam)
@@ -196,13 +196,3 @@ def test_energy_never_grows_whatever_comes_and_goes() -> None:
             worst = max(worst, (np.linalg.norm(z) ** 2 - before) / begun)
             z = z * np.exp(-decays[state] * rng.uniform(0, 1e-7))
     assert worst < 1e-9
-
-
-def test_kept_places_are_the_same_and_kept(steel: Bar) -> None:
-    kept = KeptPlaces(most=2)
-    asked = [(steel.moving(), [NOTHING], stood(steel, (node,), 1e5)) for node in (0, 1, 2)]
-    first = kept(*asked[0])
-    assert kept(*asked[0]) is first and kept(*asked[1]) is not first
-    kept(*asked[2])  # the first leaves
-    again = kept(*asked[0])
-    assert again is not first and np.array_equal(poles_of(again), poles_of(first))

@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import RecordError
-from sonic_bullet.support import ContactSide, Region, contact_spring, pad_spring, quantised, wide_plate_m_n_s
+from sonic_bullet.support import ContactSide, Region, contact_spring, pad_spring, wide_plate_m_n_s
 
 STEEL = ContactSide(2e11, 0.3, 3e-4, 0.0)
 OAK = ContactSide(1.1e9, 0.35, 0.02, 0.0)
@@ -105,13 +105,6 @@ def test_a_wide_plate() -> None:
     assert 1 / wide_plate_m_n_s(11.5e9, 0.3, 450.0, 0.02) == pytest.approx(
         8 * np.sqrt(11.5e9 * 0.02**3 / (12 * 0.91) * 450 * 0.02), rel=1e-12
     )
-
-
-def test_quantised_loads() -> None:
-    loads = np.geomspace(1e-3, 1e3, 400)
-    near = np.array([quantised(load) for load in loads])
-    assert np.abs(np.log(near / loads)).max() <= np.log(1.1) / 2 + 1e-12
-    assert len(set(near)) < 160
 
 
 def test_what_is_no_region_or_load() -> None:

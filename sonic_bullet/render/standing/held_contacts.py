@@ -62,7 +62,7 @@ STAND = np.dtype(
 )
 """How a body stands."""
 
-SHARE = 0.08
+SHARE = 0.05
 """Of simulated time that may go into new poles: with it, a pile of a hundred boxes costs half more, and live sound is
 never late for it. Who waits longest is served first, what moves before what does not.
 """
@@ -75,7 +75,8 @@ AGAIN_S = 0.02
 @njit(nogil=True, error_model="numpy")
 def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, dt_s):
     """All pairs move on by the step whose rows are first … stop - 1; pairs without them for SPAN steps let go."""
-    row = first
+    row, follow = first, 1.0 - np.exp(-dt_s / SMOOTH_S)
+    target, place = np.empty(MOST), np.empty((MOST + 1, 2, 3))
     for i in range(count):
         slot = active[i]
         pair, one = pairs[slot], held[slot]
@@ -99,7 +100,7 @@ def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, 
                 size = min(size, bodies[pair.body[side]].size_m)
         near = NEAR * size if size < np.inf else np.inf
         share = min(pair.support_n[0] / pair.force_n[NOW], 1.0) / dt_s if pair.force_n[NOW] > 0.0 else 0.0
-        _smooth(one, rows, begin, row, share, near, 1.0 - np.exp(-dt_s / SMOOTH_S))
+        _smooth(one, rows, begin, row, share, near, follow, target, place)
         one.used_s += dt_s
         if _differs(one, near):
             one.used, one.used_s = one.count, 0.0
@@ -135,10 +136,12 @@ def _nearest(one, point, count):
 
 
 @njit(nogil=True, error_model="numpy")
-def _smooth(one, rows, begin, end, share, near, follow):
-    """The held points take in rows begin … end - 1, whose loads in N·s times ``share`` are newtons."""
-    target, place, old = np.zeros(MOST), np.zeros((MOST, 2, 3)), one.count
-    total, outward = 0.0, np.zeros((2, 3))
+def _smooth(one, rows, begin, end, share, near, follow, target, place):
+    """The held points take in rows begin … end - 1, whose loads in N·s times ``share`` are newtons. target (MOST,),
+    place (MOST + 1, 2, 3): room for what the rows carry, and for their normals.
+    """
+    target[:], place[:] = 0.0, 0.0
+    old, total, outward = one.count, 0.0, place[MOST]
     for r in range(begin, end):
         load = rows[r].load_n_s * share
         if load <= 0.0:
@@ -151,8 +154,10 @@ def _smooth(one, rows, begin, end, share, near, follow):
             one.point_m[k] = rows[r].point_m
         target[k] += load
         total += load
-        place[k] += load * rows[r].point_m
-        outward += load * rows[r].outward
+        for side in range(2):
+            for x in range(3):
+                place[k, side, x] += load * rows[r].point_m[side, x]
+                outward[side, x] += load * rows[r].outward[side, x]
     if total > 0.0:
         _lean(one, outward, follow if old else 1.0)
     whole = 0.0
@@ -161,7 +166,9 @@ def _smooth(one, rows, begin, end, share, near, follow):
         whole += one.load_n[k]
         if target[k] > 0.0:  # what it adds to the load it brings its place with: the moment is smoothed as the load is
             share = follow * target[k] / one.load_n[k]
-            one.point_m[k] += share * (place[k] / target[k] - one.point_m[k])
+            for side in range(2):
+                for x in range(3):
+                    one.point_m[k, side, x] += share * (place[k, side, x] / target[k] - one.point_m[k, side, x])
     kept = 0
     for k in range(one.count):
         if one.load_n[k] >= LEAST * whole or target[k] > 0.0:
@@ -175,9 +182,18 @@ def _smooth(one, rows, begin, end, share, near, follow):
 def _lean(one, outward, follow):
     """The pair's normals follow those of a step, weighted (2, 3)."""
     for side in range(2):
-        length = np.sqrt((outward[side] ** 2).sum())
-        mean = one.outward[side] + follow * (outward[side] / max(length, 1e-300) - one.outward[side])
-        one.outward[side] = mean / max(np.sqrt((mean**2).sum()), 1e-300)
+        length, mean = max(_length(outward[side]), 1e-300), one.outward[side]
+        for x in range(3):
+            mean[x] += follow * (outward[side, x] / length - mean[x])
+        length = max(_length(mean), 1e-300)
+        for x in range(3):
+            mean[x] /= length
+
+
+@njit(nogil=True, error_model="numpy")
+def _length(vector):
+    """Of (3,)."""
+    return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
 @njit(nogil=True, error_model="numpy")

@@ -126,11 +126,11 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
         other = both[1 - side]
         if other not in partners:
             partners.append(other)
-        places = [_places(state, both[s], held, s, axes) for s, axes in enumerate(_axes(held, quaternion[both]))]
-        curvature = places[0][1] + places[1][1]
+        axes = _axes(held, quaternion[both])
+        (own, bent, off), (there, also, away) = (_places(state, both[s], held, s, axes[s]) for s in (side, 1 - side))
         load = held["load_n"][: held["count"]]
-        for i, spring in enumerate(_springs(state, both, held, curvature, load)):
-            touches.append(Touch(partners.index(other), places[side][0][i], places[1 - side][0][i], spring))
+        for i, spring in enumerate(_springs(state, both, held, bent + also, max(off, away), load)):
+            touches.append(Touch(partners.index(other), own[i], there[i], spring))
             loads.append(load[i])
     return partners, touches, np.array(loads)
 
@@ -161,32 +161,40 @@ def _rotation(quaternion: Array) -> Array:
     )
 
 
-def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[list[Place], Array, Array]:
-    """Places of a pair's points on one body, the surface's curvature there (c,), and whether each was found (c,)."""
+def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[list[Place], Array, float]:
+    """Places of a pair's points on one body, the surface's curvature there (c,), and how far the points' middle is from
+    it in m.
+    """
     one, row = state.resonators[b], state.table.bodies[b]
     point = held["point_m"][: held["count"], side]
-    shape, curvature = np.zeros((len(point), 3, one.mode_count)), np.zeros(len(point))
+    shape, curvature, off = np.zeros((len(point), 3, one.mode_count)), np.zeros(len(point)), 0.0
     if one.index is not None and one.body.model is not None:
-        outward = np.broadcast_to(held["outward"][side], point.shape)
-        face, weight, _ = nearest(one.index, point, outward)
-        corner = one.body.model.face[face]
-        shape = np.einsum("pc,pcxm->pxm", weight, one.shape[corner].astype(float))
+        outward = held["outward"][side]
+        asked = np.vstack([point, point.sum(axis=0) / len(point)])
+        face, weight, distance = nearest(one.index, asked, np.tile(outward, (len(asked), 1)))
+        off = float(distance[-1])
+        corner = one.body.model.face[face[:-1]]
+        shape = np.einsum("pc,pcxm->pxm", weight[:-1], one.shape[corner].astype(float))
         vertex = one.body.model.vertex_m[corner]
-        normal = np.cross(vertex[:, 1] - vertex[:, 0], vertex[:, 2] - vertex[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        leans = (normal * outward).sum(axis=1) < CREASE_COS
-        curvature = np.where(leans, row["edge_per_m"], one.body.model.curvature_per_m[face])
+        x, y = vertex[:, 1] - vertex[:, 0], vertex[:, 2] - vertex[:, 0]
+        normal = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - x[:, [2, 0, 1]] * y[:, [1, 2, 0]]
+        leans = normal @ outward < CREASE_COS * np.sqrt((normal**2).sum(axis=1))
+        curvature = np.where(leans, row["edge_per_m"], one.body.model.curvature_per_m[face[:-1]])
     if np.isfinite(row["curvature_per_m"]):
         curvature = np.full(len(point), row["curvature_per_m"])
-    return [Place(s, p, axes) for s, p in zip(shape, point, strict=True)], curvature, point
+    return [Place(s, p, axes) for s, p in zip(shape, point, strict=True)], curvature, off
 
 
-def _springs(state: State, both: list[int], held: Array, curvature: Array, load: Array) -> Iterator[ContactSpring]:
-    """The spring of each of a pair's points: of its part of one region, or of a region of its own."""
+def _springs(
+    state: State, both: list[int], held: Array, curvature: Array, off_m: float, load: Array
+) -> Iterator[ContactSpring]:
+    """The spring of each of a pair's points: of its part of one region, or of a region of its own. off_m: of the
+    points' middle from the surfaces.
+    """
     sides = state.resonators[both[0]].side, state.resonators[both[1]].side
     sizes = [float(row["size_m"]) for row in state.table.bodies[both] if row["volume_m3"] > 0]
     size = min(sizes, default=SIZELESS_M)
-    region = _one_region(state, both, held, curvature, size) if len(load) > 1 else None
+    region = _one_region(held["point_m"][: held["count"], 0], float(curvature.mean()), off_m, size)
     whole = float(load.sum())
     if region is not None:
         spring = contact_spring(region, sides, whole)
@@ -200,22 +208,13 @@ def _springs(state: State, both: list[int], held: Array, curvature: Array, load:
         yield contact_spring(point, sides, n)
 
 
-def _one_region(state: State, both: list[int], held: Array, curvature: Array, size: float) -> Region | None:
-    """The line or face that touches between a pair's points; None where nothing does there."""
-    point = held["point_m"][: held["count"]]
-    span = np.ptp(point[:, 0], axis=0)
-    if np.linalg.norm(span) < STRUCK_FLAT * size:
+def _one_region(point_m: Array, curvature_per_m: float, off_m: float, size_m: float) -> Region | None:
+    """The line or face that touches between a pair's points (c, 3); None where nothing does there."""
+    middle = point_m - point_m.sum(axis=0) / len(point_m)
+    spread = np.sqrt(((middle.max(axis=0) - middle.min(axis=0)) ** 2).sum())
+    if spread < STRUCK_FLAT * size_m or off_m > ON * spread:
         return None
-    for side, b in enumerate(both):
-        index = state.resonators[b].index
-        if index is not None:
-            off = nearest(index, point[:, side].mean(axis=0)[None], held["outward"][side][None])[2][0]
-            if off > ON * np.linalg.norm(span):
-                return None
-    middle = point[:, 0] - point[:, 0].mean(axis=0)
-    along = np.linalg.svd(middle)[2]
-    half = np.abs(middle @ along.T).max(axis=0)
-    bent = float(curvature.mean())
-    if bent * size > FLAT_CURVATURE:  # mean of both principal curvatures, of which a line has one
-        return Region((float(half[0]), 0.0), (0.0, 2 * bent))
+    half = np.abs(middle @ np.linalg.svd(middle)[2].T).max(axis=0)
+    if curvature_per_m * size_m > FLAT_CURVATURE:  # mean of both principal curvatures, of which a line has one
+        return Region((float(half[0]), 0.0), (0.0, 2 * curvature_per_m))
     return Region((float(half[0]), float(max(half[1], NARROW * half[0]))), (0.0, 0.0))
