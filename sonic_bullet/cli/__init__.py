@@ -32,16 +32,14 @@ from sonic_bullet.cli.examples import (
     FIT_EPILOG,
     GROUP_EPILOG,
     MODES_EPILOG,
-    RENDER_EPILOG,
     RESIDUAL_EPILOG,
 )
 from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
 from sonic_bullet.cli.play_command import play
+from sonic_bullet.cli.render_command import render
 from sonic_bullet.cli.soundtrack.film_command import film
 from sonic_bullet.cli.soundtrack.score_command import score
-from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 
-DEFAULT_SR = 48_000
 DEFAULT_MODES_MATERIAL = "steel"
 
 
@@ -54,65 +52,7 @@ def cli() -> None:
 cli.add_command(cache)
 cli.add_command(compare)
 cli.add_command(baseline)
-
-
-@cli.command(epilog=RENDER_EPILOG)
-@click.argument("scene", metavar="SCENE.py|LOG.npz")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="NAME.wav",
-    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; float formats hold 1.0 = 1 Pa.",
-)
-@click.option(
-    "--seconds",
-    type=float,
-    metavar="S",
-    help="How long to simulate; of a log, how much of it. [default: the scene's own, else 4]",
-)
-@click.option(
-    "--sr", type=float, metavar="HZ", help=f"Sample rate, 8000 … 384000. [default: {DEFAULT_SR}; a log's own]"
-)
-@click.option(
-    "--contacts", metavar="NAME.npz", help="Also write the contact log, which renders again without PyBullet."
-)
-@click.option(
-    "--models",
-    type=click.Choice(["included", "reference"]),
-    help="Where that log's modal models are: in it, or in the cache, which makes it small. [default: included]",
-)
-@click.option("--picture", metavar="NAME.png", help="Also draw pressure, spectrogram and events.")
-@json_option
-@click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
-@click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
-@click.option(
-    "--microphone",
-    "microphones",
-    type=Numbers("X,Y,Z"),
-    multiple=True,
-    help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
-)
-@click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
-@click.option(
-    "--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file)."
-)
-@click.option(
-    "--residual/--no-residual",
-    default=None,
-    help="What presets sound beside their modes. [default: it sounds; of a log, as it was rendered]",
-)
-@click.option(
-    "--supports/--no-supports", default=None, help="Bodies that stand on others ring less. [default: as above]"
-)
-@soundtrack_options
-def render(**options: Any) -> None:
-    """Run a PyBullet scene, or replay a contact log, to a sound file."""
-    from sonic_bullet.cli.scene_commands import run_render
-
-    run_render(**options)
-
-
+cli.add_command(render)
 cli.add_command(play)
 cli.add_command(film)
 cli.add_command(score)

@@ -47,6 +47,41 @@ channel_option = click.option(
 )
 
 
+def level_options(command: Any) -> Any:
+    """The options that say how loud a file is."""
+    peak = click.option(
+        "--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1)."
+    )
+    return peak(
+        click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")(command)
+    )
+
+
+def scene_options(command: Any) -> Any:
+    """The options that say how a scene is listened to."""
+    for option in reversed(
+        (
+            click.option(
+                "--microphone",
+                "microphones",
+                type=Numbers("X,Y,Z"),
+                multiple=True,
+                help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
+            ),
+            click.option(
+                "--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]"
+            ),
+            click.option(
+                "--material",
+                metavar="M",
+                help="Material of the bodies of a script that names none (a name or a preset file).",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
 def strike_options(command: Any) -> Any:
     """The options that say how one recording was struck and recorded; a case says it itself."""
     for option in reversed(

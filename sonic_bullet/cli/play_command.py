@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
-from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.cli.parameters import json_option, scene_options
 from sonic_bullet.records.errors import AudioError, FileError, SceneError
 
 if TYPE_CHECKING:
@@ -49,17 +49,7 @@ REFRESH_S = 0.25  # of the line on a terminal
 @click.option(
     "--ahead", "ahead_s", type=float, metavar="S", help="How much sound waits: how late a step may be. [default: 0.018]"
 )
-@click.option(
-    "--microphone",
-    "microphones",
-    type=Numbers("X,Y,Z"),
-    multiple=True,
-    help="A microphone in the world, in m; repeat for more channels. [default: the scene's own]",
-)
-@click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
-@click.option(
-    "--material", metavar="M", help="Material of the bodies of a script that names none (a name or a preset file)."
-)
+@scene_options
 @json_option
 def play(scene: str, json_to: str | None, **options: Any) -> None:
     """Play a PyBullet scene, or a contact log, on a sound card while it runs."""

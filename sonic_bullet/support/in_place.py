@@ -99,7 +99,7 @@ def touched_rows(
         at = np.flatnonzero(of == p)
         if len(at):
             here = (3 * at[:, None] + np.arange(3)).ravel()
-            other[here, begin[p] : begin[p + 1]] = partner.moves([touches[i].other for i in at])
+            other[here, begin[p] : begin[p + 1]] = partner.moves([touches[i].other for i in at.tolist()])
     spring = np.array([(t.spring.normal_n_m, *2 * (t.spring.tangential_n_m,)) for t in touches], complex).ravel()
     row = np.flatnonzero(spring)
     made = Touched(

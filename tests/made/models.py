@@ -102,8 +102,8 @@ def row(
     gap: float = 0.0,
 ) -> Contacts:
     """One contact; join several with `Contacts.joined`."""
-    one = [np.array([value], float) for value in (point_a, point_b, normal, impulse_n_s, slip, sweep)]
-    return Contacts(np.array([a]), np.array([b]), *one, np.array([approach]), np.array([gap]))
+    one = [np.array([value], float) for value in (point_a, point_b, normal, impulse_n_s, slip, sweep, approach, gap)]
+    return Contacts(np.array([a]), np.array([b]), *one)
 
 
 def step(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
-from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.cli.parameters import Numbers, json_option, level_options, scene_options
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -54,17 +54,8 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @click.option("--audio", "codec", type=click.Choice(["aac", "pcm", "flac", "opus", "mp3"]),
               help="Codec of the sound. [default: mp4 aac, mov pcm, mkv flac]")  # fmt: skip
 @click.option("--sr", type=float, metavar="HZ", help="Sample rate. [default: 48000; a log's own]")
-@click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
-@click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
-@click.option(
-    "--microphone",
-    "microphones",
-    type=Numbers("X,Y,Z"),
-    multiple=True,
-    help="A microphone in the world, in m; two are stereo. [default: the scene's own]",
-)
-@click.option("--seed", type=click.IntRange(0), help="Seed of the surfaces' roughness. [default: 0; a log's own]")
-@click.option("--material", metavar="M", help="Material of the bodies of a script that names none.")
+@level_options
+@scene_options
 @json_option
 def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
-from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.cli.parameters import Numbers, json_option, level_options
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 EPILOG = """\b
@@ -32,8 +32,7 @@ materials and an export script for Blender."""
 @click.option("--scale", type=float, default=1.0, metavar="X", help="Of all lengths: 0.01 for centimetres.")
 @click.option("--sr", type=float, default=48_000, metavar="HZ", help="Sample rate. [default: 48000]")
 @click.option("--contacts", metavar="NAME.npz", help="Also write the contact log, for render and film.")
-@click.option("--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1).")
-@click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")
+@level_options
 @click.option(
     "--microphone",
     "microphones",

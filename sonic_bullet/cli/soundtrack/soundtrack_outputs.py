@@ -112,7 +112,8 @@ class Soundtrack:
     @property
     def time_reference(self) -> int:
         """In samples."""
-        return round((self.wish.time_reference_s or 0.0) * self.sr)
+        begins_s = self.wish.time_reference_s
+        return 0 if begins_s is None else round(begins_s * self.sr)
 
     def cues_for(self, frames: int, body: int | None = None) -> dict[str, Any]:
         """Keywords of `write_audio` for a file of so many frames."""

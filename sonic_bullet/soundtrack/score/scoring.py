@@ -100,7 +100,8 @@ def score_animation(
         steps: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
         try:
-            find_steps(animation, stage, steps, half, hidden_m_s=hidden_n_s(1.0, noise_m or 0.0, animation.fps))
+            hidden_m_s = 0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps)
+            find_steps(animation, stage, steps, half, hidden_m_s=hidden_m_s)
         except KeyboardInterrupt as error:  # those so far are played and kept
             stopped = error
         dt_s = 1 / animation.fps / substeps_of(animation.fps)

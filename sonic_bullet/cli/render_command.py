@@ -1,0 +1,55 @@
+"""`render`: a scene or a contact log to a sound file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from sonic_bullet.cli.examples import RENDER_EPILOG
+from sonic_bullet.cli.parameters import json_option, level_options, scene_options
+from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
+
+
+@click.command(epilog=RENDER_EPILOG)
+@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="NAME.wav",
+    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; float formats hold 1.0 = 1 Pa.",
+)
+@click.option(
+    "--seconds",
+    type=float,
+    metavar="S",
+    help="How long to simulate; of a log, how much of it. [default: the scene's own, else 4]",
+)
+@click.option("--sr", type=float, metavar="HZ", help="Sample rate, 8000 … 384000. [default: 48000; a log's own]")
+@click.option(
+    "--contacts", metavar="NAME.npz", help="Also write the contact log, which renders again without PyBullet."
+)
+@click.option(
+    "--models",
+    type=click.Choice(["included", "reference"]),
+    help="Where that log's modal models are: in it, or in the cache, which makes it small. [default: included]",
+)
+@click.option("--picture", metavar="NAME.png", help="Also draw pressure, spectrogram and events.")
+@json_option
+@level_options
+@scene_options
+@click.option(
+    "--residual/--no-residual",
+    default=None,
+    help="What presets sound beside their modes. [default: it sounds; of a log, as it was rendered]",
+)
+@click.option(
+    "--supports/--no-supports", default=None, help="Bodies that stand on others ring less. [default: as above]"
+)
+@soundtrack_options
+def render(**options: Any) -> None:
+    """Run a PyBullet scene, or replay a contact log, to a sound file."""
+    from sonic_bullet.cli.scene_commands import run_render
+
+    run_render(**options)
