@@ -170,6 +170,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "supports": True,
         "progress": None,
         "say": None,
+        "at_end": None,
     }
     return scene.render_scene, {"path": folder / "scene.py", **rest}
 
@@ -427,6 +428,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "supports": FLAG,
         "progress": CALL,
         "say": CALL,
+        "at_end": CALL,
     },
     "write_audio": {
         "path": PATH,
@@ -546,7 +548,7 @@ def test_whatever_is_passed_is_taken_or_refused(
     tried = 0
     for argument in good:
         for value in MENU:
-            if argument not in ("progress", "say") or not callable(value):  # a user's function raises what it likes
+            if argument not in ("progress", "say", "at_end") or not callable(value):  # a user's function raises what it likes
                 refusal(call, {**good, argument: value})
                 tried += 1
     assert tried > len(good) * len(MENU) * 0.8
