@@ -84,9 +84,9 @@ def render_scene(
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the
     bodies of a plain script. residual: whether what materials sound beside their modes is sounded. supports: whether
     what a body stands on takes of its modes, as `attach` has it. progress is given the share done, say what is being
-    computed before the first step (modes: seconds a body). at_end: is shown the listener while its world is still there.
-    Raises SonicBulletError; where the scene broke or was interrupted under way, the exception carries what was rendered
-    so far as ``partial``.
+    computed before the first step (modes: seconds a body). at_end: is shown the listener while its world is
+    still there. Raises SonicBulletError; where the scene broke or was interrupted under way, the exception carries what
+    was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -252,7 +252,8 @@ class _Stage:
             return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
         sound = render_kept(log)
-        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
+        lifted = listener.lifted if log.supports else {}
+        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), lifted)
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

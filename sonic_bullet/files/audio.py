@@ -327,6 +327,7 @@ def write_audio(
     if cues is not None and container not in ("WAV", "RF64"):
         raise FileError(f"cannot write cue points to {brief(path)}: {container} has none", "end the name with .wav")
     check_levels(peak_dbfs, lufs)
+    begins = as_whole(time_reference, "time_reference", "count samples from the timeline's start", least=0)
     full_scale_pa = as_number(
         full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError
     )
@@ -335,7 +336,7 @@ def write_audio(
     if channels == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
-    chunks = b"" if cues is None else wave_chunks(cues, description=Path(path).stem, time_reference=time_reference)
+    chunks = b"" if cues is None else wave_chunks(cues, description=Path(path).stem, time_reference=begins)
     options: dict[str, Any] = {"gain_per_pa": gain, "subtype": subtype, "expected_frames": frames, "chunks": chunks}
     with AudioWriter(path, rate, channels, **options) as writer:
         for block in sound.blocks(BLOCK_FRAMES):

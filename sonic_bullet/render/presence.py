@@ -90,9 +90,9 @@ def release(state: State) -> None:
 
 
 def lifted(state: State, who: Array | None = None) -> dict[str, tuple[int, int]]:
-    """By name of each body so far: steps that it rang on contacts, and those of them in which Σ|F| of what rings
-    exceeded some contact's load, so that it would lift: beyond the contacts' law. who: of the tables, None: all of
-    them, beside those who left.
+    """By name of each body so far: steps that it rang on contacts, and at most how many of them were beyond the
+    contacts' law: Σ|F| of what rings, each mode where it lifts first, exceeded the load. who: of the tables, None: all
+    of them, beside those who left.
     """
     found = dict(state.lifted)
     for b in range(len(state.stand)) if who is None else who.tolist():

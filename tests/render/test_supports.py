@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,13 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.files import read_log
-from sonic_bullet.records import Material
+from sonic_bullet.files import ContactLog, read_log
+from sonic_bullet.records import Array, Material
+from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render import render_log
-from tests.made.models import STEEL, WOOD, box_model
+from sonic_bullet.render.standing import supports
+from sonic_bullet.synth.bank.passing import STEADY
+from tests.made.models import STEEL, WOOD, box_body, box_model, row, step
 from tests.made.residuals import modes, residual
 from tests.made.worlds import EDGES_M, TONES_HZ, box, plate_model
 
@@ -56,7 +60,7 @@ def test_live_is_replayed_to_the_bit_whatever_stands_on_what(client: Any, tmp_pa
 
 def test_who_does_not_ask_for_supports_hears_bodies_that_hang(client: Any) -> None:
     listener = landed(client, supports=False)
-    assert not listener.contacts.supports
+    assert not listener.contacts.supports and not listener.lifted
     assert np.array_equal(render_log(listener.contacts), listener.sound())
 
 
@@ -109,3 +113,71 @@ def test_what_is_quenched_is_silent_on_both_sides(client: Any) -> None:
     at = int(0.4 * 48_000)
     tail = listener.sound()[:, at + 8 :]
     assert np.abs(tail).max() < 1e-3 * np.abs(listener.sound()).max()
+
+
+def test_a_body_that_slides_takes_the_place_where_it_lies_now(client: Any) -> None:
+    """The lower number keeps its own corners; poles are of where they are on the other."""
+    client.setGravity(0, 0, -9.81)
+    listener = sb.attach(client, seed=2)
+    sliding = box(client, (-0.25, 0, 0.006), turn=(0, 0, 0))
+    listener.add(sliding, material=STEEL, model=plate_model())
+    under = board(client)
+    listener.add(under, material=WOOD, model=box_model((0.8, 0.6, 0.024), (90.0, 210.0, 480.0), WOOD))
+    client.changeDynamics(sliding, -1, lateralFriction=0.05)
+    client.resetBaseVelocity(sliding, (0.7, 0, 0))
+    for _ in range(100):
+        client.stepSimulation()
+    state = listener._synth._state
+    (slot,) = state.pairs.active[: state.pairs.count[0]]
+    held = state.pairs.held[slot]
+    assert client.getBasePositionAndOrientation(sliding)[0][0] > -0.1
+    off = np.linalg.norm((held["used_m"] - held["point_m"])[: held["count"]], axis=2)
+    assert off.max() < 0.25 * max(EDGES_M)
+
+
+@pytest.mark.parametrize("material", [STEEL, None])
+def test_contacts_that_press_from_both_sides_have_a_direction(material: Material | None) -> None:
+    """A ring on a peg: the loads' normals cancel. And where nobody says what touches, there is no spring."""
+    bodies = [replace(box_body(EDGES_M, TONES_HZ, STEEL, body_id=i), material=material) for i in range(2)]
+    steps = []
+    for k in range(120):
+        sides = [
+            row(0, 1, (0, 0, sign * (0.3 if k == 5 else 0.01)), normal=(0, 0, sign), point_a=(x, y, sign * 0.006),
+                point_b=(x, y, sign * 0.006), approach=0.5 if k == 5 else 0.0)
+            for sign in (1, -1) for x, y in ((0.02, 0.01), (-0.02, 0.01), (0, -0.01))
+        ]  # fmt: skip
+        touching = Contacts.joined(sides) if k >= 5 else Contacts.none()
+        steps.append(step([[0, 0, 0], [0, 0, 0]], touching, gravity=(0, 0, -9.81)))
+    microphone = sb.Microphone(np.array([0.0, -1.0, 0.5]))
+    sound = render_log(ContactLog(tuple(bodies), tuple(steps), (microphone,), 48_000, 0))
+    assert np.isfinite(sound).all() and sound.any()
+
+
+def test_what_a_touch_stops_is_not_set_free() -> None:
+    """A mode that its own material stops within samples stays so, whatever the touch makes of it."""
+    free = np.array([-0.5 + 0.2j, -1e-4 + 0.2j])
+    made = supports._audible(np.array([-3.0 + 0.1j, -3.0 + 0.1j]), free)
+    assert (made.real <= np.array([-0.5, -supports.STOPPED])).all()
+
+
+def test_a_partner_is_heard_for_one_mode_alone() -> None:
+    """A fork: its low mode hardly sounds and the board's share of it is large, its highest is 75 dB louder. And what a
+    partner's mode sounds goes with the frequency at which it is moved.
+    """
+    fork = SimpleNamespace(weight=np.array([[0.0043, 25.4]], complex), omega_rad_s=np.array([2.7e3, 8.6e4]))
+    on = SimpleNamespace(weight=np.array([[1.0j]]), omega_rad_s=np.array([1.35e3]))
+    state: Any = SimpleNamespace(resonators=[fork, on], bank=SimpleNamespace(observed=np.ones((1, 2))))
+
+    def heard(share: float) -> list[tuple[int, Array]]:
+        placed: Any = SimpleNamespace(passes=(np.array([[share, 1e-4]]),), omega_rad_s=fork.omega_rad_s)
+        return list(supports._passed(state, 0, [1], placed, 2))
+
+    assert not heard(1e-4)
+    ((partner, weight),) = heard(0.05)
+    assert partner == 1 and weight[0, 0] == pytest.approx(0.05 * 2j)
+
+
+def test_a_plate_on_a_board_makes_it_sound(client: Any) -> None:
+    """In the run time too: late, when the board's own ringing is over, what the plate passes on is heard from it."""
+    listener = landed(client, seconds=0.6)
+    assert (listener._synth._state.ringing.passes["phase"][1] == STEADY).any()

@@ -248,6 +248,8 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
             "lufs": None,
             "full_scale_pa": 1,
             "subtype": None,
+            "cues": None,
+            "time_reference": 0,
         },
     ),
 }
@@ -438,6 +440,8 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "lufs": [*OPTIONAL, 1e9],
         "full_scale_pa": [*NUMBER, 0],
         "subtype": [5, b"PCM_16", object()],
+        "cues": [5, "cue", object(), [5], [object()]],
+        "time_reference": [*WHOLE, -1],
     },
 }
 MENU: list[Any] = [
@@ -548,7 +552,9 @@ def test_whatever_is_passed_is_taken_or_refused(
     tried = 0
     for argument in good:
         for value in MENU:
-            if argument not in ("progress", "say", "at_end") or not callable(value):  # a user's function raises what it likes
+            if argument not in ("progress", "say", "at_end") or not callable(
+                value
+            ):  # a user's function raises what it likes
                 refusal(call, {**good, argument: value})
                 tried += 1
     assert tried > len(good) * len(MENU) * 0.8

@@ -113,3 +113,36 @@ def test_quenched_they_are_silent_and_touch_on() -> None:
     assert not advance(bank, state, 600).any()
     state.at = 0
     assert np.array_equal(advance(bank, state, 800, [Strike(0, 0.0, 1e-4, hit)]), first)
+
+
+def test_a_quench_within_a_fade_leaves_nothing_to_fade() -> None:
+    """What was ended before a quench is not heard at the next strike, and what was to come is there."""
+    rng = np.random.default_rng(4)
+    bank, state, _ = bodies(rng)
+    weight, hit = rng.normal(size=(2, 20)) + 0j, rng.normal(size=20)
+    set_passes(bank, state, 0, {2: weight})
+    advance(bank, state, 300, [Strike(0, 0.0, 1e-4, hit)])
+    set_passes(bank, state, 0, {1: weight})
+    advance(bank, state, 100)
+    state = silence(state)
+    state.at = 0
+    heard = advance(bank, state, 1200, [Strike(0, 0.0, 1e-4, hit)])
+    assert not heard[:, 2].any() and heard[:, 1, :BLOCK].any()
+
+
+def test_no_change_adds_energy() -> None:
+    """What rings, Σ|z|², through 2000 changes of poles and passes at random samples: it never grows."""
+    rng = np.random.default_rng(5)
+    bank, state, sets = bodies(rng)
+    advance(bank, state, 3 * BLOCK, [Strike(b, 0.0, 1e-4, rng.normal(size=m)) for b, m in enumerate(SIZES)])
+    begun = before = (state.z**2).sum()
+    state.at = 0
+    for _ in range(2000):
+        for b, one in enumerate(sets):
+            slow = rng.uniform(0, 1e-2) * one.decay_per_s
+            set_poles(bank, state, b, (1j * one.omega_rad_s * rng.uniform(0.3, 1.5) - slow) / SR)
+        set_passes(bank, state, 0, {c: rng.normal(size=(2, 20)) + 0j for c in (1, 2) if rng.random() < 0.5})
+        advance(bank, state, int(rng.integers(1, 700)))
+        assert (state.z**2).sum() <= before + 1e-9 * begun
+        before = (state.z**2).sum()
+    assert 0 < before < begun

@@ -15,7 +15,8 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sonic_bullet.records.coerce import as_text, as_whole
+from sonic_bullet.records.coerce import as_items, as_text, as_whole, shown
+from sonic_bullet.records.errors import RecordError
 
 LAST_SAMPLE = 2**32 - 1
 """Of a cue, which is told in 32 bits: a day at 48 kHz."""
@@ -38,9 +39,14 @@ class Cue:
 
 def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: int = 0) -> bytes:
     """Chunks `bext`, `cue ` and `LIST adtl` for a file. time_reference: its first sample, counted from the start of the
-    timeline it is cut from. Cues beyond `LAST_SAMPLE` are left out.
+    timeline it is cut from. Cues beyond `LAST_SAMPLE` are left out. Raises RecordError.
     """
-    kept = [cue for cue in cues if cue.sample <= LAST_SAMPLE]
+    remedy = "give a list of cues (sonic_bullet.files.riff.wave_chunks.Cue)"
+    listed = as_items(cues, "cues", remedy)
+    for cue in listed:
+        if not isinstance(cue, Cue):
+            raise RecordError(f"a cue is {shown(cue)}", remedy)
+    kept = [cue for cue in listed if cue.sample <= LAST_SAMPLE]
     points = [
         struct.pack("<II4sIII", number, cue.sample, b"data", 0, 0, cue.sample) for number, cue in enumerate(kept, 1)
     ]

@@ -7,8 +7,8 @@
 
 A resting box shows two, three or four of its corners, another choice each step; sum and moment alone are right. Each
 point keeps the mean of what its rows carried, so sum and moment of the held points are the smoothed ones exactly, and
-the set changes only where a point was not loaded for long, or lies elsewhere. Which of both bodies the point keeps its
-place on decides nothing: a box that slides keeps its own corners, a ball that rolls on keeps none.
+the set changes only where a point was not loaded for long, or lies elsewhere. A box that slides keeps its own corners
+as its points; that they lie elsewhere on the board makes poles anew.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -27,6 +27,8 @@ NEAR = 0.15
 """Of the smaller body's size: rows nearer than this to a held point are the same point."""
 LEAST = 0.02
 """Share of a pair's load below which a point is let go."""
+LEAST_N = 1e-9
+"""Newtons below which nothing is carried."""
 FAR_OFF, OFF = 1.6, 1.1
 """Factors by which a load differs from the one that poles were made for before they are made anew: at once, 17 % of a
 Hertz spring, and after REST_S, 3 %.
@@ -40,7 +42,7 @@ HELD = np.dtype(
         ("load_n", "f8", (MOST,)),
         ("outward", "f8", (2, 3)),  # of either body's surface, its frame, mean over the points
         ("used", "i8"),  # of the set that poles were made for: how many points
-        ("used_m", "f8", (MOST, 3)),  # on the body that keeps them best
+        ("used_m", "f8", (MOST, 2, 3)),
         ("used_n", "f8", (MOST,)),
         ("used_s", "f8"),  # since then
     ],
@@ -106,8 +108,7 @@ def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, 
             one.used, one.used_s = one.count, 0.0
             for k in range(one.count):
                 one.used_n[k] = one.load_n[k]
-                for x in range(3):
-                    one.used_m[k, x] = one.point_m[k, 0, x]
+                one.used_m[k] = one.point_m[k]
             stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
 
 
@@ -140,8 +141,35 @@ def _smooth(one, rows, begin, end, share, near, follow, target, place):
     """The held points take in rows begin … end - 1, whose loads in N·s times ``share`` are newtons. target (MOST,),
     place (MOST + 1, 2, 3): room for what the rows carry, and for their normals.
     """
+    old = one.count
+    total = _take_rows(one, rows, begin, end, share, near, target, place)
+    if total > 0.0:
+        _lean(one, place[MOST], total, follow if old else 1.0)
+    whole = 0.0
+    for k in range(one.count):
+        one.load_n[k] += follow * (target[k] - one.load_n[k])
+        whole += one.load_n[k]
+        if target[k] > 0.0:  # what it adds to the load it brings its place with: the moment is smoothed as the load is
+            share = follow * target[k] / one.load_n[k]
+            for side in range(2):
+                for x in range(3):
+                    one.point_m[k, side, x] += share * (place[k, side, x] / target[k] - one.point_m[k, side, x])
+    kept = 0
+    for k in range(one.count):
+        if one.load_n[k] >= max(LEAST * whole, LEAST_N) or target[k] > 0.0:
+            one.load_n[kept] = one.load_n[k]
+            one.point_m[kept] = one.point_m[k]
+            kept += 1
+    one.count = kept
+
+
+@njit(nogil=True, error_model="numpy")
+def _take_rows(one, rows, begin, end, share, near, target, place):
+    """Each row to the held point near it, or a new one: target (MOST,) loads, place (MOST + 1, 2, 3) their moments and,
+    last, that of the normals; their sum in N.
+    """
     target[:], place[:] = 0.0, 0.0
-    old, total, outward = one.count, 0.0, place[MOST]
+    old, total, most = one.count, 0.0, 0.0
     for r in range(begin, end):
         load = rows[r].load_n_s * share
         if load <= 0.0:
@@ -154,35 +182,25 @@ def _smooth(one, rows, begin, end, share, near, follow, target, place):
             one.point_m[k] = rows[r].point_m
         target[k] += load
         total += load
+        if old == 0 and load > most:  # a pair that begins: its heaviest row's normal, then the mean
+            most = load
+            one.outward[:] = rows[r].outward
         for side in range(2):
             for x in range(3):
                 place[k, side, x] += load * rows[r].point_m[side, x]
-                outward[side, x] += load * rows[r].outward[side, x]
-    if total > 0.0:
-        _lean(one, outward, follow if old else 1.0)
-    whole = 0.0
-    for k in range(one.count):
-        one.load_n[k] += follow * (target[k] - one.load_n[k])
-        whole += one.load_n[k]
-        if target[k] > 0.0:  # what it adds to the load it brings its place with: the moment is smoothed as the load is
-            share = follow * target[k] / one.load_n[k]
-            for side in range(2):
-                for x in range(3):
-                    one.point_m[k, side, x] += share * (place[k, side, x] / target[k] - one.point_m[k, side, x])
-    kept = 0
-    for k in range(one.count):
-        if one.load_n[k] >= LEAST * whole or target[k] > 0.0:
-            one.load_n[kept] = one.load_n[k]
-            one.point_m[kept] = one.point_m[k]
-            kept += 1
-    one.count = kept
+                place[MOST, side, x] += load * rows[r].outward[side, x]
+    return total
 
 
 @njit(nogil=True, error_model="numpy")
-def _lean(one, outward, follow):
-    """The pair's normals follow those of a step, weighted (2, 3)."""
+def _lean(one, outward, total, follow):
+    """The pair's normals follow those of a step, (2, 3) weighted by loads of ``total`` in all; where these press from
+    opposite sides and leave none, they stay.
+    """
     for side in range(2):
-        length, mean = max(_length(outward[side]), 1e-300), one.outward[side]
+        length, mean = _length(outward[side]), one.outward[side]
+        if length < LEAST * total:
+            continue
         for x in range(3):
             mean[x] += follow * (outward[side, x] / length - mean[x])
         length = max(_length(mean), 1e-300)
@@ -205,11 +223,12 @@ def _differs(one, near):
     for k in range(one.count):
         if not one.used_n[k] / off <= one.load_n[k] <= one.used_n[k] * off:
             return True
-        square = 0.0
-        for x in range(3):
-            square += (one.point_m[k, 0, x] - one.used_m[k, x]) ** 2
-        if np.sqrt(square) > near:
-            return True
+        for side in range(2):
+            square = 0.0
+            for x in range(3):
+                square += (one.point_m[k, side, x] - one.used_m[k, side, x]) ** 2
+            if np.sqrt(square) > near:
+                return True
     return False
 
 
@@ -256,7 +275,8 @@ def choose_bodies(
         one = stand[best]
         sounds[best] = one.stale = 0
         one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, AGAIN_S, points[best]
-        credit_s[0] -= price_s(bodies[best].modes, points[best])
+        if points[best]:  # its own poles are there at once
+            credit_s[0] -= price_s(bodies[best].modes, points[best])
         wanted += 1
     return wanted
 
@@ -280,8 +300,9 @@ def _longest_stale(stand, bodies, waits):
 
 @njit(nogil=True, error_model="numpy")
 def count_lifted(stand, bank_body, ringing, law, z, driven):
-    """Count the steps in which what rings would lift a body off: Σ_k lift_k |z_k| > 1, law[6]: lift, newtons per unit
-    of z over the load, at the point that lifts first.
+    """Count the steps in which what rings may lift a body off: Σ_k lift_k |z_k| > 1, law[6]: lift, newtons per unit of
+    z over the load, of each mode at the point that it lifts first: no step is missed, and some are counted in which
+    modes lift at different points.
     """
     modes = law.shape[1]
     for b in range(len(stand)):

@@ -20,6 +20,7 @@ import numpy as np
 from sonic_bullet.geometry.nearest_point import nearest
 from sonic_bullet.records import Array
 from sonic_bullet.render.contact_place import CREASE_COS, FLAT_CURVATURE, SIZELESS_M
+from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.strike_pulses import STRUCK_FLAT
 from sonic_bullet.render.synthesis_state import State
 from sonic_bullet.support import (
@@ -42,7 +43,9 @@ ON = 0.02
 NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
 LEAST_PASSED = 0.3
-"""Of a body's own loudest weight: what passes on with less would add 0.4 dB to it, and is left out."""
+"""Of a mode's own weight: what passes on with less would add 0.4 dB to it, and is left out."""
+LEAST_HEARD = 1e-3
+"""And of its loudest one: 60 dB below, it is what is left when all else has died away."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
 
@@ -98,19 +101,33 @@ def _lanes(state: State, b: int) -> Array:
 
 def _audible(new: Array, free: Array) -> Array:
     """Poles as the bank can play them: what the touches stop or make too fast is gone within a block."""
-    stopped = -STOPPED + 1j * np.minimum(free.imag, FASTEST_TURN)
+    stopped = np.minimum(free.real, -STOPPED) + 1j * np.minimum(free.imag, FASTEST_TURN)
     fast = ~np.isfinite(new) | (new.imag > FASTEST_TURN) | (new.imag <= 1e-6) | (-new.real > new.imag)
     return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
 
 
 def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
-    """Weights (W, columns) of what passes to each partner that is heard."""
-    own = np.abs(state.resonators[b].weight[0]).max(initial=0.0)
+    """Weights (W, columns) of what passes to each partner that is heard: more than LEAST_PASSED of what the body itself
+    sounds in some mode, of those within LEAST_HEARD of its loudest.
+    """
+    own = np.abs(state.resonators[b].weight[0])
+    least = np.maximum(LEAST_PASSED * own, LEAST_HEARD * own.max(initial=0.0))
     for p, rate in zip(partners, placed.passes, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
-        weight[:, : rate.shape[1]] = np.nan_to_num(state.resonators[p].weight @ rate)
-        if np.abs(weight[0]).max(initial=0.0) > LEAST_PASSED * own or np.abs(weight[1:]).max(initial=0.0) > 0:
+        weight[:, : rate.shape[1]] = passed_weight(state.resonators[p], rate, placed.omega_rad_s)
+        if (np.abs(weight[0, : len(own)]) > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
+
+
+def passed_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
+    """Weights (W, m) of another body's modes, at omega_rad_s (m,), in what a partner sounds whose own modes move with
+    rate (m_p, m) times theirs. Pressure is iωρ₀ times velocity: it goes with the frequency at which a mode is moved;
+    how well it radiates beside is taken at the mode's own.
+    """
+    rate = np.nan_to_num(rate)
+    weight: Array = partner.weight @ rate
+    weight[0] = (partner.weight[0] / partner.omega_rad_s) @ rate * omega_rad_s
+    return weight
 
 
 def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array]:
@@ -126,6 +143,8 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
         other = both[1 - side]
         if other not in partners:
             partners.append(other)
+        if not sum(state.resonators[one].side.compliance_per_pa for one in both):
+            continue  # both rigid: nobody says what they are made of
         axes = _axes(held, quaternion[both])
         (own, bent, off), (there, also, away) = (_places(state, both[s], held, s, axes[s]) for s in (side, 1 - side))
         load = held["load_n"][: held["count"]]

@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.bank.layout import BANK_BODY, FLUSH, PAIR, RINGING, STRIKE
-from sonic_bullet.synth.bank.passing import OFF, PASS
+from sonic_bullet.synth.bank.passing import OFF, PASS, SILENCED
 from sonic_bullet.synth.bank.tile import BLOCK
 
 FASTEST_DECAY_PER_SAMPLE = 2.0
@@ -279,6 +279,8 @@ def silence(state: BankState) -> BankState:
     for name in ("ringing", "driven", "tiled", "moving", "motion"):  # poles and passes stay: what touches does
         state.ringing[name] = 0
     state.ringing["strike"] = -1
+    state.passes["phase"] = SILENCED[state.passes["phase"]]
+    state.ringing["passes"] = np.count_nonzero(state.passes["phase"] != OFF, axis=1)
     pool = len(state.strikes)
     state.free[...] = np.concatenate([[pool], np.arange(pool - 1, -1, -1)])
     return state

@@ -31,6 +31,8 @@ OFF, STEADY, COMING, RISING, LEAVING, FALLING, BRIEF = range(7)
 PASS = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
 LEAVES = np.array([OFF, LEAVING, OFF, BRIEF, LEAVING, FALLING, BRIEF])
 """What each becomes where it is to end."""
+SILENCED = np.array([OFF, STEADY, STEADY, STEADY, OFF, OFF, OFF])
+"""What each becomes where nothing sounds any more, and nothing has to fade."""
 
 
 @uncounted
