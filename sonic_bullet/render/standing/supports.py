@@ -44,7 +44,7 @@ NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
 LEAST_PASSED = 0.3
 """Of a mode's own weight: what passes on with less would add 0.4 dB to it, and is left out."""
-LEAST_HEARD = 1e-3
+FAINTEST = 1e-3
 """And of its loudest one: 60 dB below, it is what is left when all else has died away."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
@@ -108,10 +108,10 @@ def _audible(new: Array, free: Array) -> Array:
 
 def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
     """Weights (W, columns) of what passes to each partner that is heard: more than LEAST_PASSED of what the body itself
-    sounds in some mode, of those within LEAST_HEARD of its loudest.
+    sounds in some mode, of those within FAINTEST of its loudest.
     """
     own = np.abs(state.resonators[b].weight[0])
-    least = np.maximum(LEAST_PASSED * own, LEAST_HEARD * own.max(initial=0.0))
+    least = np.maximum(LEAST_PASSED * own, FAINTEST * own.max(initial=0.0))
     for p, rate in zip(partners, placed.passes, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
         weight[:, : rate.shape[1]] = passed_weight(state.resonators[p], rate, placed.omega_rad_s)
