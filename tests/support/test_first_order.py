@@ -117,3 +117,23 @@ def test_a_foot_on_a_board_that_resonates() -> None:
         fast, exact = (solve(fork, [board], [touch]).decay_per_s[0] for solve in (first_order, in_place))
         found.append((fast - fork.decay_per_s[0]) / (exact - fork.decay_per_s[0]))
     assert found == pytest.approx(np.ones(20), abs=0.01)
+
+
+@pytest.mark.parametrize(("plate", "half_space"), [(1e-3, 0.0), (0.0, 3e-12)])
+def test_what_lies_under_a_contact_and_has_neither_modes_nor_mass(plate: float, half_space: float) -> None:
+    """A mode on a spring on a wide plate or a half-space: the root of s² + 2ds + λ + φ²s/(s/K + y₀ − y₂s²) = 0."""
+    one, spring, shape = Moving(np.array([9e3]), np.array([3.0])), 4e4 * (1 + 0.01j), 8.0
+    under = Moving(np.zeros(0), np.zeros(0), plate_m_n_s=plate, half_space_m_s_n=half_space)
+    touch = Touch(
+        0,
+        Place(np.array([[shape], [0.0], [0.0]]), np.zeros(3), np.eye(3)),
+        Place(np.zeros((3, 0)), np.zeros(3), np.eye(3)),
+        ContactSpring(spring, 0j),
+    )
+    free = np.array([1, 2 * 3.0, 9e3**2 + 3.0**2])
+    root = np.roots(np.polyadd(np.polymul(free, [-half_space, 1 / spring, plate]), [shape**2, 0]))
+    exact = root[np.abs(root - 9e3j).argmin()]
+    newton, runs = in_place(one, [under], [touch]), first_order(one, [under], [touch])
+    assert -newton.decay_per_s[0] + 1j * newton.omega_rad_s[0] == pytest.approx(exact, rel=1e-9)
+    assert runs.decay_per_s[0] == pytest.approx(-exact.real, rel=0.01)
+    assert -exact.real > 3.1
