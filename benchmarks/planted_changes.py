@@ -2,8 +2,8 @@
 
     python benchmarks/planted_changes.py [NAME] …
 
-scenes: 40 changes of one input; pairs: 20 of two; decoys: 10 inputs that change no sample, five alone and five beside a
-change that matters; logs: the 40 changes, of logs alone; recordings: 12 changes of a WAV; held_out: 24 changes in
+scenes: 42 changes of one input; pairs: 20 of two; decoys: 10 inputs that change no sample, five alone and five beside a
+change that matters; logs: the 42 changes, of logs alone; recordings: 12 changes of a WAV; held_out: 24 changes in
 scenes of other kinds; same: unchanged runs; processes: in others; page: its size; cost: of equal inputs; piles: chaotic
 ones, by sound. Without a word, the first five.
 """
@@ -180,7 +180,7 @@ def quiet(text: str) -> None:
 
 
 def scenes(bench: Bench, logs: bool = False) -> None:
-    """40 changes of one input."""
+    """42 changes of one input."""
     found_count = right = 0
     for number, one in enumerate(PLANTED):
         began = time.perf_counter()
