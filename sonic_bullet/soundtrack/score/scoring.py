@@ -80,14 +80,15 @@ def score_animation(
     notes: tuple[str, ...] = ()
     if not isinstance(animation, Animation):
         animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
-    notes += _check_fall(animation)
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     say = say or (lambda text: None)
     half = (lambda share: progress(0.7 * share)) if progress is not None else None
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
         apart = alone(animation, stage)
-        driven = driven_bodies(animation, apart)
+        noise_m = pose_noise_m(animation, apart)
+        notes += _check_fall(animation, noise_m)
+        driven = driven_bodies(animation, apart, noise_m)
         if driven.any():
             bodies = tuple(
                 replace(x, driven=x.driven or bool(d)) for x, d in zip(animation.bodies, driven, strict=True)
@@ -95,7 +96,7 @@ def score_animation(
             animation = replace(animation, bodies=bodies)
             stage.bodies = bodies
             stage.held |= driven
-        noise_m = pose_noise_m(animation, apart)
+            noise_m = pose_noise_m(animation, apart)  # a hand's way is no noise
         say("who touches whom")
         steps: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
@@ -162,9 +163,9 @@ def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:
     return RenderResult(sound, log, listener.sr, (*notes, *listener.notes, *silence_notes(sound, log)))
 
 
-def _check_fall(animation: Animation) -> tuple[str, ...]:
+def _check_fall(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
     """Raise AnimationError where bodies fall as if a metre were something else."""
-    found, expected = fall_m_s2(animation), float(np.linalg.norm(animation.gravity_m_s2))
+    found, expected = fall_m_s2(animation, noise_m), float(np.linalg.norm(animation.gravity_m_s2))
     if found is None or expected == 0:
         return ()
     ratio = found / expected

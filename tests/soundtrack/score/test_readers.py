@@ -13,11 +13,21 @@ from scipy.spatial.transform import Rotation
 from sonic_bullet.records.errors import AnimationError, SonicBulletError
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
-from sonic_bullet.soundtrack.score.flight import fall_m_s2, hidden_n_s, pose_noise_m
+from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
 from sonic_bullet.soundtrack.score.gltf import _Sampler
 from sonic_bullet.soundtrack.score.keyframes import read_rules, write_keyframes
 from sonic_bullet.soundtrack.score.scoring import read_animation
-from tests.made.animations import EDGES_M, ball_animation, box_mesh, dropped, keyframes, write_glb, write_tree
+from tests.made.animations import (
+    EDGES_M,
+    RADIUS_M,
+    ball_animation,
+    bounce_m,
+    box_mesh,
+    dropped,
+    keyframes,
+    write_glb,
+    write_tree,
+)
 
 
 def test_three_files_of_one_scene_are_one_animation(tmp_path: Path) -> None:
@@ -111,6 +121,27 @@ def test_a_fall_tells_gravity_and_the_noise_of_its_poses() -> None:
     found = pose_noise_m(noisy, np.ones((400, 2), bool))
     assert found == pytest.approx(noise_m, rel=0.25)
     assert hidden_n_s(0.1, noise_m, 240) == pytest.approx(5 * np.sqrt(6) * 0.1 * noise_m * 240)
+
+
+@pytest.mark.parametrize(("rounded_m", "fps"), [(1e-4, 240.0), (1e-4, 60.0), (1e-3, 240.0), (0.0, 240.0)])
+def test_who_falls_is_free_however_its_poses_are_rounded(rounded_m: float, fps: float) -> None:
+    """Rounded to 0.1 mm, accelerations from frame to frame are off by half of gravity at 240; over a flight they are
+    not. A hand that carries something about is still a hand.
+    """
+    time_s = np.arange(int(0.45 * fps)) / fps
+
+    def seen(height_m: np.ndarray) -> tuple[bool, float | None]:
+        if rounded_m:
+            height_m = np.round(height_m / rounded_m) * rounded_m
+        made = ball_animation(height_m, fps)
+        apart = np.broadcast_to(height_m[:, None] > RADIUS_M + 5e-3, (len(height_m), 2))
+        noise_m = pose_noise_m(made, apart)
+        return bool(driven_bodies(made, apart, noise_m)[1]), fall_m_s2(made, noise_m)
+
+    driven, fall = seen(bounce_m(time_s, 0.3, 0.7))
+    assert not driven
+    assert fall == pytest.approx(9.81, rel=0.1)
+    assert seen(1 + 0.1 * np.sin(6 * time_s))[0]
 
 
 def test_an_animation_needs_motion() -> None:
