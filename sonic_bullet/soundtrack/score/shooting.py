@@ -97,6 +97,8 @@ class Shooting:
         """Where the next frame begins: at its pose (b,), or, where noise hides the difference, where this one ended:
         begun at noisy poses anew, what rests would fall a little in every frame.
         """
+        if self._hidden_m < POSE_M:
+            return pose
         away = np.linalg.norm(end["position_m"] - pose["position_m"], axis=1)
         turned = np.linalg.norm(rotation(pose["quaternion_xyzw"], end["quaternion_xyzw"]), axis=1)
         within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < self._hidden_m)
