@@ -96,6 +96,7 @@ def test_each_stem_to_its_own_peak(place: Path) -> None:
         (("--events", "no/x.csv"), "no"),
         (("--stems", "scene.py"), "scene.py"),
         (("--time-reference", "3"), "--cues"),
+        *((("--cues", "--time-reference", text), "--time-reference") for text in ("1e300", "5e14", "inf", "nan")),
         (("--stem-peak-dbfs", "-3"), "--stems"),
         (("--events", "x.json", "--json", "x.json"), "one name"),
     ],

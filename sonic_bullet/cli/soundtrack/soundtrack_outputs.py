@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sonic_bullet.soundtrack.stems import Stem
 
 WITH_CUES = (".wav", ".rf64")
+LATEST_S = 1e9
 
 
 def soundtrack_options(command: Any) -> Any:
@@ -72,6 +73,8 @@ class SoundtrackWish:
             raise FileError(f"cannot write cue points to {output}", "end its name with .wav")
         if self.time_reference_s is not None and not self.cues:
             raise FileError("--time-reference is told beside cue points", "give --cues too")
+        if self.time_reference_s is not None and not self.time_reference_s <= LATEST_S:
+            raise FileError(f"--time-reference is {self.time_reference_s:g} s", f"give 0 to {LATEST_S:g}, 30 years")
         if self.stem_peak_dbfs is not None and self.stems is None:
             raise FileError("--stem-peak-dbfs is of stems", "give --stems DIR too")
         return self if self.stems is None else replace(self, stems=folder_place(self.stems, ""))

@@ -129,7 +129,8 @@ def score_animation(
 def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = None, **options: Any) -> RenderResult:
     """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
 
-    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored.
+    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored;
+    interrupted, the exception carries what was scored so far as ``partial``.
     """
     from sonic_bullet.render import render_kept
     from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
@@ -141,9 +142,10 @@ def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = 
             with suppress(MeshError):
                 shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
 
-    half = (lambda share: progress(0.5 * share)) if progress is not None else None
-    rest = (lambda share: progress(0.5 + 0.5 * share)) if progress is not None else None
-    result = render_scene(path, progress=half, at_end=look, **options)
+    def part(begin: float, end: float) -> Callable[[float], None] | None:
+        return (lambda share: progress(begin + (end - begin) * share)) if progress is not None else None
+
+    result = render_scene(path, progress=part(0, 0.5), at_end=look, **options)
     moves = moves_of(result.log)
     if not any(one.drives for one in moves):
         raise AnimationError(f"{path} drives no body by hand", "render it: contacts are simulated")
@@ -152,10 +154,22 @@ def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = 
         for i, body in enumerate(result.log.bodies)
         if (body.body_id, body.link) in shapes
     }
-    log = scored_by_hand(result.log, known, moves)
-    sound = render_kept(log, progress=rest)
-    notes = tuple(note for note in result.notes if note not in silence_notes(result.sound, result.log))
-    return RenderResult(sound, log, result.sr, (*notes, *move_notes(log, moves), *silence_notes(sound, log)))
+    notes = (
+        *(note for note in result.notes if note not in silence_notes(result.sound, result.log)),
+        *move_notes(result.log, moves),
+    )
+    log = result.log
+    try:
+        with interrupts():
+            log = scored_by_hand(result.log, known, moves, part(0.5, 0.8))
+            sound = render_kept(log, progress=part(0.8, 1.0))
+    except (SonicBulletError, KeyboardInterrupt) as error:
+        log = getattr(error, "log", log)
+        if hasattr(error, "kept") or hasattr(error, "log"):
+            kept = error.kept if hasattr(error, "kept") else render_kept(log)
+            error.partial = RenderResult(kept, log, result.sr, notes)  # type: ignore[union-attr]
+        raise
+    return RenderResult(sound, log, result.sr, (*notes, *silence_notes(sound, log)))
 
 
 def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:

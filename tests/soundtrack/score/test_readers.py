@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from sonic_bullet.records.errors import AnimationError, SonicBulletError
+from sonic_bullet.soundtrack.frame_rates import nearest_rate
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
 from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
-from sonic_bullet.soundtrack.score.gltf import _Sampler
+from sonic_bullet.soundtrack.score.gltf import _rate, _Sampler
 from sonic_bullet.soundtrack.score.keyframes import read_rules, write_keyframes
 from sonic_bullet.soundtrack.score.scoring import read_animation
 from tests.made.animations import (
@@ -160,6 +163,7 @@ def test_an_animation_needs_motion() -> None:
         ("a.json", b"{}", "a.json"),
         ("a.json", b'{"format": "sonic-bullet-animation/1", "fps": "1/0", "bodies": []}', "fps"),
         ("a.json", b'{"format": "sonic-bullet-animation/1", "fps": 24, "bodies": [], "x": 1}', "x"),
+        ("a.json", b'{"format": "sonic-bullet-animation/1", "fps": "1e99999999", "bodies": []}', "fps"),
         ("a.npz", b"PK", "a.npz"),
         ("a.abc", b"", ".glb"),
     ],
@@ -212,3 +216,49 @@ def test_any_bytes_of_a_glb_may_be_wrong(tmp_path: Path) -> None:
         except SonicBulletError:
             refused += 1
     assert refused > 30
+
+
+def changed(path: Path, change: Callable[[dict[str, Any], bytearray], None]) -> None:
+    """A GLB, its tree and bytes changed in place."""
+    raw = path.read_bytes()
+    size = int.from_bytes(raw[12:16], "little")
+    tree, data = json.loads(raw[20 : 20 + size]), bytearray(raw[28 + size :])
+    change(tree, data)
+    write_tree(path, tree, bytes(data))
+
+
+def times(tree: dict[str, Any], data: bytearray) -> np.ndarray:
+    """The times of the keys of `write_glb`, to be written to."""
+    view = tree["bufferViews"][0]
+    return np.frombuffer(data, "<f4", view["byteLength"] // 4, view["byteOffset"])
+
+
+def test_a_late_first_key_is_said(tmp_path: Path) -> None:
+    """The sound begins with the first key, where a player holds it from 0 on."""
+    write_glb(tmp_path / "a.glb", dropped(60))
+    assert not read_animation(tmp_path / "a.glb").notes
+    changed(tmp_path / "a.glb", lambda tree, data: np.add(t := times(tree, data), 2, out=t))
+    late = read_animation(tmp_path / "a.glb")
+    assert len(late.objects[0].position_m) == len(dropped(60).position_m["box"])
+    assert any("first key is at 2.000 s" in note for note in late.notes)
+
+
+@pytest.mark.parametrize(
+    ("rate", "seconds"),
+    [(240.0, 90), (24000 / 1001, 600), (30000 / 1001, 30), (60000 / 1001, 2), (25.0, 3600), (12.5, 60), (59.9, 60)],
+)
+def test_the_rate_of_baked_keys_is_that_of_all_of_them(rate: float, seconds: float) -> None:
+    """Distances of float32 times are off by ten millionths of their time: 8 µs of 4 ms after 90 s."""
+    key = (np.arange(round(seconds * rate)) / rate).astype(np.float32).astype(float)
+    found = _rate([key[:5], key])
+    assert abs(found / rate - 1) * seconds * rate < 0.05  # of a frame, at the end
+    assert found == rate or not rate.is_integer()
+    assert nearest_rate(29.96) == 29.96
+
+
+def test_a_small_file_does_not_take_all_memory(tmp_path: Path) -> None:
+    """One key that is late is thousands of frames; what they are is said, and not tried."""
+    write_glb(tmp_path / "a.glb", dropped(240))
+    changed(tmp_path / "a.glb", lambda tree, data: times(tree, data).__setitem__(-1, 8000.0))
+    with pytest.raises(AnimationError, match=r"frames of 2 nodes.*--fps"):
+        read_animation(tmp_path / "a.glb")
