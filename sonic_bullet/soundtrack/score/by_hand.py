@@ -18,11 +18,11 @@ from itertools import groupby
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.animated import AnimatedBody, rotation
+from sonic_bullet.listener.animated import AnimatedBody, matrices, rotation
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AnimationError
-from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation, matrices
+from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 
 DRIVEN_STEPS = 4

@@ -19,11 +19,11 @@ from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
-from sonic_bullet.listener.animated import PoseStage
+from sonic_bullet.listener.animated import PoseStage, matrices
 from sonic_bullet.listener.frames import turned
 from sonic_bullet.listener.polling import NO_RAW
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.score.animation import Animation, matrices
+from sonic_bullet.soundtrack.score.animation import Animation
 
 TOUCH_M = 1.5e-3
 """How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""

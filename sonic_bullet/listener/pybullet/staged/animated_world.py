@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.animated import AnimatedBody, Shot, rotation
+from sonic_bullet.listener.animated import AnimatedBody, Shot, matrices, rotation
 from sonic_bullet.listener.frames import MOTION, Motion, turned
 from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
@@ -81,8 +81,7 @@ class AnimatedStage:
 
     def boxes(self, motion: Array) -> tuple[Array, Array]:
         """See PoseStage."""
-        frame = np.array([pybullet.getMatrixFromQuaternion(q) for q in motion["quaternion_xyzw"].tolist()])
-        frame = frame.reshape(-1, 3, 3)
+        frame = matrices(motion["quaternion_xyzw"])
         middle = motion["position_m"] + np.einsum("bij,bj->bi", frame, self.middle_m)
         half = np.einsum("bij,bj->bi", np.abs(frame), self.half_m)
         return middle - half, middle + half
@@ -145,6 +144,7 @@ class AnimatedStage:
             side /= np.linalg.norm(side)
             for axis in (side, -side, np.cross(normal, side), -np.cross(normal, side)):
                 tilted = turned(turn[None], angle * axis[None])[0]
+                back = matrices(turned(np.array([[0.0, 0, 0, 1]]), -angle * axis[None])[0])
                 pybullet.resetBasePositionAndOrientation(
                     self.ids[low], place.tolist(), tilted.tolist(), physicsClientId=self.client_id
                 )
@@ -153,7 +153,7 @@ class AnimatedStage:
                         continue
                     at = [np.array(one[5]), np.array(one[6])]
                     mine = 0 if low == a else 1
-                    at[mine] = place + turned_back(at[mine] - place, angle * axis)
+                    at[mine] = place + back @ (at[mine] - place)
                     gap = float((at[0] - at[1]) @ normal)
                     row = _raw(self.ids[a], self.ids[b], at[0], at[1], normal, gap)
                     known = (r for r in rows if r["normal"][0] @ normal > SAME_FACE)
@@ -258,15 +258,6 @@ def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) ->
     row["body_a"], row["body_b"], row["link_a"], row["link_b"] = a, b, -1, -1
     row["point_a_m"], row["point_b_m"], row["normal"], row["gap_m"] = point_a, point_b, normal, gap
     return row
-
-
-def turned_back(vector: Array, rotation_rad: Array) -> Array:
-    """A vector (3,) turned by the opposite of a small rotation vector [Rodrigues' formula]."""
-    angle = float(np.linalg.norm(rotation_rad))
-    axis = -rotation_rad / max(angle, 1e-300)
-    return np.asarray(
-        vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1 - np.cos(angle))
-    )
 
 
 def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
