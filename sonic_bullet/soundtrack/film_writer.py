@@ -259,6 +259,10 @@ class FilmWriter:
         finally:
             self.partial.close()
         if not kept:
+            if isinstance(error, KeyboardInterrupt):
+                raise KeyboardInterrupt(
+                    f"{str(error) or 'stopped'}; no picture was drawn yet: no film is left"
+                ) from error
             return
         saved = f"the first {float(self.pictures / self.fps):.3f} s are in {kept_name(Path(self.path))}"
         if isinstance(error, SonicBulletError):

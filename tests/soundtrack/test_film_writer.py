@@ -159,6 +159,16 @@ def test_a_film_that_is_stopped_is_a_film_of_what_was_finished(tmp_path: Path, e
     assert abs(film.click() - samples_of(5, fps, SR)) <= 1
 
 
+def test_a_film_that_is_stopped_before_its_first_picture_says_so(tmp_path: Path) -> None:
+    def stop() -> None:
+        with FilmWriter(tmp_path / "x.mp4", KeptSound.of(np.zeros((1, 99))), SR, fps=Fraction(30), size=(SIDE, SIDE)):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="stopped; no picture was drawn yet"):
+        stop()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_every_codec_is_tried() -> None:
     assert {codec for _, codec in FORMATS} == set(CODECS)
 
