@@ -21,6 +21,8 @@ FALL_RANGE = (0.02, 5.0)
 HANDED = 0.5
 NEAR_M = 5e-3
 SIGMAS = 5.0
+REST_FRAMES, WHITE, QUIETER = 16, 5.0, 4.0
+"""Frames of a rest that tells noise; see _rests."""
 MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
 
@@ -77,14 +79,37 @@ def alone(animation: Animation, stage: PoseStage) -> Array:
 
 def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     """Standard deviation of the noisiest coordinate of the poses, from the third differences of flights, in which a
-    parabola has none; None where nobody flies. Where nothing moves, rounding makes no noise. apart (t, b): who is near
-    nobody.
+    parabola has none, or else of what rests; None where nobody does either. What rests shows no rounding. apart (t, b):
+    who is near nobody.
     """
-    flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3] & animation.free & animation.moving
-    if flies.sum() < LEAST_FRAMES:
+    flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
+    who = animation.free & animation.moving
+    told = flies & who
+    if told.sum() < LEAST_FRAMES:
+        told[:, who] = _rests(animation.position_m[:, who])
+    if told.sum() < LEAST_FRAMES:
         return None
-    third = np.diff(animation.position_m, 3, axis=0)[flies]  # of white noise √20 σ
+    third = np.diff(animation.position_m, 3, axis=0)[told]  # of white noise √20 σ
     return float(MAD * np.median(np.abs(third), axis=0).max() / np.sqrt(20))
+
+
+def _rests(position_m: Array) -> Array:
+    """(t - 3, b) third differences in `REST_FRAMES` of white noise alone. In every coordinate mean squares of third
+    differences are ten times those of first ones, 20 σ² and 2 σ²; where something moves they are less. Nobody is much
+    quieter at any time: what rattles dies away, noise does not.
+    """
+    found = np.zeros((max(len(position_m) - 3, 0), position_m.shape[1]), bool)
+    if len(position_m) < REST_FRAMES or not position_m.shape[1]:
+        return found
+    first, third = (
+        np.lib.stride_tricks.sliding_window_view(np.diff(position_m, n, axis=0) ** 2, REST_FRAMES - n, axis=0).mean(-1)
+        for n in (1, 3)
+    )
+    loud = third.sum(axis=2)
+    white = (third > WHITE * first).all(axis=2) & (loud < QUIETER**2 * loud.min())
+    for k in range(REST_FRAMES - 3):
+        found[k : k + len(white)] |= white
+    return found
 
 
 def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:

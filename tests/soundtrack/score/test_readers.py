@@ -126,6 +126,23 @@ def test_a_fall_tells_gravity_and_the_noise_of_its_poses() -> None:
     assert hidden_n_s(0.1, noise_m, 240) == pytest.approx(5 * np.sqrt(6) * 0.1 * noise_m * 240)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_what_rests_tells_noise_and_what_rattles_tells_none(seed: int) -> None:
+    """Nobody flies; a rattle of the same size dies away, and somebody who is quieter than that knows better."""
+    rng, noise_m = np.random.default_rng(seed), 3e-4
+    still = ball_animation(RADIUS_M + 1e-3 * np.arange(40), 24.0)
+    jitter, nowhere = noise_m * rng.standard_normal((40, 3)), np.zeros((40, 2), bool)
+
+    def told(away_m: np.ndarray) -> float | None:
+        place = still.position_m.copy()
+        place[:, 1] = np.array([0, 0, RADIUS_M]) + away_m
+        return pose_noise_m(replace(still, position_m=place), nowhere)
+
+    assert told(jitter) == pytest.approx(noise_m, rel=0.6)
+    rattle = told(jitter * np.exp(-np.arange(40) / 6)[:, None])
+    assert rattle is None or rattle < 0.1 * noise_m
+
+
 @pytest.mark.parametrize(("rounded_m", "fps"), [(1e-4, 240.0), (1e-4, 60.0), (1e-3, 240.0), (0.0, 240.0)])
 def test_who_falls_is_free_however_its_poses_are_rounded(rounded_m: float, fps: float) -> None:
     """Rounded to 0.1 mm, accelerations from frame to frame are off by half of gravity at 240; over a flight they are
