@@ -548,9 +548,7 @@ def test_whatever_is_passed_is_taken_or_refused(
     tried = 0
     for argument in good:
         for value in MENU:
-            if argument not in ("progress", "say", "at_end") or not callable(
-                value
-            ):  # a user's function raises what it likes
+            if argument not in ("progress", "say", "at_end") or not callable(value):  # a user's function raises what it likes
                 refusal(call, {**good, argument: value})
                 tried += 1
     assert tried > len(good) * len(MENU) * 0.8

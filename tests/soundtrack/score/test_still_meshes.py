@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from sonic_bullet.listener import direct_client, disconnect
+from sonic_bullet.listener.animated import AnimatedBody
+from sonic_bullet.listener.frames import MOTION
 from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage
 from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
-from tests.made.animations import box_mesh
+from tests.made.animations import RADIUS_M, ball_body, box_mesh
 
 SIDE_M, MASS_KG, WIDE_M, HIGH_M, THICK_M = 0.04, 0.2, 0.15, 0.2, 0.1
 CORNERS = np.array([(x, y, z) for z in (0, HIGH_M) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
@@ -99,11 +100,26 @@ def test_a_solid_is_its_hull_and_a_fine_floor_is_one_face() -> None:
     assert len(pieces(Shape("mesh", vertex_m=BIN[0], face=BIN[1]), "bin", False)) == 5
 
 
-def test_what_has_too_many_faces_is_named() -> None:
-    """A bowl: half a sphere, open."""
-    lat, lon = np.meshgrid(np.linspace(0.1, 1.5, 8), np.arange(24) * np.pi / 12, indexing="ij")
-    bowl = np.stack([np.sin(lat) * np.cos(lon), np.sin(lat) * np.sin(lon), -np.cos(lat)], axis=-1).reshape(-1, 3)
-    quads = [(24 * i + j, 24 * i + (j + 1) % 24, 24 * i + 24 + (j + 1) % 24, 24 * i + 24 + j)
-             for i in range(7) for j in range(24)]  # fmt: skip
-    with pytest.raises(AnimationError, match=r"'bowl'.*faces"):
-        pieces(Shape("mesh", vertex_m=bowl, face=of_quads(bowl, quads)[1]), "bowl", False)
+def test_a_fine_bowl_is_hollow() -> None:
+    """Half a sphere, open: who hangs in it touches nobody; at its ground and at its side the wall is where it is."""
+    lat, lon = np.meshgrid(np.linspace(0.05, 1.5, 14), np.arange(32) * np.pi / 16, indexing="ij")
+    bowl = WIDE_M * np.stack([np.sin(lat) * np.cos(lon), np.sin(lat) * np.sin(lon), -np.cos(lat)], -1).reshape(-1, 3)
+    quads = [(32 * i + j, 32 * i + (j + 1) % 32, 32 * i + 32 + (j + 1) % 32, 32 * i + 32 + j)
+             for i in range(13) for j in range(32)]  # fmt: skip
+    shape = Shape(
+        "mesh", vertex_m=bowl, face=np.concatenate([of_quads(bowl, quads)[1], [(0, i, i + 1) for i in range(31)]])
+    )
+    assert pieces(shape, "bowl", False) == []
+    motion = np.zeros(2, MOTION)
+    motion["quaternion_xyzw"][:, 3] = 1
+    with AnimatedStage((AnimatedBody("bowl", (shape,), 0.0, np.zeros(3)), ball_body()), np.zeros(3)) as stage:
+        for tilt in (0.0, 0.8):
+            normal = np.array([np.sin(tilt), 0, np.cos(tilt)])
+            place = (RADIUS_M - WIDE_M) * normal
+            motion["position_m"][1] = 0.5 * place
+            assert not len(stage.closest(motion, [(0, 1)], 1.5e-3))
+            motion["position_m"][1] = place
+            raw = stage.closest(motion, [(1, 0)], 1.5e-3)
+            nearest = raw[raw["gap_m"].argmin()]
+            assert abs(nearest["gap_m"]) < 1.5e-3
+            assert nearest["normal"] @ normal > 0.98

@@ -68,7 +68,12 @@ class AnimatedStage:
 
     def _made(self, body: AnimatedBody) -> int:
         ask, cid = pybullet, self.client_id
-        shape = _compound([options for shape in body.shapes for options in _collision(shape, body)], cid)
+        made_of = [options for shape in body.shapes for options in _collision(shape, body)]
+        if len(made_of) > 1 and any("indices" in options for options in made_of):
+            raise AnimationError(
+                f"body '{body.name}': one of its meshes has too many faces", "make it a body of its own"
+            )
+        shape = _compound(made_of, cid)
         if shape < 0:
             raise AnimationError(f"body '{body.name}': PyBullet makes no collision shape of it", "simplify its mesh")
         made = int(ask.createMultiBody(body.mass_kg, shape, physicsClientId=cid))
@@ -140,6 +145,8 @@ class AnimatedStage:
         place, turn = motion[low]["position_m"], motion[low]["quaternion_xyzw"]
         angle = TILT_M / self.extent_m[low]
         for normal in normals:
+            if sum(np.array(one[7]) @ normal > SAME_FACE for one in points) > 2:  # its corners are there
+                continue
             side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
             side /= np.linalg.norm(side)
             for axis in (side, -side, np.cross(normal, side), -np.cross(normal, side)):
@@ -249,8 +256,12 @@ def _collision(shape: Shape, body: AnimatedBody) -> Iterator[dict[str, Any]]:
     elif shape.kind == "plane":
         yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
     else:
-        for corner in pieces(shape, body.name, body.mass_kg > 0):
+        found = pieces(shape, body.name, body.mass_kg > 0)
+        for corner in found:
             yield {"shapeType": pybullet.GEOM_MESH, "vertices": corner.tolist(), **placed}
+        if not found:
+            bare = {"vertices": shape.vertex_m.tolist(), "indices": shape.face.ravel().tolist()}
+            yield {"shapeType": pybullet.GEOM_MESH, **bare, **placed}
 
 
 def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) -> Array:

@@ -1,9 +1,10 @@
 """A mesh as convex pieces that collide: what moves as the hulls of its connected parts, what never moves as it is.
 
-    part closed and convex -> its hull;  moves -> its hull;  else -> its flat faces, each a hull without thickness
+    part closed and convex -> its hull;  moves -> its hull;  else -> its flat faces, each a hull without thickness,
+                                                             or, where they are many, no pieces: a mesh of triangles
 
-Bullet finds how deep a body is in a flat hull from either side. Of a mesh of triangles it would look at each by itself:
-a body that is a little deep meets the edges between those of one floor.
+Bullet finds how deep a body is in a flat hull from either side. Of a mesh of triangles it looks at each by itself: a
+body that is a little deep meets the edges between those of one floor, too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError, MeshError
 
 MOST = 64
-"""Pieces of one body: beyond, PyBullet takes longer for them than for all else."""
+"""Pieces of one body: beyond, PyBullet takes longer for them than for triangles."""
 CONVEX = 0.02
 """By which share of it a hull may be larger than what is convex: rounded corners."""
 FLAT = 1e-3
@@ -26,8 +27,8 @@ FLAT = 1e-3
 
 
 def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
-    """Corners (v, 3) of each. Raises AnimationError where a body that moves is flat, or one that never does has too
-    many faces that are not one convex solid.
+    """Corners (v, 3) of each; none where what never moves has so many faces that it collides triangle by triangle.
+    Raises AnimationError where a body that moves is flat.
     """
     vertex, face = welded(shape.vertex_m, shape.face)
     parts = list(_connected(vertex, face))
@@ -38,12 +39,7 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
         except MeshError as error:
             raise AnimationError(f"body '{name}': its mesh is flat", "give it thickness") from error
     found = [piece for part in parts for piece in _still(*part)]
-    if len(found) > MOST:
-        raise AnimationError(
-            f"body '{name}': its mesh has {len(found)} faces that are not of one convex solid, {MOST} are the most",
-            "simplify it, or split it into closed convex parts",
-        )
-    return found
+    return found if len(found) <= MOST else []
 
 
 def _connected(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
