@@ -123,7 +123,8 @@ def scored_by_hand(
         for body, one in zip(log.bodies, bodies, strict=True)
     )
     if stopped is not None:
-        stopped.log = replace(replace(log, bodies=heavy).first(len(made)), steps=tuple(made))  # type: ignore[attr-defined]
+        known_log = replace(log, bodies=heavy).first(len(made))
+        stopped.log = replace(known_log, steps=tuple(made))  # type: ignore[attr-defined]
         raise stopped
     return replace(log, bodies=heavy, steps=(*made, steps[-1]))
 

@@ -84,12 +84,12 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     """
     flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
     who = animation.free & animation.moving
-    told = flies & who
-    if told.sum() < LEAST_FRAMES:
-        told[:, who] = _rests(animation.position_m[:, who])
-    if told.sum() < LEAST_FRAMES:
+    calm = flies & who
+    if calm.sum() < LEAST_FRAMES:
+        calm[:, who] = _rests(animation.position_m[:, who])
+    if calm.sum() < LEAST_FRAMES:
         return None
-    third = np.diff(animation.position_m, 3, axis=0)[told]  # of white noise √20 σ
+    third = np.diff(animation.position_m, 3, axis=0)[calm]  # of white noise √20 σ
     return float(MAD * np.median(np.abs(third), axis=0).max() / np.sqrt(20))
 
 

@@ -27,7 +27,7 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
-from sonic_bullet.soundtrack.frame_rates import EXACT, nearest_rate
+from sonic_bullet.soundtrack.frame_rates import rate_of_keys
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 from sonic_bullet.soundtrack.score.keyframes import tipped, upright
 
@@ -35,9 +35,6 @@ BYTES_MAX = 1 << 30
 POSES_MAX = 2_000_000
 """Of all nodes: half a gigabyte while they are read."""
 LATE_S = 1e-3
-USUAL_FPS = 30.0
-UNEVEN = 4e-4
-"""By which share the median distance of keys may be off: less than half of what is between n and n·1000/1001."""
 _REMEDY = "export it again as glTF 2.0 (.glb)"
 COMPONENT = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -61,7 +58,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
                 f"{path} holds no node animation", "bake the simulation to keyframes and export with animations"
             )
         times = [sampler.time_s for own in channels.values() for sampler in own.values()]
-        rate = fps if fps is not None else _rate(times)
+        rate = fps if fps is not None else rate_of_keys(times)
         first, last = min(t[0] for t in times), max(t[-1] for t in times)
         count = int(np.floor((last - first) * rate + 1e-3)) + 1
         many = max(len(_needed(file)), 1)
@@ -202,21 +199,6 @@ def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
                 raise AnimationError("a sampler holds numbers that are none", _REMEDY)
             found.setdefault(node, {})[path] = _Sampler(time_s, value, how, path == "rotation")
     return found
-
-
-def _rate(times: list[Array]) -> float:
-    """Frames a second of baked keys: of the sampler that has most, over all of it, where they are even but for float32;
-    else the median of all distances. `USUAL_FPS` where they are sparse.
-    """
-    gaps = np.concatenate([np.diff(t) for t in times])
-    if len(gaps) < 8:
-        return USUAL_FPS
-    longest = max(times, key=len)
-    rate, within = 1 / float(np.median(gaps)), UNEVEN
-    own = np.diff(longest)
-    if len(own) >= 8 and np.abs(own - own.mean()).max() <= 2 * np.spacing(np.float32(longest[-1])):
-        rate, within = 1 / float(own.mean()), EXACT
-    return nearest_rate(rate, within) if rate >= 10 else USUAL_FPS
 
 
 def _parents(file: _File) -> dict[int, int]:

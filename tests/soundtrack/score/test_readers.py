@@ -13,11 +13,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sonic_bullet.records.errors import AnimationError, SonicBulletError
-from sonic_bullet.soundtrack.frame_rates import nearest_rate
+from sonic_bullet.soundtrack.frame_rates import nearest_rate, rate_of_keys
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
 from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
-from sonic_bullet.soundtrack.score.gltf import _rate, _Sampler
+from sonic_bullet.soundtrack.score.gltf import _Sampler
 from sonic_bullet.soundtrack.score.keyframes import read_rules, write_keyframes
 from sonic_bullet.soundtrack.score.scoring import read_animation
 from tests.made.animations import (
@@ -267,7 +267,7 @@ def test_a_late_first_key_is_said(tmp_path: Path) -> None:
 def test_the_rate_of_baked_keys_is_that_of_all_of_them(rate: float, seconds: float) -> None:
     """Distances of float32 times are off by ten millionths of their time: 8 µs of 4 ms after 90 s."""
     key = (np.arange(round(seconds * rate)) / rate).astype(np.float32).astype(float)
-    found = _rate([key[:5], key])
+    found = rate_of_keys([key[:5], key])
     assert abs(found / rate - 1) * seconds * rate < 0.05  # of a frame, at the end
     assert found == rate or not rate.is_integer()
     assert nearest_rate(29.96) == 29.96
