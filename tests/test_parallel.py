@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, popen_fork
 from pathlib import Path
 
 import numpy as np
@@ -223,3 +223,15 @@ def test_who_stops_reading_leaves_no_process() -> None:
     assert int(next(reading)[0]) == 0
     reading.close()
     assert active_children() == []
+
+
+def test_arrays_are_made_here_where_no_process_is_to_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise BlockingIOError("no process")
+
+    monkeypatch.setattr(module, "_can_fork", lambda: True)
+    monkeypatch.setattr(popen_fork.Popen, "_launch", refused)  # which makes two pipes of its own, and leaves them
+    held = len(os.listdir("/proc/self/fd"))
+    made = [int(one[0]) for one in arrays_in_order(lambda number: np.array([number]), 9, (1,), np.int64)]
+    assert made == list(range(9))
+    assert len(os.listdir("/proc/self/fd")) == held

@@ -114,3 +114,14 @@ def rotation(first: Array, second: Array) -> Array:
     length = np.linalg.norm(axis, axis=-1, keepdims=True)
     angle = 2 * np.arctan2(length, np.abs(real))
     return np.asarray(np.where(real < 0, -1.0, 1.0) * axis * angle / np.maximum(length, 1e-300))
+
+
+def matrices(quaternion: Array) -> Array:
+    """Rotation matrices (…, 3, 3) of unit quaternions (…, 4), x y z w [Kuipers 1999, sec. 5.15]."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

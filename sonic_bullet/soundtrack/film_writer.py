@@ -37,6 +37,7 @@ from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
+from sonic_bullet.soundtrack.frame_rates import fraction_of
 
 
 class _Codec(NamedTuple):
@@ -71,7 +72,7 @@ def as_fps(text: object) -> Fraction:
     """Pictures a second, as a fraction: 30, "30000/1001", "29.97". Raises FileError."""
     remedy = "give pictures a second, 24, 25, 30000/1001 or 60 say"
     try:
-        fps = Fraction(str(text))
+        fps = fraction_of(str(text))
     except (ValueError, ZeroDivisionError):
         raise FileError(f"fps is {shown(text)}", remedy) from None
     # what is written as 29.97 or 23.976 is meant so [SMPTE ST 12-1, sec. 4]
@@ -258,6 +259,10 @@ class FilmWriter:
         finally:
             self.partial.close()
         if not kept:
+            if isinstance(error, KeyboardInterrupt):
+                raise KeyboardInterrupt(
+                    f"{str(error) or 'stopped'}; no picture was drawn yet: no film is left"
+                ) from error
             return
         saved = f"the first {float(self.pictures / self.fps):.3f} s are in {kept_name(Path(self.path))}"
         if isinstance(error, SonicBulletError):

@@ -21,6 +21,7 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.riff.wave_chunks import Cue
+from sonic_bullet.listener.animated import matrices
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
@@ -32,7 +33,6 @@ from sonic_bullet.synth.strikes import NOW, SPAN
 
 IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED = "impact", "roll", "slide", "support", "uncaused strike"
 SOUNDING = (IMPACT, ROLL, SLIDE)
-LASTING = (ROLL, SLIDE, SUPPORT)
 LEVEL_S = 0.05
 """How long after an impact arrives its peak is looked for: the ear's integration time for loudness is of that order,
 and the latest mode's first swing is over."""
@@ -92,6 +92,27 @@ class _Moment(NamedTuple):
     reason: str = ""
 
 
+@dataclass(slots=True)
+class _Run:
+    """Steps of a pair and a kind, from the first on; step: the last of `steps`, travel: sum of speeds times loads."""
+
+    first: _Moment
+    step: int
+    end_s: float
+    steps: int
+    load_n_s: float
+    travel: float
+
+    @classmethod
+    def of(cls, one: _Moment) -> _Run:
+        return cls(one, one.step, one.end_s, 1, one.impulse_n_s, (one.impulse_n_s + 1e-300) * one.speed_m_s)
+
+    def add(self, other: _Run) -> None:
+        """Go on with what came next."""
+        self.step, self.end_s, self.steps = other.step, other.end_s, self.steps + other.steps
+        self.load_n_s, self.travel = self.load_n_s + other.load_n_s, self.travel + other.travel
+
+
 class EventWitness:
     """Sees every step of a log's run; `events` are what it saw."""
 
@@ -99,6 +120,7 @@ class EventWitness:
         self._log, self._steps = log, iter(log.steps)
         self._known: dict[int, Mapping[tuple[int, int], _Touch]] = {}
         self._seen: list[_Moment] = []
+        self._runs: dict[tuple[int, int], list[_Run]] = {}  # grown in place: what rests rests for hours
         self._struck: dict[tuple[int, int], int] = {}
 
     def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:
@@ -137,7 +159,15 @@ class EventWitness:
             else:
                 continue
             reason = NO_VOICE if mute[i] else reason
-            self._seen.append(_Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason))
+            moment = _Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason)
+            if kind == UNCAUSED:
+                self._seen.append(moment)
+                continue
+            runs = self._runs.setdefault(who, [])
+            if runs and runs[-1].first.kind == kind and number - runs[-1].step <= SPAN:
+                runs[-1].add(_Run.of(moment))
+            else:
+                runs.append(_Run.of(moment))
 
     def _touching(self, number: int) -> Mapping[tuple[int, int], _Touch]:
         """The pairs that touch in a step of the log; behind its last nobody does."""
@@ -154,7 +184,7 @@ class EventWitness:
             moments = list(mine)
             for kind, apart in ((IMPACT, 1), (UNCAUSED, SPAN)):
                 found += [self._impact(group) for group in _strikes([x for x in moments if x.kind == kind], apart)]
-            found += [self._span(group) for group in _spans([x for x in moments if x.kind in LASTING])]
+        found += [self._span(run) for runs in self._runs.values() for run in _spans(runs)]
         by_index = {stem.index: stem for stem in stems}
         pressure = bool(self._log.sensors) and isinstance(self._log.sensors[0], Microphone)
         return tuple(
@@ -167,10 +197,8 @@ class EventWitness:
         impulse = sum(one.impulse_n_s for one in pulses)
         return self._event(first, pulses[-1].end_s, impulse, max(one.speed_m_s for one in pulses))
 
-    def _span(self, moments: list[_Moment]) -> SoundEvent:
-        load = np.array([one.impulse_n_s for one in moments])
-        speed = float(np.average([one.speed_m_s for one in moments], weights=load + 1e-300))
-        return self._event(moments[0], moments[-1].end_s, float(load.sum()), speed)
+    def _span(self, run: _Run) -> SoundEvent:
+        return self._event(run.first, run.end_s, run.load_n_s, run.travel / (run.load_n_s + run.steps * 1e-300))
 
     def _event(self, first: _Moment, end_s: float, impulse_n_s: float, speed_m_s: float) -> SoundEvent:
         log, late_s, place_m = self._log, 0.0, np.array(first.touch.place_m)
@@ -190,7 +218,7 @@ def touching_pairs(step: Step | None) -> Mapping[tuple[int, int], _Touch]:
     row = step.contacts.row
     load = np.abs(np.einsum("ki,ki->k", row["impulse_n_s"], row["normal"])) + 1e-300
     at = np.searchsorted(step.body, row["a"])
-    place = step.position_m[at] + _turned(step.quaternion_xyzw[at], row["point_a_m"])
+    place = step.position_m[at] + np.einsum("kij,kj->ki", matrices(step.quaternion_xyzw[at]), row["point_a_m"])
     slip, sweep = np.linalg.norm(row["slip_m_s"], axis=1), row["sweep_m_s"].max(axis=1)
     pair, which = np.unique(np.sort(np.stack([row["a"], row["b"]], 1), axis=1), axis=0, return_inverse=True)
     total = np.bincount(which.ravel(), load)
@@ -203,13 +231,6 @@ def touching_pairs(step: Step | None) -> Mapping[tuple[int, int], _Touch]:
         (low, high): _Touch((x[i], y[i], z[i]), slip[i], sweep[i], float(approach[i]))
         for i, (low, high) in enumerate(pair.tolist())
     }
-
-
-def _turned(quaternion: Array, vector: Array) -> Array:
-    """Vectors (k, 3) turned by unit quaternions (k, 4), x y z w: v + 2 w (q × v) + 2 q × (q × v)."""
-    axis, real = quaternion[:, :3], quaternion[:, 3:]
-    across = np.cross(axis, vector)
-    return np.asarray(vector + 2 * (real * across + np.cross(axis, across)))
 
 
 def _strikes(pulses: list[_Moment], apart: int) -> list[list[_Moment]]:
@@ -225,25 +246,19 @@ def _strikes(pulses: list[_Moment], apart: int) -> list[list[_Moment]]:
     return groups
 
 
-def _spans(moments: list[_Moment]) -> list[list[_Moment]]:
-    """Steps of one pair as spans of one kind; a kind that lasts less than `SPAN` steps, as manifolds flicker, belongs
-    to what was before it, and a gap of as much ends none.
+def _spans(runs: Sequence[_Run]) -> list[_Run]:
+    """Runs of one pair as spans of one kind; a kind that lasts less than `SPAN` steps, as manifolds flicker, belongs to
+    what was before it, and a gap of as much ends none.
     """
-    runs: list[list[_Moment]] = []
-    for one in moments:
-        if runs and runs[-1][-1].kind == one.kind and one.step - runs[-1][-1].step <= SPAN:
-            runs[-1].append(one)
-        else:
-            runs.append([one])
-    spans: list[list[_Moment]] = []
+    spans: list[_Run] = []
     for run in runs:
         last = spans[-1] if spans else None
-        if last is not None and run[0].step - last[-1].step <= SPAN and (
-            len(run) < SPAN or last[0].kind == run[0].kind
+        if last is not None and run.first.step - last.step <= SPAN and (
+            run.steps < SPAN or last.first.kind == run.first.kind
         ):  # fmt: skip
-            last.extend(run)
+            last.add(run)
         else:
-            spans.append(run)
+            spans.append(replace(run))
     return spans
 
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.records.errors import FileError
 from sonic_bullet.render import render_log
-from sonic_bullet.soundtrack.score.scoring import read_animation
+from sonic_bullet.soundtrack.score.scoring import read_animation, score_scene
 from tests.cli.test_commands import error_of, run
 from tests.made.animations import EDGES_M, box_mesh, dropped, keyframes, write_glb
 
@@ -167,3 +168,40 @@ def test_the_export_script_writes_what_is_read(place: Path, monkeypatch: pytest.
     assert (export.fps, one.stated.material, one.stated.mass_kg) == (24.0, "oak", 0.3)
     assert one.mesh is not None and np.abs(one.mesh[0] - vertex).max() < 1e-12
     assert np.diff(one.position_m[:, 2], 2) == pytest.approx(np.full(10, -9.81 / 24**2))
+
+
+@pytest.mark.parametrize("words", [["--materials", "t.json"], ["--fps", "24"], ["--scale", "0.01"]])
+def test_what_a_scene_says_itself_is_not_passed_over(
+    place: Path, capfd: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    Path("hand.py").write_text(HAND)
+    Path("t.json").write_text("[]")
+    assert "leave out" in error_of(capfd, "score", "hand.py", "-o", "a.wav", *words)
+
+
+def test_a_log_that_cannot_be_written_does_not_take_the_sound_with_it(
+    place: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sonic_bullet import files
+
+    def full(*_: object) -> None:
+        raise FileError("cannot write a.npz: no space left", "make room")
+
+    monkeypatch.setattr(files, "write_log", full)
+    write_glb(place / "a.glb", dropped(60))
+    said = error_of(capfd, "score", "a.glb", "-o", "a.wav", "--sr", "8000", "--contacts", "a.npz")
+    assert "no space left" in said and "a.partial.wav" in said
+    assert read_audio("a.partial.wav")[0].any()
+
+
+@pytest.mark.parametrize("at", [0.6, 0.9])
+def test_a_scene_that_is_stopped_after_its_simulation_is_kept(place: Path, at: float) -> None:
+    Path("hand.py").write_text(HAND)
+
+    def stop(share: float) -> None:
+        if share > at:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        score_scene("hand.py", sr=8000, progress=stop)
+    assert caught.value.partial.sound.samples().any()  # type: ignore[attr-defined]

@@ -131,6 +131,16 @@ def test_what_rests_is_silent_and_said_to_carry_weight() -> None:
     assert all(one.level_db is None for one in events)
 
 
+def test_who_rests_takes_no_memory_for_it() -> None:
+    """An hour of rest is one span that grows, and not a record a step."""
+    log = run(resting, 1.0)
+    witness = EventWitness(log)
+    render_stems(log, witness=witness)
+    kept = len(witness._seen) + sum(len(runs) for runs in witness._runs.values())
+    assert kept < 0.1 * len(log.steps)
+    assert sum(one.end_s - one.start_s for one in witness.events((), log.sr) if one.kind == SUPPORT) > 0.8
+
+
 def test_two_bodies_without_a_voice_are_said_to_have_none() -> None:
     def setup(client: Any, listener: sb.Listener) -> None:
         ground = floor(client)

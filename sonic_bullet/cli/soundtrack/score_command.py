@@ -5,13 +5,16 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option, level_options
 from sonic_bullet.records.errors import FileError, SonicBulletError
+
+if TYPE_CHECKING:
+    from sonic_bullet.scene import RenderResult
 
 EPILOG = """\b
 Examples:
@@ -53,25 +56,34 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
     check_audio_output(output)
     if contacts is not None and not contacts.endswith(".npz"):
         raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
+    of_scene = Path(animation).suffix.lower() == ".py"
+    if of_scene and (options["table"] is not None or options["fps"] is not None or options["scale"] != 1):
+        raise FileError(
+            f"{animation} is a scene, which says its materials, step and lengths itself",
+            "leave out --materials, --fps and --scale",
+        )
     to, contacts_to, json_to = places(output, contacts, json_to)
     with clean_stdout(json_to) as say:
         with quiet_stderr():
             from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
         rules = rules_of(options["table"])
+        result: RenderResult | None = None
         try:
             with progress_bar(Path(animation).name) as (progress, tell):
                 how: dict[str, Any] = {"sr": sr, "seed": options["seed"], "progress": progress, "say": tell}
-                if Path(animation).suffix.lower() == ".py":
+                if of_scene:
                     places_m = options["microphones"] or None
                     result = score_scene(animation, microphones=places_m, material=options["material"], **how)
                 else:
                     how |= {name: options[name] for name in ("fps", "scale")}
                     how |= {"rules": rules, "material": options["material"] or "plastic"}
                     result = score_animation(animation, microphones=options["microphones"] or MICROPHONE, **how)
+            if contacts_to is not None:
+                write_log(contacts_to, result.log)
         except (SonicBulletError, KeyboardInterrupt) as error:
+            if result is not None:
+                error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, str(to), output, *levels.values()) from error
-        if contacts_to is not None:
-            write_log(contacts_to, result.log)
         report = replace(write_audio(str(to), result.sound, sr, **levels), path=output)
         say(summary(report, result.log))
         for note in result.notes:

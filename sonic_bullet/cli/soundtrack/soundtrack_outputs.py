@@ -6,6 +6,7 @@ SoundtrackWish (options) -> checked -> made (one more run of the log, body by bo
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from sonic_bullet.soundtrack.stems import Stem
 
 WITH_CUES = (".wav", ".rf64")
+LATEST_S = 1e9
 
 
 def soundtrack_options(command: Any) -> Any:
@@ -72,9 +74,17 @@ class SoundtrackWish:
             raise FileError(f"cannot write cue points to {output}", "end its name with .wav")
         if self.time_reference_s is not None and not self.cues:
             raise FileError("--time-reference is told beside cue points", "give --cues too")
+        if self.time_reference_s is not None and not self.time_reference_s <= LATEST_S:
+            raise FileError(f"--time-reference is {self.time_reference_s:g} s", f"give 0 to {LATEST_S:g}, 30 years")
         if self.stem_peak_dbfs is not None and self.stems is None:
             raise FileError("--stem-peak-dbfs is of stems", "give --stems DIR too")
-        return self if self.stems is None else replace(self, stems=folder_place(self.stems, ""))
+        if self.stems is None:
+            return self
+        folder = folder_place(self.stems, "")
+        to = Path(output).absolute()
+        if os.path.realpath(to.parent) == os.path.realpath(folder) and re.match(r"\d\d+-", to.name):
+            raise FileError(f"{output} has the name of a stem in {self.stems}", "give --stems a folder of its own")
+        return replace(self, stems=folder)
 
     def made(
         self,
@@ -127,7 +137,7 @@ class Soundtrack:
         }
 
     def write(self, mix: AudioReport) -> None:
-        """Events and stems. Raises FileError, AudioError naming what is written already."""
+        """Events and stems. Raises FileError, AudioError."""
         from sonic_bullet.soundtrack.event_tables import write_events
         from sonic_bullet.soundtrack.stems import write_stems
 
@@ -148,7 +158,13 @@ class Soundtrack:
                 time_reference=self.time_reference,
             )
         )
-        self.words.append(f"{self.wish.stems}{os.sep}: {len(reports)} stems")
+        said = f"{self.wish.stems}{os.sep}: {len(reports)} stems"
+        older = {one.name for one in Path(self.wish.stems).glob("[0-9][0-9]*-*.wav")} - {
+            Path(report.path).name for report in reports
+        }
+        if older:
+            said += f"; {', '.join(sorted(older)[:5])} there {'is' if len(older) == 1 else 'are'} of another render"
+        self.words.append(said)
         self.described["stems"] = [
             {
                 "path": report.path,

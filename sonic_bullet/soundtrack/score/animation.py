@@ -89,14 +89,3 @@ class Animation:
         motion["velocity_m_s"][0][self.free] -= self.gravity_m_s2 / self.fps
         motion["spin_rad_s"][0] = motion["spin_rad_s"][1]
         return motion
-
-
-def matrices(quaternion: Array) -> Array:
-    """Rotation matrices (…, 3, 3) of unit quaternions (…, 4), x y z w [Kuipers 1999, sec. 5.15]."""
-    x, y, z, w = np.moveaxis(quaternion, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

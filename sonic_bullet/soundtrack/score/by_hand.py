@@ -18,11 +18,11 @@ from itertools import groupby
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.animated import AnimatedBody, rotation
+from sonic_bullet.listener.animated import AnimatedBody, matrices, rotation
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AnimationError
-from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation, matrices
+from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 
 DRIVEN_STEPS = 4
@@ -87,7 +87,8 @@ def scored_by_hand(
     progress: Callable[[float], None] | None = None,
 ) -> ContactLog:
     """The log with the contacts of driven bodies. shapes: of bodies by their index. Raises AnimationError where bodies
-    come or go, steps change their length, or a driven body has no mass and no model to tell it.
+    come or go, steps change their length, or a driven body has no mass and no model to tell it; interrupted, the
+    exception carries the steps so far as ``log``.
     """
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
@@ -108,15 +109,23 @@ def scored_by_hand(
     known = [_given(step, len(bodies), driven) for step in steps]
     with AnimatedStage(bodies, animation.gravity_m_s2) as stage:
         found: list[tuple[Array, Array]] = []
-        fit_steps(animation, stage, found, progress, known=np.stack(known), only=driven)
+        stopped: KeyboardInterrupt | None = None
+        try:
+            fit_steps(animation, stage, found, progress, known=np.stack(known), only=driven)
+        except KeyboardInterrupt as error:
+            stopped = error
         world = AnimatedWorld(stage, found, steps[0].dt_s)
         for body in stage.ids:
             world.add(body)
-        made = [_merged(step, world.after_step(), driven, moves, k) for k, step in enumerate(steps[:-1])]
+        made = [_merged(step, world.after_step(), driven, moves, k) for k, step in enumerate(steps[: len(found)])]
     heavy = tuple(
         replace(body, mass_kg=one.mass_kg, inertia_kg_m2=np.diag(one.inertia_kg_m2)) if one.driven else body
         for body, one in zip(log.bodies, bodies, strict=True)
     )
+    if stopped is not None:
+        known_log = replace(log, bodies=heavy).first(len(made))
+        stopped.log = replace(known_log, steps=tuple(made))  # type: ignore[attr-defined]
+        raise stopped
     return replace(log, bodies=heavy, steps=(*made, steps[-1]))
 
 

@@ -15,11 +15,11 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from sonic_bullet.geometry import inertia, is_closed, volume_m3, welded
-from sonic_bullet.listener.animated import AnimatedBody
+from sonic_bullet.listener.animated import AnimatedBody, matrices
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
-from sonic_bullet.soundtrack.score.animation import Animation, matrices
+from sonic_bullet.soundtrack.score.animation import Animation
 
 ONE_SPOT_M = 1e-4
 RESTITUTION, FRICTION = 0.7, 0.7

@@ -1,6 +1,6 @@
 """What free flight says of an animation: gravity, and with it the scale; noise of the poses; who is moved by hand.
 
-a(k) = (x(k+1) - 2x(k) + x(k-1)) fps²        in flight a = g, and of a noise σ in the poses √6 σ fps² is left
+a(k) = (x(k+n) - 2x(k) + x(k-n)) (fps/n)²    in flight a = g, and of a noise σ in the poses √6 σ (fps/n)² is left
 a hidden impulse: 5 √6 m σ fps               five standard deviations of m times the second difference's speed
 """
 
@@ -11,6 +11,7 @@ import numpy as np
 from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.impulse_fit import near_pairs, speeds
 
 STEADY = 0.1
 """Share by which an acceleration may change from frame to frame and still be a fall: air, and float32 poses."""
@@ -20,54 +21,95 @@ FALL_RANGE = (0.02, 5.0)
 HANDED = 0.5
 NEAR_M = 5e-3
 SIGMAS = 5.0
+REST_FRAMES, WHITE, QUIETER = 16, 5.0, 4.0
+"""Frames of a rest that tells noise; see _rests."""
 MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
 
 
-def accelerations(animation: Animation) -> Array:
-    """(t - 2, b, 3) in m/s²."""
-    return np.diff(animation.position_m, 2, axis=0) * animation.fps**2
+def accelerations(animation: Animation, apart: int = 1) -> Array:
+    """(t - 2 apart, b, 3) in m/s², from poses so many frames apart."""
+    x = animation.position_m
+    second = x[2 * apart :] - 2 * x[apart : len(x) - apart] + x[: -2 * apart]
+    return np.asarray(second * (animation.fps / apart) ** 2)
 
 
-def _steady(animation: Animation) -> Array:
-    """(t - 3, b) whether an acceleration is the next frame's too, downwards, and some."""
-    a, down = accelerations(animation), animation.gravity_m_s2
+def frames_apart(animation: Animation, noise_m: float | None, within_m_s2: float) -> int:
+    """How many frames apart poses tell an acceleration from noise: 5 √6 √3 σ (fps/n)², of all three coordinates, is no
+    more than this.
+    """
+    noise_m_s2 = SIGMAS * float(np.sqrt(18)) * (noise_m or 0.0) * animation.fps**2
+    frames = int(np.ceil(np.sqrt(noise_m_s2 / max(within_m_s2, 1e-12))))
+    return min(max(frames, 1), (len(animation) - 1) // 2)
+
+
+def _steady(a: Array, animation: Animation) -> Array:
+    """(a - 1, b) whether an acceleration is the next frame's too, downwards, and some."""
+    down = animation.gravity_m_s2
     size = np.linalg.norm(a, axis=2)
     same = np.linalg.norm(a[1:] - a[:-1], axis=2) < STEADY * size[:-1]
     along = (a @ down)[:-1] > 0.9 * size[:-1] * max(float(np.linalg.norm(down)), 1e-12)
     return np.asarray(same & along & (size[:-1] > 0.05) & animation.free)
 
 
-def fall_m_s2(animation: Animation) -> float | None:
+def fall_m_s2(animation: Animation, noise_m: float | None = None) -> float | None:
     """With what acceleration bodies fall; None where nobody does steadily. Who leans on something falls slower, nobody
     faster: the fastest tenth is free.
     """
-    steady = _steady(animation)
+    within_m_s2 = STEADY * float(np.linalg.norm(animation.gravity_m_s2))
+    a = accelerations(animation, frames_apart(animation, noise_m, within_m_s2))
+    steady = _steady(a, animation)
     if steady.sum() < LEAST_FRAMES:
         return None
-    return float(np.quantile(np.linalg.norm(accelerations(animation)[:-1], axis=2)[steady], 0.9))
+    return float(np.quantile(np.linalg.norm(a[:-1], axis=2)[steady], 0.9))
 
 
 def alone(animation: Animation, stage: PoseStage) -> Array:
-    """(t, b) who is near nobody."""
-    motion = animation.poses()
-    found = np.zeros(motion.shape, bool)
+    """(t, b) who is so far from everybody that it touches nobody from a frame before to a frame after."""
+    motion, step_s = animation.poses(), 1 / animation.fps
+    fall_m = float(np.linalg.norm(animation.gravity_m_s2)) * step_s**2
+    speed_m_s = np.stack([speeds(one, stage.reach_m) for one in motion])
+    speed_m_s[:-1] = np.maximum(speed_m_s[:-1], speed_m_s[1:])
+    found = np.ones(motion.shape, bool)
     for k in range(len(motion)):
-        low, high = stage.boxes(motion[k])
-        meet = ((low[:, None] - NEAR_M <= high[None]) & (high[:, None] + NEAR_M >= low[None])).all(axis=2)
-        found[k] = meet.sum(axis=1) == 1
+        pairs = near_pairs(motion[k], stage.reach_m, speed_m_s[k] * step_s + fall_m + NEAR_M, ~animation.moving, stage)
+        found[k, [one for pair in pairs for one in pair]] = False
     return found
 
 
 def pose_noise_m(animation: Animation, apart: Array) -> float | None:
-    """Standard deviation of a coordinate of the poses, from the third differences of flights, in which a parabola has
-    none; None where nobody flies. apart (t, b): who is near nobody.
+    """Standard deviation of the noisiest coordinate of the poses, from the third differences of flights, in which a
+    parabola has none, or else of what rests; None where nobody does either. What rests shows no rounding. apart (t, b):
+    who is near nobody.
     """
-    flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3] & animation.free & animation.moving
-    if flies.sum() < LEAST_FRAMES:
+    flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
+    who = animation.free & animation.moving
+    calm = flies & who
+    if calm.sum() < LEAST_FRAMES:
+        calm[:, who] = _rests(animation.position_m[:, who])
+    if calm.sum() < LEAST_FRAMES:
         return None
-    third = np.diff(animation.position_m, 3, axis=0)[flies]  # of white noise √20 σ
-    return float(MAD * np.median(np.abs(third)) / np.sqrt(20))
+    third = np.diff(animation.position_m, 3, axis=0)[calm]  # of white noise √20 σ
+    return float(MAD * np.median(np.abs(third), axis=0).max() / np.sqrt(20))
+
+
+def _rests(position_m: Array) -> Array:
+    """(t - 3, b) third differences in `REST_FRAMES` of white noise alone. In every coordinate mean squares of third
+    differences are ten times those of first ones, 20 σ² and 2 σ²; where something moves they are less. Nobody is much
+    quieter at any time: what rattles dies away, noise does not.
+    """
+    found = np.zeros((max(len(position_m) - 3, 0), position_m.shape[1]), bool)
+    if len(position_m) < REST_FRAMES or not position_m.shape[1]:
+        return found
+    first, third = (
+        np.lib.stride_tricks.sliding_window_view(np.diff(position_m, n, axis=0) ** 2, REST_FRAMES - n, axis=0).mean(-1)
+        for n in (1, 3)
+    )
+    loud = third.sum(axis=2)
+    white = (third > WHITE * first).all(axis=2) & (loud < QUIETER**2 * loud.min())
+    for k in range(REST_FRAMES - 3):
+        found[k : k + len(white)] |= white
+    return found
 
 
 def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
@@ -75,14 +117,16 @@ def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
     return SIGMAS * float(np.sqrt(6)) * mass_kg * noise_m * fps
 
 
-def driven_bodies(animation: Animation, apart: Array) -> Array:
+def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = None) -> Array:
     """(b,) who is moved by hand though nobody says so: in most frames in which it touches nothing it does not fall."""
     pull = float(np.linalg.norm(animation.gravity_m_s2))
     found = np.array([one.driven for one in animation.bodies], bool)
     if pull == 0:
         return found
-    wrong = np.linalg.norm(accelerations(animation) - animation.gravity_m_s2, axis=2) > HANDED * pull
-    flies = apart[2:] & apart[1:-1] & apart[:-2]
+    frames = frames_apart(animation, noise_m, HANDED * pull)
+    fall = accelerations(animation, frames) - animation.gravity_m_s2
+    wrong = np.linalg.norm(fall, axis=2) > HANDED * pull
+    flies = np.lib.stride_tricks.sliding_window_view(apart, 2 * frames + 1, axis=0).all(axis=2)
     moving = animation.moving & (np.array([one.mass_kg for one in animation.bodies]) > 0)
     enough = flies.sum(axis=0) >= LEAST_FRAMES
     share = (wrong & flies).sum(axis=0) / np.maximum(flies.sum(axis=0), 1)

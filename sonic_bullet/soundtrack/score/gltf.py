@@ -27,12 +27,14 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
+from sonic_bullet.soundtrack.frame_rates import rate_of_keys
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 from sonic_bullet.soundtrack.score.keyframes import tipped, upright
 
 BYTES_MAX = 1 << 30
-FRAMES_MAX = 2_000_000
-USUAL_FPS = 30.0
+POSES_MAX = 2_000_000
+"""Of all nodes: half a gigabyte while they are read."""
+LATE_S = 1e-3
 _REMEDY = "export it again as glTF 2.0 (.glb)"
 COMPONENT = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -56,13 +58,17 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
                 f"{path} holds no node animation", "bake the simulation to keyframes and export with animations"
             )
         times = [sampler.time_s for own in channels.values() for sampler in own.values()]
-        rate = fps if fps is not None else _rate(times)
+        rate = fps if fps is not None else rate_of_keys(times)
         first, last = min(t[0] for t in times), max(t[-1] for t in times)
         count = int(np.floor((last - first) * rate + 1e-3)) + 1
-        if not 0 < count <= FRAMES_MAX:
-            raise AnimationError(f"{path} has {count} frames", "give another --fps")
+        many = max(len(_needed(file)), 1)
+        if not 0 < count * many <= POSES_MAX:
+            raise AnimationError(
+                f"{path} has {count} frames of {many} nodes, {POSES_MAX} poses are the most",
+                "export a shorter take, or give a lower --fps",
+            )
         at_s = first + np.arange(count) / rate
-        notes: list[str] = []
+        notes = [f"the first key is at {first:.3f} s: the sound begins there"] * bool(first > LATE_S)
         objects = tuple(_objects(file, channels, at_s, scale, notes))
         return Export(rate, objects, np.array([0.0, 0.0, -9.81]), tuple(notes))
 
@@ -195,22 +201,25 @@ def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
     return found
 
 
-def _rate(times: list[Array]) -> float:
-    """Frames a second of baked keys: the median of their distances; `USUAL_FPS` where they are sparse."""
-    gaps = np.concatenate([np.diff(t) for t in times]) if times else np.zeros(0)
-    if len(gaps) < 8:
-        return USUAL_FPS
-    middle = float(np.median(gaps))
-    rate = 1 / middle
-    whole = round(rate) if abs(rate - round(rate)) < 0.02 * 1.001 else rate
-    return float(whole) if rate >= 10 else USUAL_FPS
+def _parents(file: _File) -> dict[int, int]:
+    return {child: i for i, node in enumerate(file.tree.get("nodes", ())) for child in node.get("children", ())}
+
+
+def _needed(file: _File) -> set[int]:
+    """Nodes that have a mesh, and those that they hang on."""
+    parent, found = _parents(file), set[int]()
+    for one, node in enumerate(file.tree.get("nodes", ())):
+        at: int | None = one if "mesh" in node else None
+        while at is not None and at not in found:
+            found.add(at)
+            at = parent.get(at)
+    return found
 
 
 def _objects(
     file: _File, channels: Mapping[int, Mapping[str, _Sampler]], at_s: Array, scale: float, notes: list[str]
 ) -> Iterator[ExportedObject]:
-    nodes = file.tree.get("nodes", [])
-    parent = {child: i for i, node in enumerate(nodes) for child in node.get("children", ())}
+    nodes, parent = file.tree.get("nodes", []), _parents(file)
     known: dict[int, Array] = {}
 
     def world(i: int, depth: int = 0) -> Array:
@@ -239,6 +248,8 @@ def _objects(
             continue
         matrix = world(i)
         stretch, place, turn = _rigid(name, matrix)
+        if not node.get("children"):
+            del known[i], matrix
         yield ExportedObject(
             name,
             upright(place * scale, "y"),

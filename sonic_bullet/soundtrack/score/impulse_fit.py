@@ -19,11 +19,11 @@ from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
-from sonic_bullet.listener.animated import PoseStage
+from sonic_bullet.listener.animated import PoseStage, matrices
 from sonic_bullet.listener.frames import turned
 from sonic_bullet.listener.polling import NO_RAW
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.score.animation import Animation, matrices
+from sonic_bullet.soundtrack.score.animation import Animation
 
 TOUCH_M = 1.5e-3
 """How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""
@@ -81,24 +81,26 @@ def fit_steps(
     motion, step_s = animation.poses(), 1 / animation.fps
     change = momentum_changes(animation, motion, hidden_m_s) - known
     static = ~animation.moving
+    touch_m = TOUCH_M + hidden_m_s / float(np.sqrt(6)) / animation.fps  # what noise hides of a gap, too
     for k in range(len(animation) - 1):
         raw = NO_RAW
         if k:
             after = motion[k + 1]
-            speed = np.maximum(_speeds(motion[k], reach_m), _speeds(after, reach_m))
-            pairs = near_pairs(motion[k], reach_m, speed * step_s + TOUCH_M, static, stage)
+            speed = np.maximum(speeds(motion[k], reach_m), speeds(after, reach_m))
+            pairs = near_pairs(motion[k], reach_m, speed * step_s + touch_m, static, stage)
             if only is not None:
                 pairs = [pair for pair in pairs if pair[0] in only or pair[1] in only]
-            far = float(speed.max(initial=0.0)) * 2 * step_s + TOUCH_M
+            far = float(speed.max(initial=0.0)) * 2 * step_s + touch_m
             raw = stage.closest(motion[k], pairs, far) if pairs else NO_RAW
-            raw = raw[_can_touch(raw, motion[k], after, step_s, stage)]
+            raw = raw[_can_touch(raw, motion[k], after, step_s, stage, touch_m)]
             raw = loaded(animation, motion[k], raw, change[k], stage)
         found.append((motion[k], raw))
         if progress is not None:
             progress((k + 1) / len(animation))
 
 
-def _speeds(motion: Array, reach_m: Array) -> Array:
+def speeds(motion: Array, reach_m: Array) -> Array:
+    """(b,) at most, of any point of each."""
     return np.asarray(
         np.linalg.norm(motion["velocity_m_s"], axis=1) + np.linalg.norm(motion["spin_rad_s"], axis=1) * reach_m
     )
@@ -115,7 +117,7 @@ def near_pairs(
     return [(int(a), int(b)) for a, b in zip(*np.nonzero(np.triu(meet, 1)), strict=True)]
 
 
-def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: PoseStage) -> Array:
+def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: PoseStage, touch_m: float) -> Array:
     """(k,) whether a place closes within the frame before or after: carried on with the speeds that it had, or back
     with those that it has then.
     """
@@ -124,7 +126,7 @@ def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: Po
     a, b = stage.rows(raw["body_a"]), stage.rows(raw["body_b"])
     closing, parting = (_along(raw, m, before, a, b) for m in (before, after))
     travel = step_s * np.maximum(np.maximum(-closing, parting), 0)
-    return np.asarray(raw["gap_m"] - travel <= TOUCH_M)
+    return np.asarray(raw["gap_m"] - travel <= touch_m)
 
 
 def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:

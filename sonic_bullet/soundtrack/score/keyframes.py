@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,6 +20,7 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
+from sonic_bullet.soundtrack.frame_rates import fraction_of
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 
 FORMAT = "sonic-bullet-animation/1"
@@ -105,7 +105,7 @@ def _numbers(arrays: Mapping[str, Array], name: str, bodies: int, width: int) ->
 
 def _rate(said: float | str) -> float:
     try:
-        return float(Fraction(said) if isinstance(said, str) and len(said) < 40 else said)
+        return float(fraction_of(said) if isinstance(said, str) else said)
     except (ValueError, ZeroDivisionError):
         raise AnimationError(f"fps is {shown(said)}", 'give a number, or "30000/1001"') from None
 

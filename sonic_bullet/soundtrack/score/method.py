@@ -35,4 +35,4 @@ def find_steps(
     if animation.fps >= FIT_FROM_FPS:
         fit_steps(animation, stage, found, progress, hidden_m_s=hidden_m_s)
     else:
-        Shooting(animation, stage, substeps_of(animation.fps)).find_steps(found, progress)
+        Shooting(animation, stage, substeps_of(animation.fps), hidden_m_s).find_steps(found, progress)

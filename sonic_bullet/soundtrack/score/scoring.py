@@ -80,14 +80,15 @@ def score_animation(
     notes: tuple[str, ...] = ()
     if not isinstance(animation, Animation):
         animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
-    notes += _check_fall(animation)
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
     say = say or (lambda text: None)
     half = (lambda share: progress(0.7 * share)) if progress is not None else None
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
         apart = alone(animation, stage)
-        driven = driven_bodies(animation, apart)
+        noise_m = pose_noise_m(animation, apart)
+        notes += _check_fall(animation, noise_m)
+        driven = driven_bodies(animation, apart, noise_m)
         if driven.any():
             bodies = tuple(
                 replace(x, driven=x.driven or bool(d)) for x, d in zip(animation.bodies, driven, strict=True)
@@ -95,7 +96,7 @@ def score_animation(
             animation = replace(animation, bodies=bodies)
             stage.bodies = bodies
             stage.held |= driven
-        noise_m = pose_noise_m(animation, apart)
+            noise_m = pose_noise_m(animation, apart)  # a hand's way is no noise
         say("who touches whom")
         steps: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
@@ -128,7 +129,8 @@ def score_animation(
 def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = None, **options: Any) -> RenderResult:
     """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
 
-    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored.
+    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored;
+    interrupted, the exception carries what was scored so far as ``partial``.
     """
     from sonic_bullet.render import render_kept
     from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
@@ -140,9 +142,10 @@ def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = 
             with suppress(MeshError):
                 shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
 
-    half = (lambda share: progress(0.5 * share)) if progress is not None else None
-    rest = (lambda share: progress(0.5 + 0.5 * share)) if progress is not None else None
-    result = render_scene(path, progress=half, at_end=look, **options)
+    def part(begin: float, end: float) -> Callable[[float], None] | None:
+        return (lambda share: progress(begin + (end - begin) * share)) if progress is not None else None
+
+    result = render_scene(path, progress=part(0, 0.5), at_end=look, **options)
     moves = moves_of(result.log)
     if not any(one.drives for one in moves):
         raise AnimationError(f"{path} drives no body by hand", "render it: contacts are simulated")
@@ -151,10 +154,22 @@ def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = 
         for i, body in enumerate(result.log.bodies)
         if (body.body_id, body.link) in shapes
     }
-    log = scored_by_hand(result.log, known, moves)
-    sound = render_kept(log, progress=rest)
-    notes = tuple(note for note in result.notes if note not in silence_notes(result.sound, result.log))
-    return RenderResult(sound, log, result.sr, (*notes, *move_notes(log, moves), *silence_notes(sound, log)))
+    notes = (
+        *(note for note in result.notes if note not in silence_notes(result.sound, result.log)),
+        *move_notes(result.log, moves),
+    )
+    log = result.log
+    try:
+        with interrupts():
+            log = scored_by_hand(result.log, known, moves, part(0.5, 0.8))
+            sound = render_kept(log, progress=part(0.8, 1.0))
+    except (SonicBulletError, KeyboardInterrupt) as error:
+        log = getattr(error, "log", log)
+        if hasattr(error, "kept") or hasattr(error, "log"):
+            kept = error.kept if hasattr(error, "kept") else render_kept(log)
+            error.partial = RenderResult(kept, log, result.sr, notes)  # type: ignore[union-attr]
+        raise
+    return RenderResult(sound, log, result.sr, (*notes, *silence_notes(sound, log)))
 
 
 def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:
@@ -162,9 +177,9 @@ def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:
     return RenderResult(sound, log, listener.sr, (*notes, *listener.notes, *silence_notes(sound, log)))
 
 
-def _check_fall(animation: Animation) -> tuple[str, ...]:
+def _check_fall(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
     """Raise AnimationError where bodies fall as if a metre were something else."""
-    found, expected = fall_m_s2(animation), float(np.linalg.norm(animation.gravity_m_s2))
+    found, expected = fall_m_s2(animation, noise_m), float(np.linalg.norm(animation.gravity_m_s2))
     if found is None or expected == 0:
         return ()
     ratio = found / expected

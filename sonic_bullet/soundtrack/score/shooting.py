@@ -30,6 +30,7 @@ FIRST_SPEED_M_S = 3.0
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.65, 0.8, 0.95)
 NUDGE = 0.01  # m/s, and of restitution
 ROUNDS = 4
+FORCES = ("force_n", "friction_1_n", "friction_2_n")
 ENOUGH = 4.0
 """Cost of a body's shot below which nothing is searched: every pose within 2 σ."""
 
@@ -48,12 +49,18 @@ class _Try:
 
 
 class Shooting:
-    """A search through an animation, frame by frame. substeps: steps of the simulation to a frame."""
+    """A search through an animation, frame by frame. substeps: steps of the simulation to a frame. hidden_m_s: as in
+    `find_steps`; what is not told from noise in a pose, its 5 σ, is hidden_m_s / (√6 fps).
+    """
 
-    def __init__(self, animation: Animation, stage: PoseStage, substeps: int) -> None:
-        self._animation, self._stage, self._substeps = animation, stage, substeps
+    def __init__(self, animation: Animation, stage: PoseStage, substeps: int, hidden_m_s: float = 0.0) -> None:
+        self._animation, self._stage, self._substeps, self._hidden_m_s = animation, stage, substeps, hidden_m_s
         self._step_s = 1 / animation.fps / substeps
+        self._hidden_m = hidden_m_s / float(np.sqrt(6)) / animation.fps
+        self._pose_m = max(POSE_M, self._hidden_m / np.sqrt(ENOUGH))  # so that what is hidden is not searched for
+        self._speed_m_s = max(SPEED_M_S, hidden_m_s / np.sqrt(ENOUGH))
         self._motion = animation.poses()
+        self._start = self._motion[0].copy()
         self._free = np.flatnonzero(animation.free)
         mass = np.array([max(one.mass_kg, 1e-12) for one in animation.bodies])
         inertia = np.array([one.inertia_kg_m2.sum() for one in animation.bodies])
@@ -78,12 +85,24 @@ class Shooting:
                 owed = np.where(np.any(before.touching, axis=1, keepdims=True), 0.0, missing)
             before = shot = self._shot(k, best.speed, best.restitution, polled=True).shot
             last = shot.motion[-1]
+            self._start = self._followed(last, self._motion[k + 1])
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
-            self._trust_m_s = SPEED_M_S
+            self._trust_m_s = self._speed_m_s
             if progress is not None:
                 progress((k + 1) / len(self._motion))
         if before is not None:
             found += self._corrected(before, owed)
+
+    def _followed(self, end: Array, pose: Array) -> Array:
+        """Where the next frame begins: at its pose (b,), or, where noise hides the difference, where this one ended:
+        begun at noisy poses anew, what rests would fall a little in every frame.
+        """
+        if self._hidden_m < POSE_M:
+            return pose
+        away = np.linalg.norm(end["position_m"] - pose["position_m"], axis=1)
+        turned = np.linalg.norm(rotation(pose["quaternion_xyzw"], end["quaternion_xyzw"]), axis=1)
+        within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < self._hidden_m)
+        return np.where(within, end, pose)
 
     def _corrected(self, shot: Shot, missing: Array) -> list[tuple[Array, Array]]:
         """A frame's steps with its impulses scaled: what speed (b, 6) the next frame began with beyond that with which
@@ -96,7 +115,7 @@ class Shooting:
             return list(zip(shot.motion[:-1], shot.raw, strict=True))
         whiten = whitening(self._animation, shot.motion[-1])
         mass = np.array([one.mass_kg for one in self._animation.bodies])
-        trust = 1 / (np.sqrt(np.maximum(mass, 1e-12)) * SPEED_M_S)
+        trust = 1 / (np.sqrt(np.maximum(mass, 1e-12)) * self._speed_m_s)
         matrix = np.zeros((len(mass), 6, len(strikes)))
         for column, rows in enumerate(strikes.values()):
             for number, row in rows:
@@ -117,9 +136,28 @@ class Shooting:
         raws = [raw.copy() for raw in shot.raw]
         for rows, more in zip(strikes.values(), share.tolist(), strict=True):
             for number, row in rows:
-                for name in ("force_n", "friction_1_n", "friction_2_n"):
+                for name in FORCES:
                     raws[number][name][row] *= 1 + more
+            self._without_hidden(raws, rows)
         return list(zip(shot.motion[:-1], raws, strict=True))
+
+    def _without_hidden(self, raws: list[Array], rows: list[tuple[int, int]]) -> None:
+        """A strike that changes the lighter one's speed by less than noise in the poses does is none: what carries
+        weight all the frame does so evenly, what touches for a moment does not.
+        """
+        number, row = rows[0]
+        who = self._stage.rows(np.array([raws[number][name][row] for name in ("body_a", "body_b")]))
+        mass = min(self._animation.bodies[i].mass_kg for i in who if self._animation.free[i])
+        load: dict[int, float] = {}
+        for number, row in rows:
+            load[number] = load.get(number, 0.0) + float(raws[number]["force_n"][row])
+        weight = mass * float(np.linalg.norm(self._animation.gravity_m_s2))
+        first, *later = load.values()
+        if (first + sum(max(one - weight, 0) for one in later)) * self._step_s < mass * self._hidden_m_s:
+            mean = sum(load.values()) / len(load) if len(load) == self._substeps else 0.0
+            for number, row in rows:
+                for name in FORCES:
+                    raws[number][name][row] *= mean / load[number]
 
     def _strikes(self, shot: Shot) -> dict[tuple[int, int, int], list[tuple[int, int]]]:
         """(step, row) of the loaded places of a pair in steps without a pause, by pair and first step."""
@@ -135,7 +173,7 @@ class Shooting:
         return found
 
     def _shot(self, k: int, speed: Array, restitution: Array, *, polled: bool = False) -> _Try:
-        start = self._motion[k].copy()
+        start = self._start.copy()
         free = self._free
         start["velocity_m_s"][free], start["spin_rad_s"][free] = speed[free, :3], speed[free, 3:]
         goal = self._motion[k + 1]
@@ -144,8 +182,8 @@ class Shooting:
         away = speed - self._prior
         residual = np.concatenate(
             [
-                (end["position_m"] - goal["position_m"]) / POSE_M,
-                rho * rotation(goal["quaternion_xyzw"], end["quaternion_xyzw"]) / POSE_M,
+                (end["position_m"] - goal["position_m"]) / self._pose_m,
+                rho * rotation(goal["quaternion_xyzw"], end["quaternion_xyzw"]) / self._pose_m,
                 away[:, :3] / self._trust_m_s,
                 rho * away[:, 3:] / self._trust_m_s,
             ],
@@ -190,7 +228,7 @@ class Shooting:
             if not wrong.any():
                 break
             speed = best.speed.copy()
-            miss = best.residual[:, :6] * POSE_M
+            miss = best.residual[:, :6] * self._pose_m
             miss[:, 3:] /= np.maximum(self._gyration_m, 1e-12)[:, None]
             speed[wrong] -= miss[wrong] * self._animation.fps
             best = self._shot(k, speed, best.restitution)

@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from sonic_bullet.records.errors import AnimationError, SonicBulletError
+from sonic_bullet.soundtrack.frame_rates import nearest_rate, rate_of_keys
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
-from sonic_bullet.soundtrack.score.flight import fall_m_s2, hidden_n_s, pose_noise_m
+from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
 from sonic_bullet.soundtrack.score.gltf import _Sampler
 from sonic_bullet.soundtrack.score.keyframes import read_rules, write_keyframes
 from sonic_bullet.soundtrack.score.scoring import read_animation
-from tests.made.animations import EDGES_M, ball_animation, box_mesh, dropped, keyframes, write_glb, write_tree
+from tests.made.animations import (
+    EDGES_M,
+    RADIUS_M,
+    ball_animation,
+    bounce_m,
+    box_mesh,
+    dropped,
+    keyframes,
+    write_glb,
+    write_tree,
+)
 
 
 def test_three_files_of_one_scene_are_one_animation(tmp_path: Path) -> None:
@@ -113,6 +126,44 @@ def test_a_fall_tells_gravity_and_the_noise_of_its_poses() -> None:
     assert hidden_n_s(0.1, noise_m, 240) == pytest.approx(5 * np.sqrt(6) * 0.1 * noise_m * 240)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_what_rests_tells_noise_and_what_rattles_tells_none(seed: int) -> None:
+    """Nobody flies; a rattle of the same size dies away, and somebody who is quieter than that knows better."""
+    rng, noise_m = np.random.default_rng(seed), 3e-4
+    still = ball_animation(RADIUS_M + 1e-3 * np.arange(40), 24.0)
+    jitter, nowhere = noise_m * rng.standard_normal((40, 3)), np.zeros((40, 2), bool)
+
+    def told(away_m: np.ndarray) -> float | None:
+        place = still.position_m.copy()
+        place[:, 1] = np.array([0, 0, RADIUS_M]) + away_m
+        return pose_noise_m(replace(still, position_m=place), nowhere)
+
+    assert told(jitter) == pytest.approx(noise_m, rel=0.6)
+    rattle = told(jitter * np.exp(-np.arange(40) / 6)[:, None])
+    assert rattle is None or rattle < 0.1 * noise_m
+
+
+@pytest.mark.parametrize(("rounded_m", "fps"), [(1e-4, 240.0), (1e-4, 60.0), (1e-3, 240.0), (0.0, 240.0)])
+def test_who_falls_is_free_however_its_poses_are_rounded(rounded_m: float, fps: float) -> None:
+    """Rounded to 0.1 mm, accelerations from frame to frame are off by half of gravity at 240; over a flight they are
+    not. A hand that carries something about is still a hand.
+    """
+    time_s = np.arange(int(0.45 * fps)) / fps
+
+    def seen(height_m: np.ndarray) -> tuple[bool, float | None]:
+        if rounded_m:
+            height_m = np.round(height_m / rounded_m) * rounded_m
+        made = ball_animation(height_m, fps)
+        apart = np.broadcast_to(height_m[:, None] > RADIUS_M + 5e-3, (len(height_m), 2))
+        noise_m = pose_noise_m(made, apart)
+        return bool(driven_bodies(made, apart, noise_m)[1]), fall_m_s2(made, noise_m)
+
+    driven, fall = seen(bounce_m(time_s, 0.3, 0.7))
+    assert not driven
+    assert fall == pytest.approx(9.81, rel=0.1)
+    assert seen(1 + 0.1 * np.sin(6 * time_s))[0]
+
+
 def test_an_animation_needs_motion() -> None:
     with pytest.raises(AnimationError, match="nothing moves"):
         ball_animation(np.full(9, 0.02), 24.0)
@@ -129,6 +180,7 @@ def test_an_animation_needs_motion() -> None:
         ("a.json", b"{}", "a.json"),
         ("a.json", b'{"format": "sonic-bullet-animation/1", "fps": "1/0", "bodies": []}', "fps"),
         ("a.json", b'{"format": "sonic-bullet-animation/1", "fps": 24, "bodies": [], "x": 1}', "x"),
+        ("a.json", b'{"format": "sonic-bullet-animation/1", "fps": "1e99999999", "bodies": []}', "fps"),
         ("a.npz", b"PK", "a.npz"),
         ("a.abc", b"", ".glb"),
     ],
@@ -181,3 +233,49 @@ def test_any_bytes_of_a_glb_may_be_wrong(tmp_path: Path) -> None:
         except SonicBulletError:
             refused += 1
     assert refused > 30
+
+
+def changed(path: Path, change: Callable[[dict[str, Any], bytearray], None]) -> None:
+    """A GLB, its tree and bytes changed in place."""
+    raw = path.read_bytes()
+    size = int.from_bytes(raw[12:16], "little")
+    tree, data = json.loads(raw[20 : 20 + size]), bytearray(raw[28 + size :])
+    change(tree, data)
+    write_tree(path, tree, bytes(data))
+
+
+def times(tree: dict[str, Any], data: bytearray) -> np.ndarray:
+    """The times of the keys of `write_glb`, to be written to."""
+    view = tree["bufferViews"][0]
+    return np.frombuffer(data, "<f4", view["byteLength"] // 4, view["byteOffset"])
+
+
+def test_a_late_first_key_is_said(tmp_path: Path) -> None:
+    """The sound begins with the first key, where a player holds it from 0 on."""
+    write_glb(tmp_path / "a.glb", dropped(60))
+    assert not read_animation(tmp_path / "a.glb").notes
+    changed(tmp_path / "a.glb", lambda tree, data: np.add(t := times(tree, data), 2, out=t))
+    late = read_animation(tmp_path / "a.glb")
+    assert len(late.objects[0].position_m) == len(dropped(60).position_m["box"])
+    assert any("first key is at 2.000 s" in note for note in late.notes)
+
+
+@pytest.mark.parametrize(
+    ("rate", "seconds"),
+    [(240.0, 90), (24000 / 1001, 600), (30000 / 1001, 30), (60000 / 1001, 2), (25.0, 3600), (12.5, 60), (59.9, 60)],
+)
+def test_the_rate_of_baked_keys_is_that_of_all_of_them(rate: float, seconds: float) -> None:
+    """Distances of float32 times are off by ten millionths of their time: 8 µs of 4 ms after 90 s."""
+    key = (np.arange(round(seconds * rate)) / rate).astype(np.float32).astype(float)
+    found = rate_of_keys([key[:5], key])
+    assert abs(found / rate - 1) * seconds * rate < 0.05  # of a frame, at the end
+    assert found == rate or not rate.is_integer()
+    assert nearest_rate(29.96) == 29.96
+
+
+def test_a_small_file_does_not_take_all_memory(tmp_path: Path) -> None:
+    """One key that is late is thousands of frames; what they are is said, and not tried."""
+    write_glb(tmp_path / "a.glb", dropped(240))
+    changed(tmp_path / "a.glb", lambda tree, data: times(tree, data).__setitem__(-1, 8000.0))
+    with pytest.raises(AnimationError, match=r"frames of 2 nodes.*--fps"):
+        read_animation(tmp_path / "a.glb")

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import assembled
 from sonic_bullet.soundtrack.score.scoring import score_animation
-from tests.made.animations import ball_animation, bounce_m, dropped, export_of
+from sonic_bullet.soundtrack.sound_events import IMPACT, EventWitness
+from sonic_bullet.soundtrack.stems import render_stems
+from tests.made.animations import MASS_KG, ball_animation, bounce_m, dropped, export_of
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +58,28 @@ def test_what_noise_hides_is_said() -> None:
     place[:, 1] += 2e-5 * rng.standard_normal((200, 3))
     notes = score_animation(replace(still, position_m=place), sr=8000).notes
     assert any("poses are good to 2" in note or "poses are good to 1" in note for note in notes)
+
+
+def impacts(log: ContactLog) -> list[tuple[float, float]]:
+    """Time and impulse of each that is played."""
+    witness = EventWitness(log)
+    return [(x.start_s, x.impulse_n_s) for x in witness.events(render_stems(log, witness=witness), log.sr)
+            if x.kind == IMPACT and not x.reason]  # fmt: skip
+
+
+@pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_noise_is_not_played(fps: float, seed: int) -> None:
+    """A ball that falls and stays where it fell, poses good to 0.3 mm: it strikes once, and rests without a rattle."""
+    time_s = np.arange(int(1.1 * fps)) / fps
+    fall_s, mass = np.sqrt(2 * 0.8 / 9.81), MASS_KG
+    still = ball_animation(np.where(time_s < fall_s, bounce_m(time_s, 0.8, 0.0), 0.02), fps)
+    place = still.position_m.copy()
+    place[:, 1] += 3e-4 * np.random.default_rng(seed).standard_normal((len(place), 3))
+    found = score_animation(replace(still, position_m=place, materials={"ball": "plastic"}), sr=8000)
+    heard = impacts(found.log)
+    hidden = mass * 5 * np.sqrt(6) * 3e-4 * fps
+    assert heard[0][0] == pytest.approx(fall_s, abs=2 / min(fps, 240))
+    assert heard[0][1] == pytest.approx(mass * 9.81 * fall_s, abs=hidden + 0.2 * mass * 9.81 * fall_s)
+    assert not [one for one in heard[1:] if one[0] > fall_s + 0.1 or one[1] < hidden / 2]
+    assert any("not played" in note for note in found.notes)

@@ -14,21 +14,24 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.animated import AnimatedBody, Shot, rotation
+from sonic_bullet.listener.animated import AnimatedBody, Shot, matrices, rotation
 from sonic_bullet.listener.frames import MOTION, Motion, turned
 from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.questions import Settings, contact_points
-from sonic_bullet.listener.pybullet.urdf_meshes import hull
+from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.records.errors import AnimationError, MeshError, SceneError
+from sonic_bullet.records.errors import AnimationError, SceneError
 
 TILT_M = 2e-3
 """By how much the ends of a body are tilted to find the corners of a face that lies on another: Bullet's own perturbed
 queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m)."""
-ROLLING = 1e-4
+
+
+SAME_FACE = 0.9
+"""Cosine of the angle between normals up to which places are of one face: tilts of small bodies are a quarter of it."""
 
 
 class AnimatedStage:
@@ -65,7 +68,12 @@ class AnimatedStage:
 
     def _made(self, body: AnimatedBody) -> int:
         ask, cid = pybullet, self.client_id
-        shape = _compound([options for shape in body.shapes for options in _collision(shape, body.name)], cid)
+        made_of = [options for shape in body.shapes for options in _collision(shape, body)]
+        if len(made_of) > 1 and any("indices" in options for options in made_of):
+            raise AnimationError(
+                f"body '{body.name}': one of its meshes has too many faces", "make it a body of its own"
+            )
+        shape = _compound(made_of, cid)
         if shape < 0:
             raise AnimationError(f"body '{body.name}': PyBullet makes no collision shape of it", "simplify its mesh")
         made = int(ask.createMultiBody(body.mass_kg, shape, physicsClientId=cid))
@@ -78,8 +86,7 @@ class AnimatedStage:
 
     def boxes(self, motion: Array) -> tuple[Array, Array]:
         """See PoseStage."""
-        frame = np.array([pybullet.getMatrixFromQuaternion(q) for q in motion["quaternion_xyzw"].tolist()])
-        frame = frame.reshape(-1, 3, 3)
+        frame = matrices(motion["quaternion_xyzw"])
         middle = motion["position_m"] + np.einsum("bij,bj->bi", frame, self.middle_m)
         half = np.einsum("bij,bj->bi", np.abs(frame), self.half_m)
         return middle - half, middle + half
@@ -131,24 +138,34 @@ class AnimatedStage:
             return rows
         # the corners: from poses tilted to four sides, carried back; the smaller one is tilted
         low = a if self.extent_m[a] <= self.extent_m[b] else b
-        normal = np.array(points[0][7])
-        side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-        side /= np.linalg.norm(side)
+        normals: list[Array] = []
+        for one in points:
+            if all(np.array(one[7]) @ normal < SAME_FACE for normal in normals):
+                normals.append(np.array(one[7]))
         place, turn = motion[low]["position_m"], motion[low]["quaternion_xyzw"]
         angle = TILT_M / self.extent_m[low]
-        for axis in (side, -side, np.cross(normal, side), -np.cross(normal, side)):
-            tilted = turned(turn[None], angle * axis[None])[0]
-            pybullet.resetBasePositionAndOrientation(
-                self.ids[low], place.tolist(), tilted.tolist(), physicsClientId=self.client_id
-            )
-            for one in self._nearest(a, b, reach_m + TILT_M):
-                at = [np.array(one[5]), np.array(one[6])]
-                mine = 0 if low == a else 1
-                at[mine] = place + turned_back(at[mine] - place, angle * axis)
-                gap = float((at[0] - at[1]) @ normal)
-                row = _raw(self.ids[a], self.ids[b], at[0], at[1], normal, gap)
-                if gap < reach_m and all(np.abs(row["point_a_m"] - r["point_a_m"]).max() > 1e-3 for r in rows):
-                    rows.append(row)
+        for normal in normals:
+            if sum(np.array(one[7]) @ normal > SAME_FACE for one in points) > 2:  # its corners are there
+                continue
+            side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+            side /= np.linalg.norm(side)
+            for axis in (side, -side, np.cross(normal, side), -np.cross(normal, side)):
+                tilted = turned(turn[None], angle * axis[None])[0]
+                back = matrices(turned(np.array([[0.0, 0, 0, 1]]), -angle * axis[None])[0])
+                pybullet.resetBasePositionAndOrientation(
+                    self.ids[low], place.tolist(), tilted.tolist(), physicsClientId=self.client_id
+                )
+                for one in self._nearest(a, b, reach_m + TILT_M):
+                    if np.array(one[7]) @ normal < SAME_FACE:
+                        continue
+                    at = [np.array(one[5]), np.array(one[6])]
+                    mine = 0 if low == a else 1
+                    at[mine] = place + back @ (at[mine] - place)
+                    gap = float((at[0] - at[1]) @ normal)
+                    row = _raw(self.ids[a], self.ids[b], at[0], at[1], normal, gap)
+                    known = (r for r in rows if r["normal"][0] @ normal > SAME_FACE)
+                    if gap < reach_m and all(np.abs(row["point_a_m"] - r["point_a_m"]).max() > 1e-3 for r in known):
+                        rows.append(row)
         pybullet.resetBasePositionAndOrientation(
             self.ids[low], place.tolist(), turn.tolist(), physicsClientId=self.client_id
         )
@@ -222,8 +239,8 @@ def _wavefront(vertex: Array) -> str:
     return "\n".join([*corners, *(f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertex) - 1))]) + "\n"
 
 
-def _collision(shape: Shape, name: str) -> Iterator[dict[str, Any]]:
-    """What createCollisionShapeArray wants of a shape; of a mesh the convex hull of each of its connected parts."""
+def _collision(shape: Shape, body: AnimatedBody) -> Iterator[dict[str, Any]]:
+    """What createCollisionShapeArray wants of a shape; of a mesh its convex pieces."""
     placed = {
         "collisionFramePosition": shape.position_m.tolist(),
         "collisionFrameOrientation": shape.quaternion_xyzw.tolist(),
@@ -239,27 +256,12 @@ def _collision(shape: Shape, name: str) -> Iterator[dict[str, Any]]:
     elif shape.kind == "plane":
         yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
     else:
-        for vertex in _parts(shape):
-            try:
-                corner = hull(vertex)[0]
-            except MeshError as error:
-                raise AnimationError(f"body '{name}': its mesh is flat", "give it thickness") from error
+        found = pieces(shape, body.name, body.mass_kg > 0)
+        for corner in found:
             yield {"shapeType": pybullet.GEOM_MESH, "vertices": corner.tolist(), **placed}
-
-
-def _parts(shape: Shape) -> list[Array]:
-    """Vertices (v, 3) of each connected part of a mesh."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    from sonic_bullet.geometry import welded
-
-    vertex, face = welded(shape.vertex_m, shape.face)
-    edge = np.concatenate([face[:, [0, 1]], face[:, [1, 2]]])
-    graph = coo_array((np.ones(len(edge)), (edge[:, 0], edge[:, 1])), shape=(len(vertex), len(vertex)))
-    count, label = connected_components(graph, directed=False)
-    parts = [vertex[label == i] for i in range(count) if (label == i).sum() >= 4]
-    return parts if 0 < len(parts) <= 64 else [vertex]
+        if not found:
+            bare = {"vertices": shape.vertex_m.tolist(), "indices": shape.face.ravel().tolist()}
+            yield {"shapeType": pybullet.GEOM_MESH, **bare, **placed}
 
 
 def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) -> Array:
@@ -267,15 +269,6 @@ def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) ->
     row["body_a"], row["body_b"], row["link_a"], row["link_b"] = a, b, -1, -1
     row["point_a_m"], row["point_b_m"], row["normal"], row["gap_m"] = point_a, point_b, normal, gap
     return row
-
-
-def turned_back(vector: Array, rotation_rad: Array) -> Array:
-    """A vector (3,) turned by the opposite of a small rotation vector [Rodrigues' formula]."""
-    angle = float(np.linalg.norm(rotation_rad))
-    axis = -rotation_rad / max(angle, 1e-300)
-    return np.asarray(
-        vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1 - np.cos(angle))
-    )
 
 
 def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:

@@ -1,0 +1,49 @@
+"""Frame rates that texts and times mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from sonic_bullet.records import Array
+
+LONGEST = 20
+USUAL_FPS = 30.0
+UNEVEN = 4e-4
+"""By which share the median distance of keys may be off: less than half of what is between n and n·1000/1001."""
+EXACT = 1e-5
+"""By which share a rate that was measured over all of an animation may be off."""
+
+
+def fraction_of(text: str) -> Fraction:
+    """24, 29.97, 30000/1001. Raises ValueError, ZeroDivisionError; powers of ten are none, as ten digits of one would
+    take all memory.
+    """
+    if len(text) > LONGEST or "e" in text.lower():
+        raise ValueError(text)
+    return Fraction(text)
+
+
+def nearest_rate(rate: float, within: float = EXACT) -> float:
+    """The whole number n, or n·1000/1001 [SMPTE ST 12-1, sec. 4], that a measured rate is by a share of it, else the
+    rate.
+    """
+    usual = [whole * share for share in (1.0, 1000 / 1001) for whole in (round(rate / share),)]
+    return min((one for one in usual if abs(rate / one - 1) < within), key=lambda one: abs(rate - one), default=rate)
+
+
+def rate_of_keys(times: Sequence[Array]) -> float:
+    """Frames a second of baked keys: of the sampler that has most, over all of it, where they are even but for float32;
+    else the median of all distances. `USUAL_FPS` where they are sparse.
+    """
+    gaps = np.concatenate([np.diff(t) for t in times])
+    if len(gaps) < 8:
+        return USUAL_FPS
+    longest = max(times, key=len)
+    rate, within = 1 / float(np.median(gaps)), UNEVEN
+    own = np.diff(longest)
+    if len(own) >= 8 and np.abs(own - own.mean()).max() <= 2 * np.spacing(np.float32(longest[-1])):
+        rate, within = 1 / float(own.mean()), EXACT
+    return nearest_rate(rate, within) if rate >= 10 else USUAL_FPS
