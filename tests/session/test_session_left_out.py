@@ -112,7 +112,7 @@ def test_what_falls_on_cloth_overflows_nowhere(client: Any) -> None:
         sounding_box(client, listener, (0, 0, 0.6))
         box(client, (0.3, 0, 0.6))
         touched = 0
-        for _ in range(240):
+        for _ in range(130):
             client.stepSimulation()
             touched += any(cloth in raw[1:3] for raw in client.getContactPoints())
         sound = listener.sound()
