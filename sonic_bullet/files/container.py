@@ -146,7 +146,6 @@ def read_container(
             raise FileError(f"cannot read {path}: it is not a regular file", f"name a {what}")
         size = status.st_size
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
-            stays = os.fdopen(os.dup(file.fileno()), "rb", buffering=0)  # for as long as rows of it are
             if sum(info.file_size for info in archive.infolist()) > (1 if packed is None else UNPACKED) * size:
                 raise LogError(f"{path} claims more bytes than it has", REMEDY)
             arrays: dict[str, Array] = {}
@@ -155,7 +154,7 @@ def read_container(
                 if name in arrays:
                     raise LogError(f"entry '{info.filename}' is there twice", REMEDY)
                 where = f"entry '{info.filename}'"
-                rows = _rows(archive, info, file, stays, size, where) if name in lazy else None
+                rows = _rows(archive, info, file, size, where) if name in lazy else None
                 arrays[name] = _array(_unpacked(file, info, start), where, UNPACKED * size) if rows is None else rows
         if HEADER not in arrays:
             raise LogError(f"{path} is no {what}: it has no header", REMEDY)
@@ -260,12 +259,8 @@ def _entry_name(info: zipfile.ZipInfo) -> str:
     return info.filename[:-4]
 
 
-def _rows(
-    archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, stays: BinaryIO, file_bytes: int, where: str
-) -> Any:
-    """A large entry as `RowsOfEntry` of the file that ``stays`` open, its checksum and flags compared by blocks; None
-    where it is to be loaded.
-    """
+def _rows(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, file_bytes: int, where: str) -> Any:
+    """A large entry as `RowsOfEntry`, its checksum and flags compared by blocks; None where it is to be loaded."""
     if info.file_size <= LOADED_BYTES:
         return None
     with archive.open(info) as entry:
@@ -280,6 +275,7 @@ def _rows(
     file.seek(info.header_offset + LOCAL.size - 4)
     name_bytes, extra_bytes = struct.unpack("<2H", file.read(4))
     start = info.header_offset + LOCAL.size + name_bytes + extra_bytes + at
+    stays = os.fdopen(os.dup(file.fileno()), "rb", buffering=0)  # for as long as the rows are
     return RowsOfEntry(stays, start, dtype, shape, f"{file.name}, {where}")
 
 
