@@ -116,6 +116,7 @@ def test_a_body_that_comes_again_is_refused(heard: tuple[ContactLog, np.ndarray,
 
 def test_nothing_holds_a_model_whose_bodies_are_gone(client: Any) -> None:
     """What was computed of it goes with it: tables, resonators, and what functions remember."""
+    gc.collect()  # what other tests left
     before = len(_played)
     listener = churn(client, 200, every=4, new_models=True, keep_log=False, keep_sound=False)
     faces = len(listener.world.bodies[-1].model.face)  # type: ignore[union-attr]

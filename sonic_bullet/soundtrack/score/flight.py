@@ -38,7 +38,7 @@ def frames_apart(animation: Animation, noise_m: float | None, within_m_s2: float
     """How many frames apart poses tell an acceleration from noise: 5 √6 √3 σ (fps/n)², of all three coordinates, is no
     more than this.
     """
-    noise_m_s2 = SIGMAS * float(np.sqrt(18)) * (noise_m or 0.0) * animation.fps**2
+    noise_m_s2 = 0.0 if noise_m is None else SIGMAS * float(np.sqrt(18)) * noise_m * animation.fps**2
     frames = int(np.ceil(np.sqrt(noise_m_s2 / max(within_m_s2, 1e-12))))
     return min(max(frames, 1), (len(animation) - 1) // 2)
 
