@@ -64,8 +64,8 @@ STAND = np.dtype(
 )
 """How a body stands."""
 
-SHARE = 0.07
-"""Of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes 37 % more, and live
+SHARE = 0.06
+"""Of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes a third more, and live
 sound is never late for it. Who waits longest is served first, what moves before what does not.
 """
 SAVED_S = 0.03
