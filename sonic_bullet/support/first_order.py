@@ -26,7 +26,10 @@ from sonic_bullet.support.moving import Moving
 
 
 def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
-    """See `in_place`; `turn` is the identity: modes are told by the motion that most resembles theirs when free."""
+    """See `in_place`; `turn` is the identity: a mode takes the pole of the motion that most resembles its own when
+    free. What passes and what lifts is that of its own motion, Q of all: two of one frequency stay who they are,
+    whichever way the touches turn them.
+    """
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
         return in_place(body, partners, touches)
@@ -40,7 +43,6 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
     chosen = likest(vector[:m] ** 2)
-    vector[:, chosen] *= np.where(vector[np.arange(m), chosen] < 0, -1, 1)  # the mode's, so that what passes has one
     q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
     every = spring[:, None] * (both @ vector)
     force = every[:, chosen]
@@ -65,9 +67,10 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     new = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), new)
     force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
     lifts = np.zeros((3 * len(touches), m))
-    lifts[row] = np.abs(force)
+    lifts[row] = np.abs(times_real(force, q[:m].T))
     passed = np.where(held, 0, moved * part / (1 + shift * part * yielding))
     passed /= 1 + size_squared(passed).sum(axis=0)
+    passed = times_real(passed, q[:m].T)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
     decay = np.maximum(-new.real, 0.0)
     power = np.stack([own, -contact.imag, -partner.imag], axis=1)
@@ -95,6 +98,11 @@ def _held_against(spring: Array, every: Array, value: Array, chosen: Array, give
     bound = apart**2 + size_squared(product)
     others = (product**2 * (apart / np.where(bound > 0, bound, 1))).sum(axis=0)
     return np.asarray(spring @ gives**2 - others)
+
+
+def times_real(z: Array, matrix: Array) -> Array:
+    """A complex matrix times a real one."""
+    return times(matrix.T, z.T).T
 
 
 def times(matrix: Array, z: Array) -> Array:
