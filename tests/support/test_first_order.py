@@ -137,3 +137,19 @@ def test_what_lies_under_a_contact_and_has_neither_modes_nor_mass(plate: float, 
     assert -newton.decay_per_s[0] + 1j * newton.omega_rad_s[0] == pytest.approx(exact, rel=1e-9)
     assert runs.decay_per_s[0] == pytest.approx(-exact.real, rel=0.01)
     assert -exact.real > 3.1
+
+
+def test_what_twins_pass_on_does_not_hang_on_the_choice_of_their_basis() -> None:
+    """Two modes of one frequency and a third: told in a basis turned by an angle, the same turned by that angle."""
+    rng = np.random.default_rng(8)
+    one = Moving(np.array([3e3, 3e3, 9e3]), np.array([2.0, 2.0, 5.0]))
+    on, spring = body(rng, 12, 0.0, 200.0), ContactSpring(2e3 * (1 + 0.02j), 1e3 + 0j)
+    places = [(place(rng, one), place(rng, on)) for _ in range(3)]
+    angle = 0.7
+    turn = np.eye(3)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    told, turned = (
+        first_order(one, [on], [Touch(0, Place(a.shape @ by, a.arm_m, a.axes), b, spring) for a, b in places])
+        for by in (np.eye(3), turn)
+    )
+    assert np.abs(turned.passes[0] - told.passes[0] @ turn).max() < 0.02 * np.abs(told.passes[0]).max()
