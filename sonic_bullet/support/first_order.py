@@ -27,8 +27,8 @@ from sonic_bullet.support.moving import Moving
 
 def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
     """See `in_place`; `turn` is the identity: a mode takes the pole of the motion that most resembles its own when
-    free. What passes and what lifts is that of its own motion, Q of all: two of one frequency stay who they are,
-    whichever way the touches turn them.
+    free. What passes, at most ½ of each such motion, and what lifts is that of a mode's own motion, Q of all: two of
+    one frequency stay who they are, whichever way the touches turn them.
     """
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):

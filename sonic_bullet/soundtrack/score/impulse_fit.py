@@ -29,7 +29,6 @@ TOUCH_M = 1.5e-3
 """How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""
 EVEN = 1e-4
 """Ridge, of the largest singular value: what places of one face share is shared evenly."""
-STIFF = 1e9
 
 
 def momentum_changes(animation: Animation, motion: Array, hidden_m_s: float = 0.0) -> Array:

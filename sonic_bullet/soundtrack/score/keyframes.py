@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -183,15 +183,3 @@ def read_rules(path: str | os.PathLike[str]) -> tuple[Rule, ...]:
         if Path(path).stat().st_size > 1 << 20:
             raise AnimationError(f"{path} is larger than a megabyte", remedy)
         return tuple(one.rule() for one in msgspec.json.decode(Path(path).read_bytes(), type=list[_Said]))
-
-
-def write_keyframes(path: str | os.PathLike[str], header: dict[str, Any], position: Array, turn: Array) -> None:
-    """Write an .npz of keyframes: header without poses, position (t, b, 3), quaternion_xyzw (t, b, 4).
-
-    Raises FileError.
-    """
-    from sonic_bullet.files import replacing
-
-    text = np.frombuffer(msgspec.json.encode({"format": FORMAT, **header}), np.uint8)
-    with replacing(path) as file:
-        np.savez(file, header=text, position=position, quaternion_xyzw=turn)
