@@ -145,7 +145,7 @@ class AudioWriter:
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
         self.scale_pa = 1 / self.gain_per_pa if scale else None
         if self.format in ("WAV", "RF64") and self.scale_pa is not None:
-            chunks = (chunks or wave_chunks([], description=scale_text(self.scale_pa))) + ixml_chunk(self.scale_pa)
+            chunks = ixml_chunk(self.scale_pa) + (chunks or wave_chunks([], description=scale_text(self.scale_pa)))
         self.frame_bytes, self.chunks = channels * SAMPLE_BYTES.get(self.subtype, 0), chunks
         if self.format == "WAV" and expected_frames * self.frame_bytes + len(chunks) > CHUNK_LIMIT_BYTES:
             self.format = "RF64"

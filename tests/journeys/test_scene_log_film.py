@@ -1,4 +1,4 @@
-"""From a scene to its log, and from the log to another microphone, another level, stems and a film: one gain for all."""
+"""From a scene to its log, and from the log to another microphone, another level, stems, a film: one gain for all."""
 
 from __future__ import annotations
 
