@@ -38,6 +38,7 @@ help:
 demo: .venv/run.stamp
 	@mkdir -p out
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
+	@echo "made out/$(NAME).wav (sound), out/$(NAME).npz (contact log), out/$(NAME).png (picture)"
 
 test: check
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"

@@ -36,7 +36,7 @@ from sonic_bullet.listener import (
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import render_kept, silence_notes
+from sonic_bullet.render import as_tail_db, render_kept, silence_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
 from sonic_bullet.session.scene_file import defines_build, scene_module, user_code, uses_sonic_bullet
@@ -78,6 +78,7 @@ def render_scene(
     progress: Progress | None = None,
     say: Say | None = None,
     at_end: Callable[[Listener], object] | None = None,
+    tail_db: float | None = None,
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
@@ -85,8 +86,9 @@ def render_scene(
     bodies of a plain script. residual: whether what materials sound beside their modes is sounded. supports: whether
     what a body stands on takes of its modes, as `attach` has it. progress is given the share done, say what is being
     computed before the first step (modes: seconds a body). at_end: is shown the listener while its world is
-    still there. Raises SonicBulletError; where the scene broke or was interrupted under way, the exception carries what
-    was rendered so far as ``partial``.
+    still there. tail_db: what rings is followed after the last step until it is that far below the peak, -60 say, at
+    most 10 s; None, 0: not. Raises SonicBulletError; where the scene broke or was interrupted under way, the exception
+    carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -98,6 +100,7 @@ def render_scene(
     }
     seconds = None if seconds is None else as_seconds(seconds, "seconds")
     as_call(progress, "progress"), as_call(say, "say"), as_call(at_end, "at_end")
+    tail_db = as_tail_db(tail_db)
     with _stage(path, **asked) as stage:
         try:
             with interrupts():
@@ -108,7 +111,7 @@ def render_scene(
             with suppress(SonicBulletError):  # a script's own listener may keep nothing
                 error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
-        return stage.result(notes)
+        return stage.result(notes, tail_db)
 
 
 def run_scene(
@@ -237,7 +240,7 @@ class _Stage:
             raise SceneError(f"scene '{self.path.name}' made no physics step", "call stepSimulation in it")
         return self.listener
 
-    def result(self, notes: tuple[str, ...]) -> RenderResult:
+    def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()
         notes = (*notes, *listener.notes)
         log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
@@ -248,10 +251,10 @@ class _Stage:
             and listener.supports == log.supports
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
-            sound = listener.kept_sound()
+            sound = listener.kept_sound(tail_db=tail_db)
             return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
-        sound = render_kept(log)
+        sound = render_kept(log, tail_db=tail_db)
         lifted = listener.lifted if log.supports else {}
         return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), lifted)
 

@@ -65,7 +65,7 @@ def _predicted(found: Any, folder: str) -> int:
             ) from error
     for stem, sr, before, after in made:
         for side, sample in (("before", before), ("after", after)):
-            write_audio(Path(folder) / side / f"{stem}.wav", sample, sr)
+            write_audio(Path(folder) / side / f"{stem}.wav", sample, sr, full_scale_pa=None)
     return len(made)
 
 

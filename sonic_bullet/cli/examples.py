@@ -3,7 +3,7 @@
 RENDER_EPILOG = """\b
 Examples:
   sonic-bullet render scenes/tabletop.py -o tabletop.wav --picture tabletop.png
-  sonic-bullet render my_sim.py -o out.flac --material wood --peak-dbfs -1
+  sonic-bullet render my_sim.py -o out.flac --material wood
   sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
   sonic-bullet render scenes/drop.py -o out.wav --contacts small.npz --models reference
   sonic-bullet render drop.npz -o again.wav      (the same bits, without PyBullet)

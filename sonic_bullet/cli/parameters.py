@@ -47,16 +47,6 @@ channel_option = click.option(
 )
 
 
-def level_options(command: Any) -> Any:
-    """The options that say how loud a file is."""
-    peak = click.option(
-        "--peak-dbfs", type=float, metavar="DB", help="Scale so that the peak is DB below full scale (say -1)."
-    )
-    return peak(
-        click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23).")(command)
-    )
-
-
 def scene_options(command: Any) -> Any:
     """The options that say how a scene is listened to."""
     for option in reversed(

@@ -7,7 +7,8 @@ from typing import Any
 import click
 
 from sonic_bullet.cli.examples import RENDER_EPILOG
-from sonic_bullet.cli.parameters import json_option, level_options, scene_options
+from sonic_bullet.cli.parameters import json_option, scene_options
+from sonic_bullet.cli.sound_level import level_options
 from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 
 
@@ -18,7 +19,7 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
     "--output",
     required=True,
     metavar="NAME.wav",
-    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; float formats hold 1.0 = 1 Pa.",
+    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; it says what its full scale is in Pa.",
 )
 @click.option(
     "--seconds",

@@ -19,11 +19,11 @@ from sonic_bullet.cli.output import (
     status,
     write_json,
 )
+from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_warnings
 from sonic_bullet.cli.soundtrack.soundtrack_outputs import Soundtrack, SoundtrackWish
 from sonic_bullet.files import (
     AudioReport,
     check_audio_output,
-    check_levels,
     check_sr,
     kept_name,
     read_log,
@@ -51,58 +51,74 @@ def run_render(
     models: str | None,
     picture: str | None,
     json_to: str | None,
-    peak_dbfs: float | None,
-    lufs: float | None,
     microphones: tuple[tuple[float, float, float], ...],
     seed: int | None,
     material: str | None,
     residual: bool | None,
     supports: bool | None,
-    **soundtrack: Any,
+    **others: Any,
 ) -> None:
-    """The `render` command. soundtrack: options of `SoundtrackWish`.
+    """The `render` command. others: options of `LevelWish` and `SoundtrackWish`.
 
     Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far.
     """
     rate = None if sr is None else check_sr(sr)
-    check_request(scene, seconds, peak_dbfs, lufs, material)
+    level = LevelWish(**{name: others.pop(name) for name in OPTIONS})
+    check_request(scene, seconds, level, material)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
-    extras = SoundtrackWish(**soundtrack).checked(output)
-    to, contacts, picture, json_to, events_to = _check_places(output, contacts, picture, json_to, extras.events)
+    extras = SoundtrackWish(**others).checked(output)
+    to, contacts, picture, json_to, events_to = _check_places(
+        output, contacts, picture, json_to, extras.events, level.beside(output)
+    )
     made: Soundtrack | None = None
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
-                wish = Wish(seconds, rate, microphones, seed, material, residual, supports, progress, tell)
-                result: RenderResult | _Replay = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
+                wish = Wish(
+                    seconds,
+                    rate,
+                    microphones,
+                    seed,
+                    material,
+                    residual,
+                    supports,
+                    progress,
+                    tell,
+                    tail_db=level.tail_db,
+                )
+                result: RenderResult | Replay = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
         except (SonicBulletError, KeyboardInterrupt) as error:
-            raise with_partial(error, to, output, peak_dbfs, lufs) from error
+            raise with_partial(error, to, output, level) from error
         if contacts is not None:
             try:
                 write_log(contacts, result.log, models or "included")
             except SonicBulletError as error:
                 error.partial = result  # type: ignore[attr-defined]
-                raise with_partial(error, to, output, peak_dbfs, lufs) from error
+                raise with_partial(error, to, output, level) from error
         try:
             with progress_bar("stems and events") as (progress, tell):
-                made = extras.made(result.log, result.sr, events_to, progress, tell)
+                made = extras.made(result, events_to, progress, tell)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = result  # type: ignore[union-attr]
-            raise with_partial(error, to, output, peak_dbfs, lufs) from error
-        report = replace(_written(to, result, peak_dbfs, lufs, made), path=output)
+            raise with_partial(error, to, output, level) from error
+        report = replace(_written(to, result, level, made), path=output)
         if made is not None:
             made.write(report)
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture
 
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
-        notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *_warnings(report))
+        notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *level_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
+        told = level.say(to, report.gain_per_pa, report.peak_pa, result.log) if report.channels else {}
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    lifted = None if isinstance(result, _Replay) else result.lifted
-    write_json(json_to, described_render(result.log, report, notes, lifted) | (made.described if made else {}))
+    lifted = None if isinstance(result, Replay) else result.lifted
+    write_json(
+        json_to,
+        described_render(result.log, report, notes, lifted) | {"scale": told} | (made.described if made else {}),
+    )
 
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
@@ -135,13 +151,11 @@ def is_log(scene: str) -> bool:
     return Path(scene).suffix.lower() == ".npz"
 
 
-def check_request(
-    scene: str, seconds: float | None, peak_dbfs: float | None, lufs: float | None, material: str | None
-) -> None:
+def check_request(scene: str, seconds: float | None, level: LevelWish, material: str | None) -> None:
     """Raise what is wrong with what is asked of a scene or log, before anything runs."""
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
-    check_levels(peak_dbfs, lufs)
+    level.check()
     if not Path(scene).is_file():
         raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
     if Path(scene).suffix.lower() not in (".py", ".npz"):
@@ -164,7 +178,7 @@ def _check_places(output: str, *others: str | None) -> tuple[str, str | None, st
     Raises FileError.
     """
     check_audio_output(output)
-    contacts, picture, _, _ = others
+    contacts, picture, *_ = others
     if contacts is not None and not contacts.endswith(".npz"):
         raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
     if picture is not None:
@@ -189,6 +203,7 @@ class Wish:
     progress: Callable[[float], None]
     say: Callable[[str], None]
     at_end: Callable[[Listener], object] | None = None
+    tail_db: float | None = None
 
 
 def simulated(scene: str, wish: Wish) -> RenderResult:
@@ -205,12 +220,13 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         "material": wish.material,
         "residual": wish.residual is not False,
         "supports": wish.supports is not False,
+        "tail_db": wish.tail_db,
     }
     return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Replay:
+class Replay:
     """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
 
     sound: KeptSound
@@ -219,7 +235,7 @@ class _Replay:
     notes: tuple[str, ...] = ()
 
 
-def replayed(path: str, wish: Wish) -> _Replay:
+def replayed(path: str, wish: Wish) -> Replay:
     """A log's sound: bit for bit the render it came from, where no option changes it."""
     import numpy as np
 
@@ -244,41 +260,40 @@ def replayed(path: str, wish: Wish) -> _Replay:
         log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     rate = wish.rate or log.sr
     try:
-        sound = render_kept(log, sr=wish.rate, progress=wish.progress, say=wish.say)
+        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, progress=wish.progress, say=wish.say)
     except (SonicBulletError, KeyboardInterrupt) as error:
-        error.partial = _Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
+        error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise
-    return _Replay(sound, log, rate, silence_notes(sound, log))
+    return Replay(sound, log, rate, silence_notes(sound, log))
 
 
-def _written(
-    output: str, result: RenderResult | _Replay, peak_dbfs: float | None, lufs: float | None, made: Soundtrack | None
-) -> AudioReport:
+def _written(output: str, result: RenderResult | Replay, level: LevelWish, made: Soundtrack | None) -> AudioReport:
     """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
     from sonic_bullet.render import why_silent
 
     try:
-        cues = {} if made is None else made.cues_for(result.sound.shape[1])
-        return write_audio(output, result.sound, result.sr, peak_dbfs=peak_dbfs, lufs=lufs, **cues)
+        cues: dict[str, Any] = {} if made is None else made.cues_for(result.sound.shape[1])
+        how = level.options(result.sound, result.log, output)
+        return write_audio(output, result.sound, result.sr, **how, **cues)
     except AudioError as error:
         reason = None if result.sound.peaks().any() else why_silent(result.log)
         raise AudioError(error.what, reason) if reason else error from error
 
 
 def with_partial(
-    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, peak_dbfs: float | None, lufs: float | None
+    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, level: LevelWish
 ) -> SonicBulletError | KeyboardInterrupt:
     """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a
     valid file beside ``to``.
     """
-    result: RenderResult | _Replay | None = getattr(error, "partial", None)
+    result: RenderResult | Replay | None = getattr(error, "partial", None)
     said = ""
     if result is not None and all(result.sound.shape):
         partial = kept_name(Path(to))
         said = f"the first {result.sound.shape[1] / result.sr:.3f} s are in {kept_name(Path(output))}"
         try:
             try:
-                write_audio(partial, result.sound, result.sr, peak_dbfs=peak_dbfs, lufs=lufs)
+                write_audio(partial, result.sound, result.sr, **level.options(result.sound, result.log, output))
             except AudioError:
                 # silent or too short for the level asked for: kept as it is
                 write_audio(partial, result.sound, result.sr)
@@ -306,20 +321,6 @@ def _oversized(log: ContactLog) -> tuple[str, ...]:
     return tuple(
         f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words
     )
-
-
-def _warnings(report: AudioReport) -> tuple[str, ...]:
-    if report.clipped:
-        return (
-            f"{report.clipped} samples were clipped at full scale (peak {report.peak_pa:.3g} Pa); "
-            "--peak-dbfs -1 avoids it, a float .wav needs no clipping",
-        )
-    if report.over:
-        return (
-            f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players "
-            "clip it; --peak-dbfs -1 scales it",
-        )
-    return ()
 
 
 def summary(report: AudioReport, log: ContactLog) -> str:

@@ -52,7 +52,7 @@ def compared(a: Side, b: Side, tell: Tell) -> Comparison:
     """Two sides that are known. Raises CompareError."""
     same = a.sr == b.sr and same_sound(a.sound, b.sound)
     if a.log is None or b.log is None:
-        return Comparison(a, b, same, (), () if same else _of_recordings(a, b), notes=_notes(a, b))
+        return Comparison(a, b, same, (), () if same else _of_recordings(a, b), notes=(*_notes(a, b), *_levels(a, b)))
     match = matched(a.log, b.log)
     if not same:
         require_kin(a.log, b.log, match)
@@ -174,6 +174,11 @@ def _of_recordings(a: Side, b: Side) -> tuple[Consequence, ...]:
     effects = _of_sounds(a, b)
     return (*(x for x in effects if x.kind in ("rate", "length")), *recording_effects(one, other, sr),
             *(x for x in effects if x.kind not in ("rate", "length")))  # fmt: skip
+
+
+def _levels(a: Side, b: Side) -> tuple[str, ...]:
+    """Whose level is unknown, of recordings."""
+    return tuple(note for side in (a, b) if side.log is None for note in side.notes)
 
 
 def _notes(a: Side, b: Side) -> tuple[str, ...]:

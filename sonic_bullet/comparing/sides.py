@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
@@ -214,7 +214,9 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
     samples, sr = read_audio(name)
     if not np.size(samples):
         raise CompareError(f"{shown(name)} holds no sample", "give a recording that has some")
-    return Side(name, KeptSound.of(np.atleast_2d(np.asarray(samples, float))), sr)
+    unknown = f"{name} says no scale: its level is unknown, and its samples are taken as pascals"
+    notes = () if read_audio_scale(name) is not None else (unknown,)
+    return Side(name, KeptSound.of(np.atleast_2d(np.asarray(samples, float))), sr, notes=notes)
 
 
 def of_log(log: ContactLog, name: str) -> Side:

@@ -9,12 +9,12 @@ after, `reading` is the boundary of all readers, `atomic` the replacing.
 """
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
-from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, check_sr, write_audio
+from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, write_audio
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.levels import check_levels
+from sonic_bullet.files.levels import check_levels, check_sr
 from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.models import read_model, write_model
-from sonic_bullet.files.recordings import channel_of, channel_words, read_audio
+from sonic_bullet.files.recordings import channel_of, channel_words, read_audio, read_audio_scale
 
 __all__ = [
     "AudioReport",
@@ -29,6 +29,7 @@ __all__ = [
     "check_sr",
     "kept_name",
     "read_audio",
+    "read_audio_scale",
     "read_log",
     "read_model",
     "replacing",

@@ -4,7 +4,8 @@
 
 Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and
 counted in `AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow
-every player), NaN and infinities are refused. The same samples give the same bytes, except in OGG, whose streams carry
+every player), NaN and infinities are refused. What full scale is in pascals stands in the file (riff/scale.py), and
+`read_audio` gives pascals back. The same samples give the same bytes, except in OGG, whose streams carry
 a random serial number.
 
 libsndfile says neither why a write failed nor, when it closes, whether one did: before a file gets its name it is read
@@ -26,7 +27,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
-from sonic_bullet.files.levels import as_sound, check_levels, gain_per_pa
+from sonic_bullet.files.levels import as_sound, check_levels, check_sr, gain_per_pa
+from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
 from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.partial_file import PartialFile
@@ -50,8 +52,6 @@ SAMPLE_BYTES = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, 
 CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
 BLOCK_FRAMES = 1 << 18
 SMALLEST_NORMAL = 2.0**-126  # of float32
-
-SR_MIN_HZ, SR_MAX_HZ = 8000, 384_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,16 +78,6 @@ class AudioReport:
     @property
     def seconds(self) -> float:
         return self.frames / self.sr
-
-
-def check_sr(sr: object) -> int:
-    """``sr`` as a whole number of Hz between 8000 and 384 000. Raises AudioError on anything else."""
-    remedy = f"give a whole number of Hz between {SR_MIN_HZ} and {SR_MAX_HZ}, 48000 say"
-    try:
-        return as_whole(sr, "sr", remedy, least=SR_MIN_HZ, most=SR_MAX_HZ, error=AudioError)
-    except AudioError:
-        said = f"{sr:g} Hz" if isinstance(sr, float) else f"{shown(sr)} Hz"
-        raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None
 
 
 def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
@@ -126,7 +116,8 @@ class AudioWriter:
     `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it
     has been read back. Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file
     NAME.partial.EXT and says so in the error; NAME.EXT is untouched. gain_per_pa: file units for one pascal.
-    expected_frames: chooses RF64 over WAV where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV.
+    expected_frames: chooses RF64 over WAV where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV. scale:
+    whether the file says what its full scale is; False: what is written is of no known level.
     """
 
     def __init__(
@@ -139,6 +130,7 @@ class AudioWriter:
         subtype: str | None = None,
         expected_frames: int = 0,
         chunks: bytes = b"",
+        scale: bool = True,
     ) -> None:
         """Opens the partial file.
 
@@ -151,6 +143,9 @@ class AudioWriter:
         self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
+        self.scale_pa = 1 / self.gain_per_pa if scale else None
+        if self.format in ("WAV", "RF64") and self.scale_pa is not None:
+            chunks = ixml_chunk(self.scale_pa) + (chunks or wave_chunks([], description=scale_text(self.scale_pa)))
         self.frame_bytes, self.chunks = channels * SAMPLE_BYTES.get(self.subtype, 0), chunks
         if self.format == "WAV" and expected_frames * self.frame_bytes + len(chunks) > CHUNK_LIMIT_BYTES:
             self.format = "RF64"
@@ -173,6 +168,9 @@ class AudioWriter:
                 f"cannot write {channels} channels at {self.sr} Hz to {path}: {error.error_string}",
                 "write .wav, or fewer channels",
             ) from error
+
+        if self.scale_pa is not None and self.format not in ("WAV", "RF64", "W64"):
+            self.file.comment = scale_text(self.scale_pa)
 
     @property
     def is_float(self) -> bool:
@@ -223,18 +221,9 @@ class AudioWriter:
         """What has been written so far."""
         rms = math.sqrt(self.energy_pa2 / (self.frames * self.channels)) if self.frames else 0.0
         return AudioReport(
-            self.path,
-            self.format,
-            self.subtype,
-            self.sr,
-            self.channels,
-            self.frames,
-            self.gain_per_pa,
-            self.peak_pa,
-            rms,
-            self.clipped,
-            self.over,
-        )
+            self.path, self.format, self.subtype, self.sr, self.channels, self.frames, self.gain_per_pa, self.peak_pa,
+            rms, self.clipped, self.over,
+        )  # fmt: skip
 
     def __enter__(self) -> AudioWriter:
         return self
@@ -264,17 +253,23 @@ class AudioWriter:
 
     def _name_it(self) -> None:
         """Give the whole file its name. Raises FileError, OSError."""
-        if self.chunks:
-            append_chunks(self.partial.fd, self.chunks)
+        self._append()
         if self._read_back() != self.frames:
             raise self._refused()
         forget_time(self.partial.fd)
         self.partial.replace(self.target)
 
+    def _append(self) -> None:
+        """What the file says of itself, behind its samples. Raises OSError."""
+        if self.chunks:
+            append_chunks(self.partial.fd, self.chunks)
+
     def _keep(self) -> int:
         """Keep what can be read of an unfinished file beside its target; how many frames that is. Raises OSError."""
         frames = self._read_back() if self.frames else 0
         if frames:
+            with suppress(OSError):  # the disk may be full: what is kept of it then says no scale
+                self._append()
             self.partial.replace(kept_name(self.target))
         return frames
 
@@ -309,7 +304,7 @@ def write_audio(
     *,
     peak_dbfs: float | None = None,
     lufs: float | None = None,
-    full_scale_pa: float = 1.0,
+    full_scale_pa: float | None = 1.0,
     subtype: str | None = None,
     cues: Sequence[Cue] | None = None,
     time_reference: int = 0,
@@ -317,10 +312,11 @@ def write_audio(
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
     The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of
-    ``peak_dbfs`` (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. Over 4 GiB a .wav is
-    written as RF64. cues: places named in a .wav (none of them: [] still says where the file begins), time_reference:
-    its first sample on the timeline it is for (files.riff). Raises AudioError (rate, NaN, silence or under 0.4 s where
-    loudness is asked, both levels given) and FileError (place, format).
+    ``peak_dbfs`` (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. The file says what its
+    full scale is, and `read_audio` undoes it; full_scale_pa None: samples are in no known unit, and it
+    says none. Over 4 GiB a .wav is written as RF64. cues: places named in a .wav (none of them: [] still says where the
+    file begins), time_reference: its first sample on the timeline it is for (files.riff). Raises AudioError (rate, NaN,
+    silence or under 0.4 s where loudness is asked, both levels given) and FileError (place, format).
     """
     rate = check_sr(sr)
     _, container, _ = check_audio_output(path, subtype)
@@ -328,16 +324,20 @@ def write_audio(
         raise FileError(f"cannot write cue points to {brief(path)}: {container} has none", "end the name with .wav")
     check_levels(peak_dbfs, lufs)
     begins = as_whole(time_reference, "time_reference", "count samples from the timeline's start", least=0)
+    scale = full_scale_pa is not None
     full_scale_pa = as_number(
-        full_scale_pa, "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError
-    )
+        1.0 if full_scale_pa is None else full_scale_pa,
+        "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError,
+    )  # fmt: skip
     sound = as_sound(samples)
     channels, frames = sound.shape
     if channels == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
-    chunks = b"" if cues is None else wave_chunks(cues, description=Path(path).stem, time_reference=begins)
+    words = f"{Path(path).stem[:80]}; {scale_text(1 / gain)}" if scale else Path(path).stem
+    chunks = b"" if cues is None else wave_chunks(cues, description=words, time_reference=begins)
     options: dict[str, Any] = {"gain_per_pa": gain, "subtype": subtype, "expected_frames": frames, "chunks": chunks}
+    options["scale"] = scale
     with AudioWriter(path, rate, channels, **options) as writer:
         for block in sound.blocks(BLOCK_FRAMES):
             writer.write(block)

@@ -13,8 +13,10 @@ import numpy as np
 
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number, shown
+from sonic_bullet.records.coerce import as_number, as_whole, shown
 from sonic_bullet.records.errors import AudioError
+
+SR_MIN_HZ, SR_MAX_HZ = 8000, 384_000
 
 
 def gain_per_pa(sound: KeptSound, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float) -> float:
@@ -56,6 +58,16 @@ def as_sound(samples: object) -> KeptSound:
     except ValueError:  # rows of several lengths
         pass
     raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
+
+
+def check_sr(sr: object) -> int:
+    """``sr`` as a whole number of Hz between 8000 and 384 000. Raises AudioError on anything else."""
+    remedy = f"give a whole number of Hz between {SR_MIN_HZ} and {SR_MAX_HZ}, 48000 say"
+    try:
+        return as_whole(sr, "sr", remedy, least=SR_MIN_HZ, most=SR_MAX_HZ, error=AudioError)
+    except AudioError:
+        said = f"{sr:g} Hz" if isinstance(sr, float) else f"{shown(sr)} Hz"
+        raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None
 
 
 def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:

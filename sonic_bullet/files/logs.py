@@ -48,9 +48,9 @@ from collections.abc import Mapping
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.audio import check_sr
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.container import REMEDY, Column, distinct, read_container, take, write_container
+from sonic_bullet.files.levels import check_sr
 from sonic_bullet.files.log_header import (
     RESIDUAL_ARRAYS,
     LogHeader,

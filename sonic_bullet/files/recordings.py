@@ -8,13 +8,15 @@ What a file says of its length is not believed: streams may not know it beforeha
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
@@ -25,14 +27,33 @@ MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
 BLOCK_SAMPLES = 1 << 18
 UNBROKEN = "give an unbroken audio file"
+T = TypeVar("T")
+
+
+def read_audio_scale(path: str | os.PathLike[str]) -> float | None:
+    """What full scale of a sound file is in Pa, as it says itself; None: its level is unknown.
+
+    Raises FileError where it cannot be read.
+    """
+    return _read(path, _scale)[0]
 
 
 def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
-    """Samples (channels, n) float64 in file units (pascals where written with full scale 1 Pa) and the rate in Hz.
+    """Samples (channels, n) float64 and the rate in Hz: pascals where the file says its scale, else in file units.
 
     Raises FileError where the file is missing, cut, no audio, of a rate that no recording has, or unpacks to more than
     memory is for.
     """
+
+    def read(sound: Any, fd: int) -> Array:
+        samples, scale = _samples(sound, path, os.fstat(fd).st_size), _scale(sound, fd)
+        return samples if scale is None or scale == 1.0 else samples * scale
+
+    return _read(path, read)
+
+
+def _read(path: str | os.PathLike[str], what: Callable[[Any, int], T]) -> tuple[T, int]:
+    """What is read of an open sound file and its descriptor, and its rate. Raises FileError."""
     import soundfile
 
     path = as_path(path, "path", "name a sound file")
@@ -43,9 +64,14 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
         # by its descriptor: what it is stands in its bytes, and a name that ends in .raw would have libsndfile guess
         try:
             with _forward()(file.fileno(), "r", closefd=False) as sound:
-                return _samples(sound, path, os.fstat(file.fileno()).st_size), int(sound.samplerate)
+                return what(sound, file.fileno()), int(sound.samplerate)
         except soundfile.LibsndfileError as error:
             raise FileError(f"cannot read {path}: {error.error_string.rstrip('.')}", UNBROKEN) from error
+
+
+def _scale(sound: Any, fd: int) -> float | None:
+    """Of an open file."""
+    return read_chunk_scale(fd) or scale_in(str(sound.comment).encode("utf-8", "replace"))
 
 
 @cache

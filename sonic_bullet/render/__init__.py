@@ -2,7 +2,8 @@
 
 silence: why there is none | presence: who is there, who has gone | resonator: a body as it is played
 tables, body_table: what the compiled stages work on | contact_rows, contact_place: contacts | strike_pulses: strikes
-friction: rolling and sliding | driver: the stages in one call | residual_voice: residuals, what happened in a step
+friction: rolling and sliding | ringing_on: what sounds after the last step
+driver: the stages in one call | residual_voice: residuals, what happened in a step
 synthesis_state: all that goes on | presence: who is there, comes and goes | synthesizer: all together
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -20,12 +22,15 @@ from sonic_bullet.records import Air, Array, Microphone
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import LogError, SonicBulletError
+from sonic_bullet.render.ringing_on import TAIL_DB, as_tail_db
 from sonic_bullet.render.silence import silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
 __all__ = [
     "LATENCY_STEPS",
+    "TAIL_DB",
     "Synthesizer",
+    "as_tail_db",
     "log_frames",
     "make_ready",
     "render_blocks",
@@ -72,13 +77,19 @@ def render_blocks(
 
     Arguments and errors: as `render_log` has them; arguments are checked at once.
     """
+    log, residual = _checked(log, sr, residual, progress, say)
+    return _blocks(log, _synthesizer(log, residual), progress, say)
+
+
+def _checked(log: ContactLog, sr: object, residual: object, progress: Any, say: Any) -> tuple[ContactLog, bool]:
+    """A log at the rate asked for, and whether it is rendered with residuals. Raises AudioError, LogError."""
     from sonic_bullet.files import check_sr
 
     as_kind(log, ContactLog, "log", "give listener.contacts, or read_log(path)", error=LogError)
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     residual = log.residual if residual is None else as_flag(residual, "residual")
     as_call(progress, "progress"), as_call(say, "say")
-    return _blocks(log, residual, progress, say)
+    return log, residual
 
 
 def render_kept(
@@ -86,30 +97,34 @@ def render_kept(
     *,
     sr: int | None = None,
     residual: bool | None = None,
+    tail_db: float | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> KeptSound:
     """What `render_log` gives, beyond a few seconds in a nameless temporary file. Arguments: as `render_log` has them.
 
+    tail_db: ring on after the last step until that far below the peak, -60 say, at most 10 s; None, 0: end with it.
+
     Raises what `render_log` does, and FileError where the disk is full; the exception, Ctrl-C too, carries what was
     rendered so far as ``kept``.
     """
-    spool = SoundSpool(len(log.sensors)) if isinstance(log, ContactLog) else SoundSpool(0)
+    tail_db = as_tail_db(tail_db)
+    log, residual = _checked(log, sr, residual, progress, say)
+    spool, synth = SoundSpool(len(log.sensors)), _synthesizer(log, residual)
     try:
-        for block in render_blocks(log, sr=sr, residual=residual, progress=progress, say=say):
+        for block in _blocks(log, synth, progress, say):
             if spool.tail[0]:
                 spool.add(block)
+        return synth.with_tail(spool.kept(), tail_db) if spool.tail[0] else KeptSound.of(block)
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.kept = spool.kept()  # type: ignore[union-attr]
         raise
-    return spool.kept() if spool.tail[0] else KeptSound.of(block)
 
 
 def _blocks(
-    log: ContactLog, residual: bool, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
+    log: ContactLog, synth: Synthesizer, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
 ) -> Iterator[Array]:
     make_radiation_known(log, say)
-    synth = _synthesizer(log, residual)
     quenches = quenched_steps(log)
     done = 0
     for steps in together(log.steps, quenches):

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
 from sonic_bullet.render.presence import admit, release
+from sonic_bullet.render.ringing_on import ring_on
 from sonic_bullet.render.synthesis_state import Setup, Witness, start
-from sonic_bullet.render.synthesizer import LOOK_EVERY, advance, drained
+from sonic_bullet.render.synthesizer import LOOK_EVERY, advance, clock_after, drained
 
 if TYPE_CHECKING:
     from sonic_bullet.records.contacts import Step
@@ -26,6 +27,7 @@ def render_apart(
     log: ContactLog,
     *,
     sr: int | None = None,
+    frames: int | None = None,
     witness: Witness | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
@@ -33,6 +35,7 @@ def render_apart(
     """Pieces of what `render_blocks` gives, before bodies are summed: (b,) their indices in the log, ascending, and
     (b, channels, n) pascals. Who is not among them is silent meanwhile.
 
+    frames: how many samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end.
     witness: is shown every step. progress, say, errors: as `render_log` has them.
     """
     from sonic_bullet.files import check_sr
@@ -60,3 +63,10 @@ def render_apart(
             progress(done / len(log.steps))
     body, frame = state.body, drained(setup, state, last)
     yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])
+    missing = 0 if frames is None or last is None else frames - clock_after(state).sample(log.sr)
+    for block in ring_on(setup, state, last) if missing > 0 and last is not None else ():
+        frame = block[:, :missing]
+        yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])
+        missing -= frame.shape[1]
+        if missing <= 0:
+            break

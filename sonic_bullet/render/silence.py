@@ -36,16 +36,22 @@ def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...
     """
     if not log.sensors:
         return (f"the render is silent: {why_silent(log)}",)
-    peaks = as_sound(samples).peaks()
-    least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
-    if (peaks > least).any():
+    if not is_silent(samples, log):
         return ()
+    peaks = as_sound(samples).peaks()
     faint = (
         f"its peak of {peaks.max():.2g} Pa is below the threshold of hearing, 20 µPa: move the microphone "
         "nearer, or --peak-dbfs -1 scales it"
     )
     unknown = faint if peaks.any() else "its log does not say why: write it with --contacts and report it"
     return (f"the render is silent: {why_silent(log) or unknown}",)
+
+
+def is_silent(samples: Array | KeptSound, log: ContactLog) -> bool:
+    """Whether nothing in (channels, n) samples can be heard: no pressure above the threshold of hearing, 20 µPa."""
+    peaks = as_sound(samples).peaks()
+    least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
+    return not bool((peaks > least).any())
 
 
 def why_silent(log: ContactLog) -> str | None:

@@ -23,6 +23,7 @@ from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
+from sonic_bullet.render.ringing_on import with_tail
 from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
@@ -306,14 +307,21 @@ class Synthesizer:
         """(channels, floor(sr·time)) all sound so far, without lag; as `kept_sound` has it, in memory."""
         return self.kept_sound().samples()
 
-    def kept_sound(self) -> KeptSound:
+    def kept_sound(self, tail_db: float | None = None) -> KeptSound:
         """All sound so far, without lag, where it lies; after an AudioError, what was made before it, after a full
-        disk, what was kept. Raises AudioError where none is kept.
+        disk, what was kept. tail_db: see `with_tail`. Raises AudioError where none is kept.
         """
         if self._sound is None:
             raise AudioError("the sound is not kept", "attach with keep_sound=True, or read() the frames")
         rest = self.rest() if self.unkept is None else np.zeros((len(self._setup.sensors), 0))
-        return KeptSound(self._sound, len(self._sound), rest)
+        sound = KeptSound(self._sound, len(self._sound), rest)
+        return sound if self.unkept is not None else self.with_tail(sound, tail_db)
+
+    def with_tail(self, sound: KeptSound, tail_db: float | None) -> KeptSound:
+        """The whole sound so far, and what rings on after it until it is tail_db below its peak; None: nothing more."""
+        if tail_db is None or self._failed is not None:
+            return sound
+        return with_tail(sound, self._setup, self._state, self._last, tail_db)
 
     def quench(self) -> None:
         """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is

@@ -37,7 +37,7 @@ from sonic_bullet.records.coerce import (
     shown,
 )
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
-from sonic_bullet.render import LATENCY_STEPS, Synthesizer, make_ready
+from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, make_ready
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
@@ -314,24 +314,24 @@ class Listener:
         """
         return self._synth.sound()
 
-    def kept_sound(self) -> KeptSound:
-        """What `sound` gives where it lies, for runs longer than the memory: `blocks` gives it in pieces."""
-        return self._synth.kept_sound()
+    def kept_sound(self, *, tail_db: float | None = None) -> KeptSound:
+        """What `sound` gives where it lies, for runs longer than the memory. tail_db: as `write` has it."""
+        return self._synth.kept_sound(as_tail_db(tail_db))
 
-    def write(self, path: str | Path, **options: Any) -> AudioReport:
-        """Write the sound so far without the lag: float32 with 1.0 = 1 Pa, or scaled by ``peak_dbfs=`` or ``lufs=``
-        (see `files.write_audio`).
+    def write(self, path: str | Path, *, tail_db: float | None = None, **options: Any) -> AudioReport:
+        """Write the sound so far without the lag: 1.0 = 1 Pa, or scaled (options of `files.write_audio`).
 
-        It goes to the file by blocks, however long it is; lufs= alone needs all of it in memory. Raises FileError,
-        AudioError.
+        tail_db: follow what rings after the last step until that far below the peak, -60 say, at most 10 s; None, 0:
+        not. By blocks, however long; lufs= alone needs all of it in memory. Raises FileError, AudioError.
         """
-        check_options(options, keywords(write_audio), "write", error=AudioError)
+        check_options(options, [*keywords(write_audio), "tail_db"], "write", error=AudioError)
+        tail_db = as_tail_db(tail_db)
         place = as_path(path, "path", "name a file, such as out.wav")
         if not self.sensors:
             raise AudioError(
                 "there is no microphone, so there is no sound to write", "attach with microphone=(x, y, z)"
             )
-        return write_audio(place, self.kept_sound(), self.sr, **options)
+        return write_audio(place, self.kept_sound(tail_db=tail_db), self.sr, **options)
 
     def detach(self) -> None:
         """Stop listening and leave the client as it was; sound and log stay. Twice is once."""

@@ -22,7 +22,7 @@ from sonic_bullet.parallel import arrays_in_order
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import AudioError, SceneError
-from sonic_bullet.soundtrack.film_writer import FilmWriter, check_film_output, check_size, samples_of
+from sonic_bullet.soundtrack.film_writer import FilmWriter, check_film_output, check_size, pictures_of, samples_of
 from sonic_bullet.soundtrack.overlay import shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import SoundEvent, touching_pairs
 from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of, staged
@@ -92,6 +92,7 @@ def make_film(
 ) -> FilmReport:
     """A film of a log with its sound (channels, n) in pascals, whole or not at all; two processes draw.
 
+    Where the sound goes on after the log's last step, the last picture does.
     standing: shapes of the scene's world, where it is there; events: drawn in, where they are given. codec: of the
     sound, None: the container's usual one. progress: given the share done. Raises FileError, AudioError, SceneError;
     stopped or failed under way, the error names the film that is finished so far.
@@ -101,6 +102,8 @@ def make_film(
     check_size(look.size)
     check_levels(peak_dbfs, lufs)
     count = pictures_in(log, look.fps, seconds)
+    if sound.shape[1] > math.floor(duration_of(log) * sr):  # it rings on: the last picture stays
+        count = max(count, pictures_of(sound.shape[1], look.fps, sr))
     gain = gain_per_pa(sound, sr, peak_dbfs, lufs, 1.0)
     staging = staged(log, look.fps, count, standing)
     cameras = _cameras(log, staging, look)

@@ -32,6 +32,7 @@ import numpy as np
 
 from sonic_bullet.files import check_output, check_sr
 from sonic_bullet.files.atomic import cannot, kept_name
+from sonic_bullet.files.riff.scale import scale_text
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records import Array
@@ -174,10 +175,11 @@ class FilmWriter:
         try:
             self._file = os.fdopen(self.partial.fd, "wb", closefd=False)
             # no random ids, no time of day: equal films, equal bytes
-            options = {"fflags": "+bitexact"}
+            options: dict[str, str] = {"fflags": "+bitexact"}
             if container != "matroska":  # whose tracks end at times of this unit, else of milliseconds
                 options["movie_timescale"] = str(self.sr)
             self._container = av.open(self._file, "w", format=container, options=options)
+            self._container.metadata["comment"] = scale_text(1 / gain_per_pa)
             self._video = self._container.add_stream("libx264", rate=fps, options=_X264)
             self._video.width, self._video.height = self.size
             self._video.pix_fmt = "yuv420p"

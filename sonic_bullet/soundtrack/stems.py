@@ -42,6 +42,7 @@ def render_stems(
     log: ContactLog,
     *,
     sr: int | None = None,
+    frames: int | None = None,
     witness: Witness | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
@@ -55,7 +56,7 @@ def render_stems(
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
     who = [index for index, body in enumerate(log.bodies) if body.model is not None]
     spools = {index: SoundSpool(len(log.sensors)) for index in who}
-    for body, frame in render_apart(log, sr=sr, witness=witness, progress=progress, say=say):
+    for body, frame in render_apart(log, sr=sr, frames=frames, witness=witness, progress=progress, say=say):
         there = dict(zip(body.tolist(), frame, strict=True))
         nothing = np.zeros(frame.shape[1:])
         for index, spool in spools.items():

@@ -66,7 +66,19 @@ def write_scene(folder: Path, act: str = "") -> None:
 def test_a_scene_that_changes_the_folder_does_not_move_its_outputs(folder: Path) -> None:
     write_scene(folder)
     done = call(
-        folder, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json", "a.json"
+        folder,
+        "render",
+        "scene.py",
+        "-o",
+        "a.wav",
+        "--tail",
+        "0",
+        "--contacts",
+        "a.npz",
+        "--picture",
+        "a.png",
+        "--json",
+        "a.json",
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("a.wav: ")

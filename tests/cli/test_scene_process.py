@@ -43,7 +43,20 @@ def process(folder: Path, *words: str, code: str = MAIN) -> subprocess.Completed
 
 def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_path: Path) -> None:
     write_scene(tmp_path)
-    done = process(tmp_path, "render", "scene.py", "-o", "a.wav", "--contacts", "a.npz", "--picture", "a.png", "--json")
+    done = process(
+        tmp_path,
+        "render",
+        "scene.py",
+        "-o",
+        "a.wav",
+        "--tail",
+        "0",
+        "--contacts",
+        "a.npz",
+        "--picture",
+        "a.png",
+        "--json",
+    )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     sound, sr = read_audio(tmp_path / "a.wav")
@@ -52,7 +65,9 @@ def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_
     assert sound.shape == (1, 12_000)
     assert told["contacts"] > 0
     assert np.abs(sound).max() > 1e-3
-    again = process(tmp_path, "render", "a.npz", "-o", "b.wav", "--contacts", "b.npz", code=WITHOUT_PYBULLET)
+    again = process(
+        tmp_path, "render", "a.npz", "-o", "b.wav", "--tail", "0", "--contacts", "b.npz", code=WITHOUT_PYBULLET
+    )
     assert again.returncode == 0, again.stderr
     assert (tmp_path / "a.wav").read_bytes() == (tmp_path / "b.wav").read_bytes()
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()

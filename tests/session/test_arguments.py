@@ -155,6 +155,7 @@ def writing(client: Any, folder: Path) -> Made:
         "lufs": None,
         "full_scale_pa": 1,
         "subtype": None,
+        "tail_db": None,
     }
 
 
@@ -171,6 +172,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "progress": None,
         "say": None,
         "at_end": None,
+        "tail_db": None,
     }
     return scene.render_scene, {"path": folder / "scene.py", **rest}
 
@@ -331,8 +333,9 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "path": PATH,
         "peak_dbfs": [*OPTIONAL, 3, 0.1, -1e9],
         "lufs": [*OPTIONAL, 1e9],
-        "full_scale_pa": [*NUMBER, 0, -1],
+        "full_scale_pa": [*OPTIONAL, 0, -1],
         "subtype": [5, b"PCM_16", object()],
+        "tail_db": [*OPTIONAL, 3, -1e9],
     },
     "Material": {
         "name": TEXT,
@@ -431,6 +434,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "progress": CALL,
         "say": CALL,
         "at_end": CALL,
+        "tail_db": [*OPTIONAL, 3, -1e9],
     },
     "write_audio": {
         "path": PATH,
@@ -438,7 +442,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "sr": [*NUMBER, 0],
         "peak_dbfs": [*OPTIONAL, 3, -1e9],
         "lufs": [*OPTIONAL, 1e9],
-        "full_scale_pa": [*NUMBER, 0],
+        "full_scale_pa": [*OPTIONAL, 0],
         "subtype": [5, b"PCM_16", object()],
         "cues": [5, "cue", object(), [5], [object()]],
         "time_reference": [*WHOLE, -1],

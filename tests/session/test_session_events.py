@@ -43,7 +43,8 @@ def test_a_quench_is_in_the_log_and_its_replay_is_the_same_bits(client: Any, tmp
     assert read.events == log.events
     np.testing.assert_array_equal(sb.render_log(read), sound)
     listener.write(tmp_path / "live.wav")
-    cli.main(["render", str(tmp_path / "log.npz"), "-o", str(tmp_path / "replay.wav")], standalone_mode=False)
+    words = ["render", str(tmp_path / "log.npz"), "-o", str(tmp_path / "replay.wav"), "--pascals", "--tail", "0"]
+    cli.main(words, standalone_mode=False)
     assert (tmp_path / "live.wav").read_bytes() == (tmp_path / "replay.wav").read_bytes()
     without = np.abs(sb.render_log(replace(log, events=())) - sound).max()
     print(f"without its event the replay is {without:.3g} off")
@@ -129,6 +130,9 @@ def test_seconds_cut_a_log_before_or_after_its_quench(client: Any, tmp_path: Pat
             str(tmp_path / "cut.npz"),
             "--seconds",
             str(seconds),
+            "--pascals",
+            "--tail",
+            "0",
         ]
         cli.main(said, standalone_mode=False)
         cut = sb.read_log(str(tmp_path / "cut.npz"))

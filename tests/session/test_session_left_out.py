@@ -75,6 +75,7 @@ def test_a_render_says_it_and_writes_the_others(tmp_path: Path) -> None:
     for name, act in (("broken", "client.resetBaseVelocity(2, [float('nan'), 0, 0])"), ("plain", "pass")):
         (tmp_path / f"{name}.py").write_text(SCENE.format(act=act))
         words = ["render", f"{name}.py", "-o", f"{name}.wav", "--contacts", f"{name}.npz", "--json", f"{name}.json"]
+        words += ["--pascals", "--tail", "0"]
         command = [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words]
         said.append(subprocess.run(command, check=False, cwd=tmp_path, capture_output=True, text=True, timeout=250))
     broken, plain = said

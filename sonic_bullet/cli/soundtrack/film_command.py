@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
-from sonic_bullet.cli.parameters import Numbers, json_option, level_options, scene_options
+from sonic_bullet.cli.parameters import Numbers, json_option, scene_options
+from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 EPILOG = """\b
 Examples:
-  sonic-bullet film scenes/tabletop.py -o tabletop.mp4 --fps 60 --peak-dbfs -1
+  sonic-bullet film scenes/tabletop.py -o tabletop.mp4 --fps 60
   sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow link0
   sonic-bullet film drop.npz -o drop.mkv --camera 0.5,-1,0.8 --look-at 0,0,0.1 --size 1920x1080
 Frame rates are fractions: 24, 25, 30000/1001. Needs PyAV: pip install 'sonic_bullet[film]'"""
@@ -73,8 +74,8 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size
 
     rate = None if options["sr"] is None else check_sr(options["sr"])
-    levels = {name: options[name] for name in ("peak_dbfs", "lufs")}
-    check_request(scene, options["seconds"], options["peak_dbfs"], options["lufs"], options["material"])
+    level = LevelWish(**{name: options[name] for name in OPTIONS})
+    check_request(scene, options["seconds"], level, options["material"])
     look = FilmLook(
         as_fps(options["fps"]),
         check_size(options["size"]),
@@ -84,7 +85,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         options["shadows"],
     )
     check_film_output(output, rate or DEFAULT_SR, max(len(options["microphones"]), 1), options["codec"])
-    to, json_to = places(output, json_to)
+    to, json_to, _ = places(output, json_to, level.beside(output))
     standing: list[Standing] = []
 
     def at_end(listener: Listener) -> None:
@@ -99,12 +100,12 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         with progress_bar(Path(scene).name) as (progress, tell):
             wish = Wish(
                 options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, None,
-                progress, tell, at_end,
+                progress, tell, at_end, level.tail_db,
             )  # fmt: skip
             try:
                 result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
             except (SonicBulletError, KeyboardInterrupt) as error:
-                raise with_partial(error, sound_to, sound_to, *levels.values()) from error
+                raise with_partial(error, sound_to, sound_to, level) from error
         if not result.log.sensors:
             raise FileError("there is no microphone, so the film has no sound", "give one, --microphone 0,-1,0.5")
         pictures_in(result.log, look.fps, options["seconds"])
@@ -117,7 +118,10 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 from sonic_bullet.soundtrack.stems import render_stems
 
                 witness = EventWitness(result.log)
-                stems = render_stems(result.log, sr=result.sr, witness=witness, progress=progress, say=tell)
+                frames = result.sound.shape[1]
+                stems = render_stems(
+                    result.log, sr=result.sr, frames=frames, witness=witness, progress=progress, say=tell
+                )
                 events = witness.events(stems, result.sr)
             report = make_film(
                 str(to),
@@ -129,14 +133,15 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 standing=standing,
                 events=events,
                 codec=options["codec"],
-                **levels,
+                **level.options(result.sound, result.log, str(to)),
                 progress=progress,
             )
         say(_summary(output, report))
+        told = level.say(str(to), report.gain_per_pa, float(result.sound.peaks().max()), result.log)
         notes = (*result.notes, *report.notes, *_clipped(report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, _described(output, report, notes))
+    write_json(json_to, _described(output, report, notes) | {"scale": told})
 
 
 def _summary(output: str, report: FilmReport) -> str:

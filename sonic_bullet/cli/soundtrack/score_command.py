@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
-from sonic_bullet.cli.parameters import Numbers, json_option, level_options
+from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 EPILOG = """\b
 Examples:
-  sonic-bullet score take1.glb -o take1.wav --materials table.json --peak-dbfs -1
+  sonic-bullet score take1.glb -o take1.wav --materials table.json
   sonic-bullet score keys.npz -o keys.wav --contacts heard.npz
   sonic-bullet render heard.npz -o again.wav --stems stems --events what.csv
   sonic-bullet score shot.glb -o shot.wav --scale 0.01 --fps 24
@@ -49,10 +50,10 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
     """Give a baked animation (.glb .gltf .json .npz) its sound, or a scene that of bodies that it moves by hand."""
     from sonic_bullet.cli.output import described_render
     from sonic_bullet.cli.scene_commands import summary, with_partial
-    from sonic_bullet.files import check_audio_output, check_levels, check_sr, write_audio, write_log
+    from sonic_bullet.files import check_audio_output, check_sr, write_audio, write_log
 
-    sr, levels = check_sr(options["sr"]), {name: options[name] for name in ("peak_dbfs", "lufs")}
-    check_levels(*levels.values())
+    sr, level = check_sr(options["sr"]), LevelWish(**{name: options[name] for name in OPTIONS})
+    level.check()
     check_audio_output(output)
     if contacts is not None and not contacts.endswith(".npz"):
         raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
@@ -62,7 +63,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
             f"{animation} is a scene, which says its materials, step and lengths itself",
             "leave out --materials, --fps and --scale",
         )
-    to, contacts_to, json_to = places(output, contacts, json_to)
+    to, contacts_to, json_to, _ = places(output, contacts, json_to, level.beside(output))
     with clean_stdout(json_to) as say:
         with quiet_stderr():
             from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
@@ -71,6 +72,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
         try:
             with progress_bar(Path(animation).name) as (progress, tell):
                 how: dict[str, Any] = {"sr": sr, "seed": options["seed"], "progress": progress, "say": tell}
+                how["tail_db"] = level.tail_db
                 if of_scene:
                     places_m = options["microphones"] or None
                     result = score_scene(animation, microphones=places_m, material=options["material"], **how)
@@ -83,9 +85,11 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
         except (SonicBulletError, KeyboardInterrupt) as error:
             if result is not None:
                 error.partial = result  # type: ignore[union-attr]
-            raise with_partial(error, str(to), output, *levels.values()) from error
-        report = replace(write_audio(str(to), result.sound, sr, **levels), path=output)
+            raise with_partial(error, str(to), output, level) from error
+        scale = level.options(result.sound, result.log, str(to))
+        report = replace(write_audio(str(to), result.sound, sr, **scale), path=output)
         say(summary(report, result.log))
+        told = level.say(str(to), report.gain_per_pa, report.peak_pa, result.log)
         for note in result.notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, described_render(result.log, report, result.notes))
+    write_json(json_to, described_render(result.log, report, result.notes) | {"scale": told})

@@ -18,7 +18,9 @@ from sonic_bullet.cli.output import folder_place
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
+    from sonic_bullet.cli.scene_commands import Replay
     from sonic_bullet.files import AudioReport, ContactLog
+    from sonic_bullet.scene import RenderResult
     from sonic_bullet.soundtrack.sound_events import SoundEvent
     from sonic_bullet.soundtrack.stems import Stem
 
@@ -88,20 +90,20 @@ class SoundtrackWish:
 
     def made(
         self,
-        log: ContactLog,
-        sr: int,
+        result: RenderResult | Replay,
         events_to: str | None,
         progress: Callable[[float], None],
         say: Callable[[str], None],
     ) -> Soundtrack | None:
-        """Stems and events of a log; None where nothing is asked for. Raises SonicBulletError."""
+        """Stems and events of a render, as long as it is; None where nothing is asked for. Raises SonicBulletError."""
         if self.stems is None and self.events is None and not self.cues:
             return None
         from sonic_bullet.soundtrack.sound_events import EventWitness
         from sonic_bullet.soundtrack.stems import render_stems
 
+        log, sr = result.log, result.sr
         witness = EventWitness(log) if self.events is not None or self.cues else None
-        stems = render_stems(log, sr=sr, witness=witness, progress=progress, say=say)
+        stems = render_stems(log, sr=sr, frames=result.sound.shape[1], witness=witness, progress=progress, say=say)
         events = witness.events(stems, sr) if witness is not None else ()
         return Soundtrack(self, log, sr, stems, events, events_to)
 

@@ -69,10 +69,12 @@ def score_animation(
     microphones: MicrophoneLike = MICROPHONE,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
+    tail_db: float | None = None,
 ) -> RenderResult:
     """The sound of a baked animation, its contact log, and notes a user should read.
 
-    rules: what bodies are made of, by name, the first that says something wins; material: of what moves and has none.
+    rules: what bodies are made of, by name, the first that says something wins; material: of what moves and has none;
+    tail_db: as `scene.render_scene` has it.
     Raises SonicBulletError; where it was interrupted under way, the exception carries what was scored so far as
     ``partial``.
     """
@@ -123,10 +125,16 @@ def score_animation(
         if stopped is not None:
             stopped.partial = _result(listener, notes)  # type: ignore[attr-defined]
             raise stopped
-        return _result(listener, notes)
+        return _result(listener, notes, tail_db)
 
 
-def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = None, **options: Any) -> RenderResult:
+def score_scene(
+    path: str | Path,
+    *,
+    progress: Callable[[float], None] | None = None,
+    tail_db: float | None = None,
+    **options: Any,
+) -> RenderResult:
     """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
 
     Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored;
@@ -162,7 +170,7 @@ def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = 
     try:
         with interrupts():
             log = scored_by_hand(result.log, known, moves, part(0.5, 0.8))
-            sound = render_kept(log, progress=part(0.8, 1.0))
+            sound = render_kept(log, tail_db=tail_db, progress=part(0.8, 1.0))
     except (SonicBulletError, KeyboardInterrupt) as error:
         log = getattr(error, "log", log)
         if hasattr(error, "kept") or hasattr(error, "log"):
@@ -172,8 +180,8 @@ def score_scene(path: str | Path, *, progress: Callable[[float], None] | None = 
     return RenderResult(sound, log, result.sr, (*notes, *silence_notes(sound, log)))
 
 
-def _result(listener: Listener, notes: tuple[str, ...]) -> RenderResult:
-    sound, log = listener.kept_sound(), listener.contacts
+def _result(listener: Listener, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
+    sound, log = listener.kept_sound(tail_db=tail_db), listener.contacts
     return RenderResult(sound, log, listener.sr, (*notes, *listener.notes, *silence_notes(sound, log)))
 
 

@@ -55,7 +55,6 @@ def test_cues_are_read_back_by_another_library(tmp_path: Path, subtype: str | No
     write_audio(plain, sound, 48_000, subtype=subtype)
     assert np.array_equal(read_audio(path)[0], read_audio(plain)[0])
     assert chunk_names(path)[-3:] == [b"bext", b"cue ", b"LIST"]
-    assert path.read_bytes()[8 : plain.stat().st_size] == plain.read_bytes()[8:]
 
 
 def test_a_file_over_4_gib_has_them_too(tmp_path: Path) -> None:
@@ -72,7 +71,7 @@ def test_without_places_there_is_the_time_alone(tmp_path: Path) -> None:
     write_audio(tmp_path / "x.wav", np.zeros((1, 10)), 48_000, cues=[], time_reference=48_000)
     assert chunk_names(tmp_path / "x.wav")[-1] == b"bext"
     write_audio(tmp_path / "y.wav", np.zeros((1, 10)), 48_000)
-    assert b"bext" not in chunk_names(tmp_path / "y.wav")
+    assert chunk_names(tmp_path / "y.wav")[-2:] == [b"iXML", b"bext"]
 
 
 def test_what_does_not_fit_is_cut_or_left_out() -> None:

@@ -1,0 +1,73 @@
+"""What full scale of a sound file is in pascals, as the file itself says it.
+
+    full_scale_pa -> "0 dBFS = 63.1 Pa; full_scale_pa=63.09573444801933"
+      WAV, RF64  bext description [EBU Tech 3285 v1, sec. 2.3] and iXML NOTE [iXML 3.01, <BWFXML><NOTE>]
+      others     the comment that libsndfile writes (FLAC, OGG, AIFF, CAF); films: the container's comment
+      W64        nowhere: libsndfile writes no text there, and miscounts the samples before a further chunk
+
+The number has all its digits, so that dividing by it gives back what was multiplied, to a rounding. A channel that is
+no pressure (a vibrometer) has its own unit in place of Pa, and the same number.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import struct
+from collections.abc import Iterator
+
+MOST_CHUNKS, MOST_BYTES = 1000, 1 << 16
+NUMBER = re.compile(rb"full_scale_pa=([0-9.]{1,25}(?:e[+-]?[0-9]{1,3})?)(?![0-9.e])")
+
+
+def scale_text(full_scale_pa: float) -> str:
+    """What a file says of its scale."""
+    return f"0 dBFS = {full_scale_pa:.3g} Pa; full_scale_pa={full_scale_pa!r}"
+
+
+def scale_in(text: bytes) -> float | None:
+    """The full scale in Pa that a text names; None where it names none that could be."""
+    found = NUMBER.search(text)
+    try:
+        number = float(found[1]) if found else math.nan
+    except ValueError:
+        return None
+    return number if math.isfinite(number) and number > 0 else None
+
+
+def ixml_chunk(full_scale_pa: float) -> bytes:
+    """The chunk `iXML` of a WAV or RF64."""
+    note = scale_text(full_scale_pa)
+    head = '<?xml version="1.0" encoding="UTF-8"?>'
+    body = f"{head}<BWFXML><IXML_VERSION>1.61</IXML_VERSION><NOTE>{note}</NOTE></BWFXML>".encode()
+    return b"iXML" + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
+
+
+def read_chunk_scale(fd: int) -> float | None:
+    """The full scale in Pa that chunks of an open WAV or RF64 name; None where none does, or it is another file.
+    What iXML says goes before bext. Raises OSError.
+    """
+    found: dict[bytes, float | None] = {}
+    for name, at, size in _chunks(fd):
+        if name in (b"iXML", b"bext"):
+            found.setdefault(name, scale_in(os.pread(fd, min(size, MOST_BYTES), at)))
+    return found.get(b"iXML") or found.get(b"bext")
+
+
+def _chunks(fd: int) -> Iterator[tuple[bytes, int, int]]:
+    """Name, place and bytes of each chunk of a RIFF or RF64."""
+    head, end = os.pread(fd, 12, 0), os.fstat(fd).st_size
+    if head[:4] not in (b"RIFF", b"RF64") or head[8:] != b"WAVE":
+        return
+    at, long = 12, 0
+    for _ in range(MOST_CHUNKS):
+        one = os.pread(fd, 8, at)
+        if len(one) < 8 or at >= end:
+            return
+        size = struct.unpack("<I", one[4:])[0]
+        if one[:4] == b"ds64":  # where sizes of 32 bits do not suffice [EBU Tech 3306, sec. 3.5]
+            long = int.from_bytes(os.pread(fd, 8, at + 16), "little")
+        size = long if one[:4] == b"data" and size == 2**32 - 1 else size
+        yield one[:4], at + 8, size
+        at += 8 + size + size % 2

@@ -1,0 +1,95 @@
+"""What still sounds after a run's last step: the same run time, without physics.
+
+    state at the end -> steps in which nobody moves or touches -> blocks -> until each channel is tail_db below its peak
+
+Bodies lie where the last step left them, and their poles are those that they had there: who stood on something is
+damped as before. Nobody is struck or rubbed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.errors import AudioError
+from sonic_bullet.synth.strikes import LOOKAHEAD
+
+if TYPE_CHECKING:
+    from sonic_bullet.render.synthesis_state import Setup, State
+
+TAIL_DB = -60.0
+"""Where a tail ends unless something else is asked for: the fall of level that reverberation times are told for
+[ISO 3382-1:2009, sec. 3.2]."""
+MOST_S = 10.0
+BLOCK_S = 0.1
+"""What is looked at once: longer than beats of neighbouring modes that a listener hears as one decay."""
+STEP_S = 1 / 240
+"""Steps of a tail are no shorter: nothing happens in them."""
+
+
+def as_tail_db(tail_db: object) -> float | None:
+    """A tail's end in dB re the peak, below 0; None and 0: no tail. Raises AudioError."""
+    if tail_db is None:
+        return None
+    remedy = "give dB below the peak, -60 say, or 0 for none"
+    return as_number(tail_db, "tail_db", remedy, least=-200, most=0, error=AudioError) or None
+
+
+def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
+    """Blocks (channels, n) of what sounds after the end of ``last``, the newest step taken in, for ever. ``state``
+    stays.
+    """
+    from sonic_bullet.render.synthesizer import advance
+
+    state = state.copy()
+    state.witness = None
+    still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
+    advance(setup, state, [still] * LOOKAHEAD)  # up to the end of ``last``, which others have
+    state.credit_s = np.zeros(0)  # no new poles
+    state.changed()
+    step = replace(still, dt_s=max(still.dt_s, STEP_S))
+    while True:
+        yield advance(setup, state, [step] * max(1, round(BLOCK_S / step.dt_s)))
+
+
+def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, tail_db: float) -> KeptSound:
+    """The sound up to the end of ``last`` and what still sounds, until each channel is tail_db below its peak; at most
+    `MOST_S` longer.
+    """
+    if last is None or not len(setup.sensors):
+        return sound
+    travel_s = max(
+        (float(np.linalg.norm(last.position_m - m, axis=1).max(initial=0.0)) for m in setup.microphone_m), default=0.0
+    )
+    quiet_s = BLOCK_S + travel_s / setup.air.sound_speed_m_s
+    weakest, peak = 10 ** (tail_db / 20), sound.peaks()
+    frames = sound.shape[1]
+    loud = bool((_peak(sound.read(max(0, frames - math.ceil(BLOCK_S * setup.sr)), frames)) > weakest * peak).any())
+    kept: list[Array] = []
+    waiting: list[Array] = []
+    room, silent = round(MOST_S * setup.sr), 0
+    for made in ring_on(setup, state, last):
+        block = made[:, :room]
+        now = _peak(block)
+        room, peak = room - block.shape[1], np.maximum(peak, now)
+        waiting.append(block)
+        silent += block.shape[1]
+        if (now > weakest * peak).any():
+            kept, waiting, silent, loud = [*kept, *waiting], [], 0, True
+        if not room or silent >= quiet_s * setup.sr:
+            break
+    kept += waiting[:1] if loud else []
+    return KeptSound(sound.spool, sound.count, np.concatenate([sound.rest, *kept], axis=1))
+
+
+def _peak(block: Array) -> Array:
+    """(channels,) of (channels, n)."""
+    return np.asarray(np.abs(block).max(axis=1, initial=0.0))
