@@ -74,7 +74,8 @@ class CaseFit:
     amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was
     taken from the guess. warnings: one line each. log_spectral_db: distance of recording and synthesis (distance.py),
     mean over the fitted strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with.
-    evidence: what was recorded of each object, those without a mesh included.
+    evidence: what was recorded of each object, those
+    without a mesh included. takes: how far the prediction of each take is, of those held out where there are any.
     """
 
     case: Case
@@ -92,3 +93,10 @@ class CaseFit:
     log_spectral_db: float = -1.0
     radiation: RadiationIn = "damping"
     evidence: tuple[RecordedObject, ...] = ()
+    takes: tuple[TakeDistance, ...] = ()
+
+    @property
+    def worse_than_silence(self) -> bool:
+        """Whether what is played is on average at least as far from the takes as silence is."""
+        known = [t for t in self.takes if np.isfinite(t.predicted_db) and np.isfinite(t.silence_db)]
+        return bool(known) and sum(t.predicted_db - t.silence_db for t in known) >= 0

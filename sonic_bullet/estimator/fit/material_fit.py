@@ -24,6 +24,7 @@ from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assi
 from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
+from sonic_bullet.estimator.fit.unheard_takes import judged_by_takes
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
@@ -49,7 +50,7 @@ def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], 
     in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
-    return fit_evidence(case, evidence, cache=cache, progress=progress)
+    return judged_by_takes(fit_evidence(case, evidence, cache=cache, progress=progress), progress)
 
 
 def fit_evidence(

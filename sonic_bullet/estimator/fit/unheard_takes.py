@@ -12,7 +12,7 @@ noise's power added, silence with that alone. A prediction farther than silence 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +36,7 @@ from sonic_bullet.records.errors import SonicBulletError
 if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.case_fit import CaseFit
 
+WORSE_THAN_SILENCE = "worse-than-silence"
 GAIN_REACH_DB = 40.0
 """The best gain is looked for this far about equal energy."""
 
@@ -66,6 +67,27 @@ def typical_strike(lines: Lines) -> TypicalStrike:
     phase = np.exp(1j * np.angle(lines.amplitude[nearest]))
     spread = off.std(axis=0, ddof=1) if len(db) > 1 else np.zeros(db.shape[1])
     return TypicalStrike(10 ** ((middle + level.mean()) / 20) * phase, spread)
+
+
+def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
+    """The fit with the distances of the takes held out, or of its own where none is; and with the verdict that it is
+    worse than silence where it is.
+
+    Raises SonicBulletError.
+    """
+    takes = take_distances(found, split="holdout", progress=progress) or take_distances(
+        found, split="fit", progress=progress
+    )
+    judged = replace(found, takes=takes)
+    if not judged.worse_than_silence:
+        return judged
+    predicted = float(np.nanmean([t.predicted_db for t in takes]))
+    silent = float(np.nanmean([t.silence_db for t in takes]))
+    verdict = (
+        f"{WORSE_THAN_SILENCE}: what is fitted is {predicted:.1f} dB from the takes, silence {silent:.1f} dB; "
+        f"{found.fit.verdict}"
+    )
+    return replace(judged, fit=replace(found.fit, verdict=verdict))
 
 
 def take_distances(

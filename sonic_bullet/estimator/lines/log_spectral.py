@@ -124,9 +124,7 @@ def power_spectra(sound: Array, windows: tuple[int, ...] = WINDOWS) -> tuple[Arr
 
 def noise_spectra(floor: Floor, like: tuple[Array, ...]) -> tuple[Array, ...]:
     """Mean powers (1, bins) of the noise under the windows of spectra ``like``."""
-    return tuple(
-        floor.at(power.shape[1])[None] * (np.hanning(2 * (power.shape[1] - 1)) ** 2).sum() for power in like
-    )
+    return tuple(floor.at(power.shape[1])[None] * (np.hanning(2 * (power.shape[1] - 1)) ** 2).sum() for power in like)
 
 
 def spectra_distance_db(a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = ABOVE) -> float:
@@ -140,6 +138,24 @@ def spectra_distance_db(a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor
             off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
             (found if observed.sum() >= FEWEST_CELLS else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
+
+
+def matching_gain(recorded: Array, made: Array, floor: Floor) -> float:
+    """The gain of a sound (n,) by which its level is that of a recording (n,) on average: in dB, over cells in which
+    both stand above the noise; by energy where there are none.
+    """
+    both = power_spectra(recorded), power_spectra(made)
+    gain = np.sqrt(float((recorded**2).sum()) / max(float((made**2).sum()), 1e-300))
+    for _ in range(3):  # which cells count goes with the gain
+        off = [
+            10 * np.log10(a[seen] / (gain**2 * b[seen]))
+            for a, b, cell in zip(*both, noise_spectra(floor, both[0]), strict=True)
+            if (seen := (a > ABOVE * cell) & (gain**2 * b > cell)).any()
+        ]
+        if not off:
+            break
+        gain *= 10 ** (float(np.mean([x.mean() for x in off])) / 20)
+    return float(gain)
 
 
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
