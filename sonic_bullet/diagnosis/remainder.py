@@ -31,8 +31,8 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     """Of the last hypothesis; empty where the verdict leaves nothing open or there is no audio."""
     if isinstance(end, WorseThanSilence):
         words = (
-            f"what was fitted is {end.before_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: no effect "
-            "was sought"
+            f"what was fitted is {end.before_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
+            "no effect was sought"
         )
         return {"left_db": None, "words": words}
     if isinstance(end, NothingCompared):

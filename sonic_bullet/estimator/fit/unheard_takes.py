@@ -158,7 +158,7 @@ def _distance(
     power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, gain: float, *, noisy: bool = True
 ) -> float:
     """D of a take's power spectra and those of a sound at a gain, with the noise's power added where it has none."""
-    noise = noise_spectra(floor, power) if noisy else tuple(0.0 for _ in power)
+    noise = noise_spectra(floor, power) if noisy else tuple(np.zeros(1) for _ in power)
     both = []
     for p, m, cell in zip(power, made, noise, strict=False):
         count = min(len(p), len(m))
