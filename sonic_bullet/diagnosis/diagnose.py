@@ -163,9 +163,9 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
             if r.split != split or r.file is None or not r.file.is_file() or not takes:
                 continue
             sample, sr = read_audio(r.file)
-            heard = until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)
-            start = round(case.onset_s * sr) if case.onset_s is not None else onset_sample(heard, sr)
-            found.append(Take(body, i, heard[start:], sr, takes[0].floor))
+            sound = until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)
+            start = round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr)
+            found.append(Take(body, i, sound[start:], sr, takes[0].floor))
     return tuple(found)
 
 

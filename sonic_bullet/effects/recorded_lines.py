@@ -24,7 +24,6 @@ from sonic_bullet.records.errors import RecordError
 
 SOUND_SPEED_M_S = 343.0
 MOST_LINES = 512
-FIELDS = ("freq_hz", "decay_per_s", "amplitude", "spread_db")
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class RecordedLines:
     spread_db: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        fields = {name: getattr(self, name) for name in FIELDS}
+        fields = self._columns()
         same_length(**fields)
         for name, values in fields.items():
             finite(name, *values, least=0.0)
@@ -85,7 +84,15 @@ class RecordedLines:
 
     def parameters(self) -> dict[str, Any]:
         """What it says, for people and JSON, in SI units."""
-        return {name: list(getattr(self, name)) for name in FIELDS}
+        return {name: list(values) for name, values in self._columns().items()}
+
+    def _columns(self) -> dict[str, tuple[float, ...]]:
+        return {
+            "freq_hz": self.freq_hz,
+            "decay_per_s": self.decay_per_s,
+            "amplitude": self.amplitude,
+            "spread_db": self.spread_db,
+        }
 
     def freedom(self) -> int:
         return 3 * len(self.freq_hz)

@@ -7,7 +7,7 @@ import numpy as np
 from sonic_bullet.effects.presets_of_effects import stored
 from sonic_bullet.effects.recorded_lines import MOST_LINES, RecordedLines
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.unheard_takes import typical_strike
+from sonic_bullet.estimator.fit.held_out_takes import typical_strike
 from sonic_bullet.presets import (
     DAMPING_TAKEN,
     FORMAT,

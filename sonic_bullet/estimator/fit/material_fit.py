@@ -19,12 +19,12 @@ import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.fit_verdict import finished
+from sonic_bullet.estimator.fit.held_out_takes import judged_by_takes
 from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
 from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
 from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
-from sonic_bullet.estimator.fit.unheard_takes import judged_by_takes
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
