@@ -1,10 +1,15 @@
-"""`diagnose`: a case to what its model lacks."""
+"""`diagnose`: a case to what its model lacks.
+
+Exit 0: a verdict; 1: a result that says no, as the baseline is farther from the recordings than silence.
+"""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 from typing import Any
+
+import click
 
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, warn, write_json
 from sonic_bullet.files.cases import read_case
@@ -47,6 +52,8 @@ def run_diagnose(
             say(f"{written} strikes predicted in {predict}")
     warn(found.warnings)
     write_json(json_to, described(found))
+    if found.verdict == "worse-than-silence":
+        raise click.exceptions.Exit(1)
 
 
 def _predicted(found: Any, folder: str) -> int:
@@ -81,9 +88,10 @@ def _summary(found: Any) -> str:
         "none": "the model suffices: no effect is accepted",
         "explained": "the model lacks",
         "unexplained": "something is left that no known effect explains",
+        "worse-than-silence": "what was fitted is farther from the recordings than silence: no effect was sought",
         "nothing": NOTHING,
     }
-    nothing = isinstance(found.closed, NothingCompared)
+    nothing = type(found.closed) is NothingCompared
     text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
     for c in found.closed.added:
         numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())

@@ -43,7 +43,7 @@ Examples:
   sonic-bullet diagnose my_case/
   sonic-bullet diagnose my_case/ --json verdict.json --predict predicted/ --report page.html
   sonic-bullet diagnose my_case/ -o preset.json   (what belongs to material and object sounds in every scene)
-A verdict is none, explained or unexplained."""
+A verdict is none, explained, unexplained or worse-than-silence (exit 1)."""
 
 CASE_EPILOG = """\b
 Examples:

@@ -1,10 +1,14 @@
-"""`fit`: a recorded strike, or a case of them, to a preset."""
+"""`fit`: a recorded strike, or a case of them, to a preset.
+
+Exit 0: fitted; 1: a result that says no, as what is fitted is farther from the takes than silence; 2: as ever.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
@@ -54,6 +58,8 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
         say(_summary(found))
     warn(found.warnings)
     write_json(json_to, described(found))
+    if found.worse_than_silence:
+        raise click.exceptions.Exit(1)
 
 
 def as_case(source: str, one: dict[str, Any]) -> Case:
@@ -138,11 +144,49 @@ def described(found: Any) -> dict[str, Any]:
         "verdict": fit.verdict,
         "metric": fit.metric if fit.metric >= 0 else None,
         "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
+        "takes": [
+            {
+                "file": t.file,
+                "split": t.split,
+                "predicted_db": _number(t.predicted_db),
+                "silence_db": _number(t.silence_db),
+                "other_take_db": _number(t.other_take_db),
+                "free_gain": t.free_gain,
+            }
+            for t in found.takes
+        ],
         "modes": [
             {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
             for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
         ],
     }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _takes(found: Any) -> list[str]:
+    """How far the prediction of each take is, in a table; nothing where no take could be compared."""
+    if not found.takes:
+        return []
+
+    def shown(value: float) -> str:
+        return f"{value:.1f} dB" if np.isfinite(value) else "-"
+
+    held = all(t.split == "holdout" for t in found.takes)
+    head = "takes that were not fitted" if held else "takes, as none is held out"
+    rows = [
+        (
+            t.file,
+            shown(t.predicted_db),
+            shown(t.silence_db),
+            shown(t.other_take_db),
+            "fitted" if t.free_gain else "known",
+        )
+        for t in found.takes
+    ]
+    return [table((head, "predicted", "silence", "nearest other take", "gain"), rows)]
 
 
 def _summary(found: Any) -> str:
@@ -184,4 +228,5 @@ def _summary(found: Any) -> str:
         )
     if found.log_spectral_db >= 0:
         text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
+    text += _takes(found)
     return "\n".join(text)

@@ -117,6 +117,8 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
     said = [f"{len(one)} of split '{split}' could not be compared: {listing(one)}" for split, one in out.items()]
     if isinstance(end, NothingCompared):
         return said
+    if not any(r.position_m is not None for take in end.judged for r in take.body.recordings):
+        said.append("no strike is placed: modes are the recorded lines, as loud as on average; give strike.position")
     if len(end.judged) == 1:
         said.append("one strike alone: nothing can be left out, so no effect can be named; record more strikes")
     if end.mesh_off:
@@ -161,12 +163,9 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
             if r.split != split or r.file is None or not r.file.is_file() or not takes:
                 continue
             sample, sr = read_audio(r.file)
-            start = onset_of(case, bodies, sr)
-            found.append(
-                Take(
-                    body, i, until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)[start:], sr, takes[0].floor
-                )
-            )
+            sound = until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)
+            start = round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr)
+            found.append(Take(body, i, sound[start:], sr, takes[0].floor))
     return tuple(found)
 
 

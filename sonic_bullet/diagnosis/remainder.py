@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import LeftOut, Take, predict_takes
 from sonic_bullet.diagnosis.selection.band_levels import in_words
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
-from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, WorseThanSilence
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
@@ -29,6 +29,12 @@ NOTHING = "nothing could be compared"
 
 def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str, Any]:
     """Of the last hypothesis; empty where the verdict leaves nothing open or there is no audio."""
+    if isinstance(end, WorseThanSilence):
+        words = (
+            f"what was fitted is {end.before_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
+            "no effect was sought"
+        )
+        return {"left_db": None, "words": words}
     if isinstance(end, NothingCompared):
         return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
     judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, Take)}

@@ -17,10 +17,11 @@ from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
+from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import RecordError
 
-KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping)
+KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping, RecordedLines)
 """Effects that a preset may hold.
 
 A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own.

@@ -196,12 +196,13 @@ class Elements:
         """
         most = MOST_UNKNOWNS[self.thin]
         least = (self._unknowns / most) ** (1 / self._growth)
-        if self.at_size is None or len(self.clamp) or least * ALIKE > 1:
+        if self.at_size is None or len(self.clamp):
             return None
-        made = self._of_size(self.edge_m * max(FINER, least)).within(most)
-        if made._unknowns > OVER * most or made._smaller_than(self) < ALIKE:
-            return None
-        return replace(made, coarser=self)
+        if least * ALIKE <= 1:
+            made = self._of_size(self.edge_m * max(FINER, least)).within(most)
+            if made._unknowns <= OVER * most and made._smaller_than(self) >= ALIKE:
+                return replace(made, coarser=self)
+        return replace(self, degree=2, coarser=None, known={}).finer() if self.degree == 3 else None
 
     def _smaller_than(self, other: Elements) -> float:
         """How many times smaller its elements are."""

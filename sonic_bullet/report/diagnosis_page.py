@@ -35,6 +35,7 @@ WORDS = {
     "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
     "explained": "The model lacks something, and what it lacks has a name.",
     "unexplained": "Something is left that none of the known effects accounts for.",
+    "worse-than-silence": "What was fitted is farther from the recordings than silence, so no effect was sought.",
     "nothing": "Nothing could be compared, so nothing is known of what the model lacks.",
 }
 
@@ -51,7 +52,7 @@ def page(d: Diagnosis) -> str:
     parts = [
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{name}</title><style>{STYLE}</style>",
         f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. "
-        f"{WORDS['nothing' if isinstance(d.closed, NothingCompared) else d.verdict]}</p>",
+        f"{WORDS['nothing' if type(d.closed) is NothingCompared else d.verdict]}</p>",
         _effects(d),
         _errors(d),
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",

@@ -142,7 +142,7 @@ def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Call
     found = fit_evidence(case, recorded, total=True, progress=progress)
     bodies = (
         struck_bodies(found, cache=cache, progress=progress)
-        if found.objects
+        if found.objects and any(r.position_m is not None for g in recorded for r in g.recordings)
         else tuple(shapeless(found, g) for g in recorded)
     )
     bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)

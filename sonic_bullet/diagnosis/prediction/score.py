@@ -21,7 +21,15 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
-from sonic_bullet.estimator.lines.log_spectral import ABOVE, WINDOWS, Floor, log_spectral_db, noise_floor_db, with_noise
+from sonic_bullet.estimator.lines.log_spectral import (
+    ABOVE,
+    WINDOWS,
+    Floor,
+    log_spectral_db,
+    matching_gain,
+    noise_floor_db,
+    with_noise,
+)
 from sonic_bullet.records import Array
 
 # rms of two noisy takes of a cell with power over noise ABOVE: each is off by 20/ln 10/√(2 ABOVE)
@@ -170,7 +178,16 @@ class Take:
         return _stated(self._apart(made)) if np.isfinite(made).all() else np.inf
 
     def _apart(self, made: Array) -> float:
-        return log_spectral_db(self.sample, with_noise(made, self.floor, self.strike), self.floor)
+        noisy = with_noise(self._gain(made) * made, self.floor, self.strike)
+        return log_spectral_db(self.sample, noisy, self.floor)
+
+    def _gain(self, made: Array) -> float:
+        """1 where the strike's impulse is known; else that which makes the mean level of both the same, in dB over
+        what stands above the noise: near the one of least D.
+        """
+        if np.isfinite(self.body.impulse_n_s[self.strike]) or not made.any():
+            return 1.0
+        return matching_gain(self.sample, made, self.floor)
 
     def least(self, p: Prediction) -> float:
         """D of two noisy takes of what is predicted."""

@@ -214,7 +214,7 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
     rms over all.
     """
     lines = recorded.lines
-    mine = tuple(r for r in found.case.recordings if r.object == recorded.thing.name)
+    mine = tuple(r for r in found.case.recordings if r.object == recorded.recordings[0].object)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
     weight = amplitude_per_impulse(recorded)
     shape = np.zeros((len(mine) + 1, 3, len(lines.freq_hz)), np.float32)

@@ -14,13 +14,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
-from sonic_bullet.diagnosis.prediction.score import Comparable, Incomparable, Judged, LeftOut, Score, comparable
+from sonic_bullet.diagnosis.prediction.score import Comparable, Incomparable, Judged, LeftOut, Score, Take, comparable
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
@@ -75,6 +77,17 @@ class NothingCompared:
         return self.before
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class WorseThanSilence(NothingCompared):
+    """A selection that never began, as the baseline is at least as far from the recordings as silence is: what an
+    effect brings nearer to them from there says nothing of them.
+    """
+
+    before_db: float
+    silence_db: float
+    verdict: ClassVar[str] = "worse-than-silence"
+
+
 def closed(
     base: Hypothesis,
     bodies: tuple[Struck, ...],
@@ -91,6 +104,12 @@ def closed(
     found = comparable(takes, made)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
+    recorded = [take for take in found.takes if isinstance(take, Take)]
+    if recorded:
+        before = float(np.mean([take.distance(made[take.body]) for take in recorded]))
+        silence = float(np.mean([take.apart_db(np.zeros(len(take.sample))) for take in recorded]))
+        if before >= silence:
+            return WorseThanSilence(start, found.left_out, before, silence)
     problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent)
     return _closed(start, made, problem, found.left_out)
 

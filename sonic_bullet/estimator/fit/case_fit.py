@@ -50,6 +50,22 @@ class ObjectFit:
         return np.asarray(self.freq_hz / self.model_hz - 1)
 
 
+@dataclass(frozen=True, slots=True)
+class TakeDistance:
+    """One take's log-spectral distances in dB: of the fit's prediction, of silence, of the nearest other take; NaN
+    where nothing of it stands above its noise, or where there is no other take.
+
+    free_gain: whether the prediction's gain was fitted to this take, its impulse or place being unknown.
+    """
+
+    file: str
+    split: str
+    predicted_db: float
+    silence_db: float
+    other_take_db: float
+    free_gain: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CaseFit:
     """A fit and what it rests on. youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the
@@ -58,6 +74,8 @@ class CaseFit:
     amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was
     taken from the guess. warnings: one line each. log_spectral_db: distance of recording and synthesis (distance.py),
     mean over the fitted strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with.
+    evidence: what was recorded of each object, those
+    without a mesh included. takes: how far the prediction of each take is, of those held out where there are any.
     """
 
     case: Case
@@ -74,3 +92,11 @@ class CaseFit:
     warnings: tuple[str, ...]
     log_spectral_db: float = -1.0
     radiation: RadiationIn = "damping"
+    evidence: tuple[RecordedObject, ...] = ()
+    takes: tuple[TakeDistance, ...] = ()
+
+    @property
+    def worse_than_silence(self) -> bool:
+        """Whether what is played is on average at least as far from the takes as silence is."""
+        known = [t for t in self.takes if np.isfinite(t.predicted_db) and np.isfinite(t.silence_db)]
+        return bool(known) and sum(t.predicted_db - t.silence_db for t in known) >= 0

@@ -98,6 +98,7 @@ def finished(
         tuple(warnings),
         decibels,
         radiation,
+        evidence,
     )
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.effects.presets_of_effects import stored
+from sonic_bullet.effects.recorded_lines import MOST_LINES, RecordedLines
 from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.held_out_takes import typical_strike
 from sonic_bullet.presets import (
     DAMPING_TAKEN,
     FORMAT,
@@ -28,13 +31,33 @@ def spreads(found: CaseFit) -> dict[str, float | None]:
     return {name: float(s * v) if np.isfinite(s) else None for name, s, v in zip(NAMES, sd, value, strict=True)}
 
 
+def recorded_lines(found: CaseFit) -> RecordedLines | None:
+    """The lines of an object as they were struck on average, where no line is known to be a mode of a shape; None
+    where the modes of a mesh say more, or where there is no line.
+    """
+    if found.objects and np.isfinite(found.fit.covariance[2, 2]):
+        return None
+    lines = max((e.lines for e in found.evidence), key=lambda e: len(e.freq_hz), default=None)
+    if lines is None or not len(lines.freq_hz):
+        return None
+    typical = typical_strike(lines)
+    size = np.abs(typical.amplitude)
+    keep = np.flatnonzero((np.nan_to_num(lines.decay_per_s) > 0) & (size > 0))
+    keep = keep[np.argsort(-(size[keep] ** 2 / lines.decay_per_s[keep]), kind="stable")[:MOST_LINES]]
+    keep = keep[np.argsort(lines.freq_hz[keep], kind="stable")]
+    if not len(keep):
+        return None
+    columns = lines.freq_hz, lines.decay_per_s, size, typical.spread_db
+    return RecordedLines(*(tuple(float(f"{x:.7g}") for x in column[keep]) for column in columns))
+
+
 def preset_of(found: CaseFit) -> Preset:
     """The preset of a fit.
 
     Surface and impact are no part of what modes tell: they are the guess's, or steel's for a guess without a name.
     """
     fit = found.fit
-    guess = found.case.objects[found.objects[0].evidence.thing.name].material if found.objects else None
+    guess = found.evidence[0].thing.material if found.evidence else None
     sd = np.diag(fit.covariance)
     youngs, poisson, assumed = found.youngs_pa, fit.poisson_ratio, found.assumed
     if np.isnan(sd[2]) and found.objects:  # what the fit does not tell must not sound as if it did
@@ -50,6 +73,10 @@ def preset_of(found: CaseFit) -> Preset:
             base.includes_radiation,
             (*assumed, f"{DAMPING_TAKEN}{base.name}')"),
         )
+    lines = recorded_lines(found)
+    if lines is not None:
+        assumed = (*assumed, "level (that of the body that plays the lines: the recordings' gain is not known)")
+        total = True
     source = f"fitted: {found.case.name}"
     taken = f"taken from '{base.name}'"
     used = {o.evidence.thing.name: o for o in found.objects}
@@ -64,6 +91,7 @@ def preset_of(found: CaseFit) -> Preset:
         damping=Damping(alpha_per_s=alpha, beta_s=beta, includes_radiation=total, source=source),
         surface=Surface(roughness_m=base.roughness_m, hurst=base.hurst, source=taken),
         impact=Restitution(restitution=base.restitution, source=taken),
+        effects=() if lines is None else (stored(lines),),
         provenance=Provenance(
             method="modes paired with damped sinusoids of maximum likelihood; least squares",
             recordings=tuple(recordings),

@@ -19,6 +19,7 @@ import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.fit_verdict import finished
+from sonic_bullet.estimator.fit.held_out_takes import judged_by_takes
 from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
 from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
 from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
@@ -49,7 +50,7 @@ def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], 
     in the verdict instead.
     """
     evidence = gather(case, cache=cache, progress=progress)
-    return fit_evidence(case, evidence, cache=cache, progress=progress)
+    return judged_by_takes(fit_evidence(case, evidence, cache=cache, progress=progress), progress)
 
 
 def fit_evidence(

@@ -196,6 +196,12 @@ def observed(
     return observation(body, guess.density_kg_m3, case.sensor, _strikes(recordings), at, along)
 
 
+def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]) -> tuple[list[Array], int]:
+    """Each take (n,) of an object from its onset to its own end, and their rate. Raises FileError, AudioError."""
+    found = [_sounds(case, thing, (r,), True) for r in recordings]
+    return [signals[0] for signals, _, _ in found], found[0][1]
+
+
 def _sounds(
     case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool
 ) -> tuple[Array, int, list[str]]:

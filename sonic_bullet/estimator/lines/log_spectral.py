@@ -114,22 +114,48 @@ def log_spectral_db(
     FEWEST_CELLS cells speak, or, where none has so many, all: of fewer, one in which noise happens to cancel a sound
     says more than all others.
     """
+    return spectra_distance_db(power_spectra(a, windows), power_spectra(b, windows), floor, above=above)
+
+
+def power_spectra(sound: Array, windows: tuple[int, ...] = WINDOWS) -> tuple[Array, ...]:
+    """Powers (frames, bins) of a sound (n,) under each window that fits into it."""
+    return tuple(_power(sound, window) for window in windows if window <= len(sound))
+
+
+def noise_spectra(floor: Floor, like: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Mean powers (1, bins) of the noise under the windows of spectra ``like``."""
+    return tuple(floor.at(power.shape[1])[None] * (np.hanning(2 * (power.shape[1] - 1)) ** 2).sum() for power in like)
+
+
+def spectra_distance_db(a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = ABOVE) -> float:
+    """Distance D of two sounds by their powers, as `log_spectral_db`."""
     found: list[float] = []
     few: list[float] = []
-    for window in windows:
-        if window > len(a):
-            continue
-        power_a, power_b, cell = (
-            _power(a, window),
-            _power(b, window),
-            floor.at(window // 2 + 1) * (np.hanning(window) ** 2).sum(),
-        )
+    for power_a, power_b, cell in zip(a, b, noise_spectra(floor, a), strict=True):
         observed = (power_a + power_b) / 2 > above * cell
         if observed.any():
             tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
             off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
             (found if observed.sum() >= FEWEST_CELLS else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
+
+
+def matching_gain(recorded: Array, made: Array, floor: Floor) -> float:
+    """The gain of a sound (n,) by which its level is that of a recording (n,) on average: in dB, over cells in which
+    both stand above the noise; by energy where there are none.
+    """
+    both = power_spectra(recorded), power_spectra(made)
+    gain = np.sqrt(float((recorded**2).sum()) / max(float((made**2).sum()), 1e-300))
+    for _ in range(3):  # which cells count goes with the gain
+        off = [
+            10 * np.log10(a[seen] / (gain**2 * b[seen]))
+            for a, b, cell in zip(*both, noise_spectra(floor, both[0]), strict=True)
+            if (seen := (a > ABOVE * cell) & (gain**2 * b > cell)).any()
+        ]
+        if not off:
+            break
+        gain *= 10 ** (float(np.mean([x.mean() for x in off])) / 20)
+    return float(gain)
 
 
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:

@@ -1,0 +1,197 @@
+"""Takes held against the fit: how far its prediction of each is, beside silence and beside another take.
+
+    take r, from its onset            ──┐
+    placed modes, or typical lines p  ──┴─► D(r, g·p)     g: of least D, where the impulse is not known
+    nothing                           ────► D(r, 0)
+    the fit's own takes t             ────► min over t and g of D(r, g·t)
+
+D: log_spectral.py, over what stands above the recording's noise, in the case's band. A prediction enters with the
+noise's power added, silence with that alone. A prediction farther than silence is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from sonic_bullet.estimator.fit.case_fit import TakeDistance
+from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_sound
+from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
+from sonic_bullet.estimator.lines.joint_lines import Lines
+from sonic_bullet.estimator.lines.log_spectral import (
+    Floor,
+    floor_between,
+    noise_spectra,
+    power_spectra,
+    spectra_distance_db,
+)
+from sonic_bullet.files.cases import CaseRecording
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SonicBulletError
+
+if TYPE_CHECKING:
+    from sonic_bullet.estimator.fit.case_fit import CaseFit
+
+WORSE_THAN_SILENCE = "worse-than-silence"
+GAIN_REACH_DB = 40.0
+"""The best gain is looked for this far about equal energy."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TypicalStrike:
+    """What a strike of unknown place leaves of each line. amplitude (k,) complex, in the recordings' units at the mean
+    level of the takes; spread_db (k,): standard deviation over takes about it, 0 where there is one take.
+    """
+
+    amplitude: Array
+    spread_db: Array
+
+
+def typical_strike(lines: Lines) -> TypicalStrike:
+    """Amplitudes of the lines in the middle of the takes.
+
+    Magnitudes are geometric means of takes brought to one level, as D and ears count decibels. Phases are those of
+    the take whose magnitudes are nearest to the means: lines that overlap keep the phases in which they were recorded.
+    """
+    size = np.maximum(np.abs(lines.amplitude), np.nan_to_num(lines.amplitude_sd) + 1e-300)
+    db = 20 * np.log10(size)
+    weight = np.broadcast_to(np.maximum(np.nan_to_num(lines.energy), 1e-300) ** 0.5, db.shape)
+    level = np.average(db, axis=1, weights=weight)[:, None]
+    middle = (db - level).mean(axis=0)
+    off = db - level - middle
+    nearest = int(np.argmin(np.average(off**2, axis=1, weights=weight)))
+    phase = np.exp(1j * np.angle(lines.amplitude[nearest]))
+    spread = off.std(axis=0, ddof=1) if len(db) > 1 else np.zeros(db.shape[1])
+    return TypicalStrike(10 ** ((middle + level.mean()) / 20) * phase, spread)
+
+
+def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
+    """The fit with the distances of the takes held out, or of its own where none is; and with the verdict that it is
+    worse than silence where it is.
+
+    Raises SonicBulletError.
+    """
+    takes = take_distances(found, split="holdout", progress=progress) or take_distances(
+        found, split="fit", progress=progress
+    )
+    judged = replace(found, takes=takes)
+    if not judged.worse_than_silence:
+        return judged
+    predicted = float(np.nanmean([t.predicted_db for t in takes]))
+    silent = float(np.nanmean([t.silence_db for t in takes]))
+    verdict = (
+        f"{WORSE_THAN_SILENCE}: what is fitted is {predicted:.1f} dB from the takes, silence {silent:.1f} dB; "
+        f"{found.fit.verdict}"
+    )
+    return replace(judged, fit=replace(found.fit, verdict=verdict))
+
+
+def take_distances(
+    found: CaseFit, *, split: str = "holdout", progress: Callable[[str], None] | None = None
+) -> tuple[TakeDistance, ...]:
+    """Distances of all takes of a split that have audio, of objects that were fitted.
+
+    Raises SonicBulletError where a file cannot be read.
+    """
+    rows: list[TakeDistance] = []
+    for e in found.evidence:
+        mine = tuple(
+            r
+            for r in found.case.recordings
+            if r.object == e.recordings[0].object and r.split == split and r.file is not None and r.file.is_file()
+        )
+        if not mine or e.signals is None:
+            continue
+        if progress is not None:
+            progress(f"predicting {len(mine)} takes of {e.thing.name}")
+        signals, sr = recorded_signals(found.case, e.thing, mine)
+        takes = [power_spectra(take) for take in in_band(e.signals, e.sr, found.case.band_hz)] if sr == e.sr else []
+        for recording, signal in zip(mine, signals, strict=True):
+            others = [t for t, r in zip(takes, e.recordings, strict=False) if r != recording]
+            rows.append(_distances(found, e, recording, in_band(signal, sr, found.case.band_hz), sr, others))
+    return tuple(rows)
+
+
+def _distances(
+    found: CaseFit,
+    e: RecordedObject,
+    recording: CaseRecording,
+    signal: Array,
+    sr: int,
+    others: list[tuple[Array, ...]],
+) -> TakeDistance:
+    floor, power = floor_between([signal]), power_spectra(signal)
+    made, free = predicted_take(found, e, recording, len(signal), sr)
+    modelled = power_spectra(made)
+    nearest = [_distance_at_best_gain(power, other, floor, noisy=False) for other in others]
+    return TakeDistance(
+        recording.file.name if recording.file is not None else "",
+        recording.split,
+        _distance_at_best_gain(power, modelled, floor) if free else _distance(power, modelled, floor, 1.0),
+        _distance(power, modelled, floor, 0.0),
+        float(np.nanmin(nearest)) if np.isfinite(nearest).any() else float("nan"),
+        free,
+    )
+
+
+def predicted_take(found: CaseFit, e: RecordedObject, recording: CaseRecording, n: int, sr: int) -> tuple[Array, bool]:
+    """Sound (n,) of a take by the fit, and whether its gain is free.
+
+    A strike of known place on a mesh is played by its modes; any other by the lines as they were struck on average.
+    """
+    if e.family is not None and recording.position_m is not None and np.isfinite(found.gain_sd):
+        try:
+            return strike_sound(found, recording, n, sr), recording.impulse_n_s is None
+        except SonicBulletError:
+            pass
+    lines = e.lines
+    if not len(lines.freq_hz):
+        return np.zeros(n), True
+    return damped_sum(lines.freq_hz, np.nan_to_num(lines.decay_per_s), typical_strike(lines).amplitude, n, sr), True
+
+
+def _distance(
+    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, gain: float, *, noisy: bool = True
+) -> float:
+    """D of a take's power spectra and those of a sound at a gain, with the noise's power added where it has none."""
+    noise = noise_spectra(floor, power) if noisy else tuple(np.zeros(1) for _ in power)
+    both = []
+    for p, m, cell in zip(power, made, noise, strict=False):
+        count = min(len(p), len(m))
+        both.append((p[:count], gain**2 * m[:count] + cell))
+    return spectra_distance_db(tuple(a for a, _ in both), tuple(b for _, b in both), floor)
+
+
+def _distance_at_best_gain(
+    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, noisy: bool = True
+) -> float:
+    """The least D over the gain of a sound."""
+    total = sum(float(m.sum()) for m in made)
+    if not total > 0:
+        return _distance(power, made, floor, 0.0)
+    start = 10 * np.log10(sum(float(p.sum()) for p in power) / total)
+
+    def cost(gain_db: float) -> float:
+        return _distance(power, made, floor, 10 ** (gain_db / 20), noisy=noisy)
+
+    steps = start + np.arange(-GAIN_REACH_DB, GAIN_REACH_DB + 1, 8.0)
+    costs = np.array([cost(g) for g in steps])
+    if not np.isfinite(costs).any():
+        return float("nan")
+    at = float(steps[int(np.nanargmin(costs))])
+    best = minimize_scalar(cost, bounds=(at - 8, at + 8), method="bounded", options={"xatol": 0.1})
+    return float(min(best.fun, np.nanmin(costs)))
+
+
+def in_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
+    """Signals (..., n) within a band, by their spectrum; as they are where the band is all that a rate holds."""
+    if band_hz[0] <= 20 and band_hz[1] >= 0.45 * sr:
+        return signal
+    spectrum = np.fft.rfft(signal, axis=-1)
+    freq = np.fft.rfftfreq(signal.shape[-1], 1 / sr)
+    spectrum[..., (freq < band_hz[0]) | (freq > band_hz[1])] = 0
+    return np.asarray(np.fft.irfft(spectrum, signal.shape[-1]))

@@ -1,0 +1,101 @@
+"""Takes that were not fitted: lines as they were struck on average, distances, and what is worse than silence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import soundfile
+from click.testing import CliRunner
+
+from sonic_bullet.cli import cli
+from sonic_bullet.estimator.fit.held_out_takes import typical_strike
+from sonic_bullet.estimator.fit.material_fit import fit_case
+from sonic_bullet.estimator.lines.joint_lines import Lines
+from sonic_bullet.files.cases import read_case
+from sonic_bullet.records import Array
+
+SR = 24_000
+HZ = np.array([410.0, 1130.0, 2270.0, 3890.0])
+DECAY = np.array([9.0, 14.0, 25.0, 40.0])
+
+
+def lines_of(amplitude: Array) -> Lines:
+    """Four lines of takes (s, 4)."""
+    s, none = len(amplitude), np.zeros(4)
+    return Lines(HZ, DECAY, amplitude.astype(complex), none, none, np.zeros((s, 4)), np.ones(s), np.full(4, 1e6), True)
+
+
+def test_a_gain_of_a_take_moves_neither_ratios_nor_spreads() -> None:
+    rng = np.random.default_rng(3)
+    size = rng.uniform(0.1, 1.0, (5, 4)) * np.exp(1j * rng.uniform(0, 6, (5, 4)))
+    plain, scaled = typical_strike(lines_of(size)), typical_strike(lines_of(size * 10.0 ** rng.uniform(-2, 2, (5, 1))))
+    ratio = np.abs(scaled.amplitude / plain.amplitude)
+    assert np.allclose(ratio, ratio[0], rtol=1e-9)
+    assert np.allclose(scaled.spread_db, plain.spread_db, atol=1e-9)
+
+
+def test_takes_that_differ_by_gain_alone_have_no_spread() -> None:
+    one = np.array([1.0, 0.5, 0.2, 0.05])
+    found = typical_strike(lines_of(np.array([1.0, 3.0, 0.2])[:, None] * one))
+    assert np.allclose(found.spread_db, 0, atol=1e-9)
+    assert np.allclose(np.abs(found.amplitude) / np.abs(found.amplitude[0]), one, rtol=1e-9)
+
+
+def case_of(folder: Path, holdouts: int, noise: float = 1e-4) -> Path:
+    """A case of takes of one object without a mesh, each as loud as chance has it."""
+    rng, n = np.random.default_rng(11), SR
+    t = np.arange(n) / SR
+    rows = []
+    for i in range(3 + holdouts):
+        size = rng.uniform(0.1, 0.9) * np.array([1.0, 0.6, 0.4, 0.2]) * 10 ** (rng.normal(0, 2, 4) / 20)
+        ring = (size[:, None] * np.exp(-DECAY[:, None] * t) * np.cos(2 * np.pi * HZ[:, None] * t)).sum(axis=0)
+        sound = np.concatenate([np.zeros(SR // 20), ring]) + noise * rng.standard_normal(n + SR // 20)
+        soundfile.write(folder / f"take{i}.wav", 0.3 * sound, SR, subtype="FLOAT")
+        rows.append({"file": f"take{i}.wav", "split": "fit" if i < 3 else "holdout"})
+    (folder / "case.json").write_text(json.dumps({"format": "sonic-bullet-case/1", "case": "taps", "recordings": rows}))
+    return folder
+
+
+def test_a_take_that_was_not_fitted_is_nearer_than_silence_and_about_as_near_as_another(tmp_path: Path) -> None:
+    found = fit_case(read_case(case_of(tmp_path, 2)))
+    assert [t.split for t in found.takes] == ["holdout", "holdout"]
+    for take in found.takes:
+        assert take.free_gain and take.predicted_db < take.silence_db / 2
+        assert take.predicted_db < 1.5 * take.other_take_db
+    assert not found.worse_than_silence
+
+
+def test_fit_says_how_near_each_take_is_and_its_preset_holds_the_lines(tmp_path: Path) -> None:
+    folder = case_of(tmp_path, 1)
+    out, verdict = tmp_path / "taps_preset.json", tmp_path / "fit.json"
+    done = CliRunner().invoke(cli, ["fit", str(folder), "-o", str(out), "--json", str(verdict)])
+    assert done.exit_code == 0, done.output
+    assert "takes that were not fitted" in done.output and "take3.wav" in done.output
+    (take,) = json.loads(verdict.read_text())["takes"]
+    assert take["predicted_db"] < take["silence_db"]
+    (lines,) = json.loads(out.read_text())["effects"]
+    assert lines["id"] == "recorded-lines"
+    for hz, decay in zip(HZ, DECAY, strict=True):
+        nearest = int(np.argmin(np.abs(np.array(lines["freq_hz"]) - hz)))
+        assert abs(lines["freq_hz"][nearest] - hz) < 1e-3 * hz
+        assert abs(lines["decay_per_s"][nearest] - decay) < 0.05 * decay
+
+
+def test_what_is_farther_than_silence_is_said_and_ends_with_one(tmp_path: Path) -> None:
+    """The held-out take is of another object: its lines stand where the fitted ones are not."""
+    folder = case_of(tmp_path, 0)
+    t = np.arange(SR) / SR
+    other = sum(np.exp(-4 * t) * np.cos(2 * np.pi * hz * t) for hz in (700.0, 1900.0))
+    rng = np.random.default_rng(5)
+    soundfile.write(folder / "other.wav", 1e-4 * (other + rng.standard_normal(SR)), SR, subtype="FLOAT")
+    case = json.loads((folder / "case.json").read_text())
+    case["recordings"].append({"file": "other.wav", "split": "holdout"})
+    (folder / "case.json").write_text(json.dumps(case))
+    out = tmp_path / "p.json"
+    done = CliRunner().invoke(cli, ["fit", str(folder), "-o", str(out)])
+    preset = json.loads(out.read_text())
+    near = "worse-than-silence" in preset["provenance"]["verdict"]
+    assert done.exit_code == (1 if near else 0), done.output
+    assert near == ("worse-than-silence" in done.output)
