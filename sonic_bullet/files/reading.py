@@ -1,5 +1,6 @@
 """The boundary of every reader: what a foreign file makes a parser throw leaves as one error of ours.
 
+    first bytes -> those of a Git LFS pointer, which stands where a large file should -> kind("PATH …", "git lfs pull")
     open, zip, npy, JSON, libsndfile, trimesh -> any exception -> kind("PATH …", remedy), at most 200 characters of it
         the file's own
 
@@ -18,6 +19,7 @@ from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 
 # characters that may be a file's own: in all; of what is wrong and of the remedy, where it would be more
 QUOTED, WHAT, REMEDY = 200, 120, 80
+LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # how every pointer begins, by Git LFS's specification
 
 
 @contextmanager
@@ -27,6 +29,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     thing: what should be there, in words.
     """
     try:
+        refuse_lfs_pointer(path, kind)
         yield
     except SonicBulletError as error:
         renamed = _with_path(error, os.fspath(path), type(error) if isinstance(error, (kind, FileError)) else kind)
@@ -38,6 +41,19 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise kind(f"{path} is cut or no {thing} ({excerpt(reason, WHAT)})", remedy) from error
+
+
+def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:
+    """Raises ``kind`` where a file is the pointer that Git LFS leaves in place of a large one."""
+    try:
+        if not os.path.isfile(path):  # a pipe would be read empty
+            return
+        with open(path, "rb") as file:
+            first = file.read(len(LFS_POINTER))
+    except (OSError, ValueError):  # whoever reads it says what is wrong
+        return
+    if first == LFS_POINTER:
+        raise kind(f"{path} is a Git LFS pointer, not the file itself", "run git lfs pull where it came from")
 
 
 def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:

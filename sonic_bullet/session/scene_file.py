@@ -10,11 +10,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from sonic_bullet.files.reading import refuse_lfs_pointer
 from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
 
 
 def defines_build(path: Path) -> bool:
     """Whether it has a function `build` at its top. Raises SceneError where it is no Python."""
+    refuse_lfs_pointer(path, SceneError)
     try:
         tree = ast.parse(path.read_text(encoding="utf-8"))
     except (SyntaxError, ValueError) as error:

@@ -21,6 +21,7 @@ from unittest.mock import patch
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
+from sonic_bullet.files.reading import refuse_lfs_pointer
 from sonic_bullet.listener.pybullet.clients import disconnect as end
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.errors import SceneError, SonicBulletError
@@ -76,6 +77,7 @@ def run_script(
     be read or a client is stepped that the script did not open.
     """
     path = Path(path)
+    refuse_lfs_pointer(path, SceneError)
     try:
         code = compile(path.read_bytes(), str(path), "exec")
     except OSError as error:

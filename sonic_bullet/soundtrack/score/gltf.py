@@ -23,7 +23,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from sonic_bullet.files.reading import reading
+from sonic_bullet.files.reading import reading, refuse_lfs_pointer
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
@@ -133,6 +133,7 @@ def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path) -> bytes:
         name = Path(unquote(uri))
         if name.is_absolute() or ".." in name.parts:
             raise AnimationError(f"buffer {shown(uri)} lies outside its folder", "keep it beside the .gltf")
+        refuse_lfs_pointer(path.parent / name, AnimationError)
         data = (path.parent / name).read_bytes()
     if len(data) < int(one.get("byteLength", 0)):
         raise AnimationError("a buffer is shorter than it claims", _REMEDY)
