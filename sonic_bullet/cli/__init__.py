@@ -34,7 +34,7 @@ from sonic_bullet.cli.examples import (
     MODES_EPILOG,
     RESIDUAL_EPILOG,
 )
-from sonic_bullet.cli.parameters import Numbers, channel_option, json_option, strike_options
+from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options
 from sonic_bullet.cli.play_command import play
 from sonic_bullet.cli.render_command import render
 from sonic_bullet.cli.soundtrack.film_command import film
@@ -152,6 +152,7 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
 @click.option(
     "--picture", metavar="NAME.png", help="Also draw the spectrogram with the features on it, and decay over frequency."
 )
+@csv_option
 @json_option
 def features(**options: Any) -> None:
     """The damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
@@ -165,6 +166,7 @@ def features(**options: Any) -> None:
 @click.option("-o", "--output", required=True, metavar="PRESET.json", help="The fitted material as a preset file.")
 @strike_options
 @click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
+@csv_option
 @json_option
 def fit(**options: Any) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""

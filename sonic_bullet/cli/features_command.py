@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
+from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, write_csv
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
+
+NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
+DECAYS = ("t60_s", "t60_sd_s", "loss_factor", "loss_factor_sd", "q", "q_sd")
 
 
 def run_features(
@@ -21,12 +24,13 @@ def run_features(
     band: tuple[float, ...] | None,
     channel: int | None,
     json_to: str | None,
+    csv_to: str | None,
     picture: str | None,
 ) -> None:
     """The `features` command. Raises SonicBulletError."""
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    picture, json_to = places(picture, json_to)
+    picture, json_to, csv_to = places(picture, json_to, csv_to)
     sound, sr = read_audio(recording)
     observed, which = channel_of(sound, channel or 0, recording), channel_words(len(sound), channel)
     warn(f"{recording}: {words}" for words in [which] if words)
@@ -41,6 +45,7 @@ def run_features(
             _draw(picture, observed, sr, found)
         say(_summary(recording, found))
     warn(f"{recording}: {note}" for note in [found.note] if note)
+    write_csv(csv_to, feature_rows(found), (*NUMBERS, *DECAYS))
     write_json(json_to, described(found, notes, doubtful=bool(found.note) or (len(sound) > 1 and channel is None)))
 
 
@@ -49,12 +54,7 @@ def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
 
     doubtful: whether a note speaks against them.
     """
-    names = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
-    columns = [getattr(found, name) for name in names]
-    rows = [
-        {name: _number(column[k]) for name, column in zip(names, columns, strict=True)}
-        for k in range(len(found.freq_hz))
-    ]
+    rows = feature_rows(found)
     verdict = "features" if rows and not doubtful else "doubtful" if rows else "no features"
     return {
         "features": rows,
@@ -66,24 +66,31 @@ def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
     }
 
 
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+def feature_rows(found: Features) -> list[dict[str, float | int | None]]:
+    """A row a feature, strongest first: what was found, and T60, η and Q of its decay; None for a spread not known."""
+    columns = [getattr(found, name) for name in NUMBERS]
+    return [
+        {name: finite(column[k]) for name, column in zip(NUMBERS, columns, strict=True)}
+        | decay_values(found.freq_hz[k], found.decay_per_s[k], found.decay_sd_per_s[k])
+        for k in range(len(found.freq_hz))
+    ]
 
 
 def _summary(recording: str, found: Features) -> str:
-    order = np.argsort(found.freq_hz)
+    order, values = np.argsort(found.freq_hz), feature_rows(found)
     rows = [
         (
             f"{found.freq_hz[k]:.3f}",
             f"{found.freq_sd_hz[k]:.2g}",
             f"{found.decay_per_s[k]:.4g}",
             f"{found.decay_sd_per_s[k]:.2g}",
+            *decay_cells(values[k]),
             f"{20 * np.log10(found.amplitude[k]):.1f}",
         )
         for k in order
     ]
     head = f"{recording}: {len(rows)} features, onset at {found.onset_s:.4f} s, noise {found.noise_dbfs:.1f} dBFS"
-    return "\n".join([head, table(("Hz", "±", "decay 1/s", "±", "dBFS"), rows)])
+    return "\n".join([head, table(("Hz", "±", "decay 1/s", "±", "T60 s", "loss factor", "Q", "dBFS"), rows)])
 
 
 def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
@@ -110,6 +117,16 @@ def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
     )
     last = np.minimum(found.onset_s + 6.9 / np.maximum(found.decay_per_s, 1e-3), time[-1])
     left.hlines(found.freq_hz / 1000, found.onset_s, last, colors="c", linewidth=0.7)
+    # the spread across, at the middle of each line
+    left.errorbar(
+        (found.onset_s + last) / 2,
+        found.freq_hz / 1000,
+        yerr=np.nan_to_num(found.freq_sd_hz) / 1000,
+        fmt="none",
+        ecolor="c",
+        elinewidth=0.7,
+        capsize=2,
+    )
     left.set(xlabel="time in s", ylabel="frequency in kHz", title="recording, features down to -60 dB")
     right.errorbar(
         found.freq_hz / 1000, found.decay_per_s, yerr=found.decay_sd_per_s, fmt="o", markersize=3, linewidth=0.7

@@ -11,12 +11,27 @@ from typing import Any
 import click
 import numpy as np
 
+from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, write_csv
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
 from sonic_bullet.files.cases import LARGEST, Case, CaseObject, CaseRecording, medium_of, read_case
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
+COLUMNS = (
+    "object",
+    "freq_hz",
+    "freq_sd_hz",
+    "decay_per_s",
+    "decay_sd_per_s",
+    "t60_s",
+    "t60_sd_s",
+    "loss_factor",
+    "loss_factor_sd",
+    "q",
+    "q_sd",
+    "mode_hz",
+)
 ONE = (
     "mesh",
     "strike",
@@ -34,13 +49,15 @@ ONE = (
 )
 
 
-def run_fit(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
+def run_fit(
+    source: str, *, output: str, picture: str | None, json_to: str | None, csv_to: str | None, **one: Any
+) -> None:
     """The `fit` command. Raises SonicBulletError."""
     if not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    to, picture, json_to = places(output, picture, json_to)
+    to, picture, json_to, csv_to = places(output, picture, json_to, csv_to)
     case = as_case(source, one)
     warn(case.warnings)
     with clean_stdout(json_to) as say:
@@ -57,6 +74,7 @@ def run_fit(source: str, *, output: str, picture: str | None, json_to: str | Non
             write_fit_picture(picture, found)
         say(_summary(found))
     warn(found.warnings)
+    write_csv(csv_to, line_rows(found), COLUMNS)
     write_json(json_to, described(found))
     if found.worse_than_silence:
         raise click.exceptions.Exit(1)
@@ -148,9 +166,9 @@ def described(found: Any) -> dict[str, Any]:
             {
                 "file": t.file,
                 "split": t.split,
-                "predicted_db": _number(t.predicted_db),
-                "silence_db": _number(t.silence_db),
-                "other_take_db": _number(t.other_take_db),
+                "predicted_db": finite(t.predicted_db),
+                "silence_db": finite(t.silence_db),
+                "other_take_db": finite(t.other_take_db),
                 "free_gain": t.free_gain,
             }
             for t in found.takes
@@ -159,11 +177,8 @@ def described(found: Any) -> dict[str, Any]:
             {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
             for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
         ],
+        "lines": line_rows(found),
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _takes(found: Any) -> list[str]:
@@ -187,6 +202,27 @@ def _takes(found: Any) -> list[str]:
         for t in found.takes
     ]
     return [table((head, "predicted", "silence", "nearest other take", "gain"), rows)]
+
+
+def line_rows(found: Any) -> list[dict[str, Any]]:
+    """A row an observed line, object by object: frequency, decay, T60, η and Q with spreads, and the fitted mode it is.
+
+    mode_hz is None where the line is no mode.
+    """
+    rows = []
+    for o in found.objects:
+        lines = o.evidence.lines
+        mode = dict(zip(o.line[o.line >= 0].tolist(), o.freq_hz[o.line >= 0].tolist(), strict=True))
+        for k in range(len(lines.freq_hz)):
+            freq, decay, sd = lines.freq_hz[k], lines.decay_per_s[k], lines.identified_sd_per_s[k]
+            own = {"freq_hz": freq, "freq_sd_hz": lines.freq_sd_hz[k], "decay_per_s": decay, "decay_sd_per_s": sd}
+            rows.append(
+                {"object": o.evidence.thing.name}
+                | {name: finite(value) for name, value in own.items()}
+                | decay_values(freq, decay, sd)
+                | {"mode_hz": mode.get(k)}
+            )
+    return rows
 
 
 def _summary(found: Any) -> str:
@@ -217,6 +253,13 @@ def _summary(found: Any) -> str:
         table(("", "value", "spread"), rows),
         f"{paired} modes paired with {lines} observed lines",
     ]
+    told = [
+        (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
+        for row in line_rows(found)
+        if row["mode_hz"] is not None
+    ]
+    if told:
+        text.append(table(("line Hz", "mode Hz", "decay 1/s", "T60 s", "loss factor", "Q"), told))
     if len(correction):
         text.append(
             f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest "

@@ -30,6 +30,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         return numbers
 
 
+csv_option = click.option(
+    "--csv",
+    "csv_to",
+    metavar="NAME.csv",
+    help="Also write the lines: frequency, decay, T60, η and Q with their spreads.",
+)
+
 json_option = click.option(
     "--json",
     "json_to",

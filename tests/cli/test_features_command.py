@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 import soundfile
+
+from sonic_bullet.cli.line_table import decay_values
 
 
 def features(*words: str | Path) -> subprocess.CompletedProcess[str]:
@@ -81,3 +85,33 @@ def test_what_is_no_recording_gets_one_line(tmp_path: Path) -> None:
         done = features(tmp_path / words[0], *words[1:])
         assert done.returncode == 2, words
         assert len(done.stderr.strip().splitlines()) == 1 and "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("freq_hz", "decay_per_s"), [(700.0, 12.0), (180.0, 3.0), (5200.0, 60.0)])
+def test_t60_loss_factor_and_q_stand_beside_the_decay(tmp_path: Path, freq_hz: float, decay_per_s: float) -> None:
+    """T60 = ln(1000)/d, η = d/(πf) = 1/Q, each to its spread, in the table, the JSON and the CSV."""
+    time = np.arange(24_000) / 48_000
+    tap = 0.3 * np.exp(-decay_per_s * time) * np.sin(2 * np.pi * freq_hz * time)
+    tap += 1e-5 * np.random.default_rng(1).standard_normal(len(time))
+    soundfile.write(tmp_path / "tap.wav", tap, 48_000, subtype="FLOAT")
+    done = features(tmp_path / "tap.wav", "--json", tmp_path / "tap.json", "--csv", tmp_path / "tap.csv")
+    assert done.returncode == 0, done.stderr
+    assert all(word in done.stdout.splitlines()[1] for word in ("T60 s", "loss factor", "Q"))
+    (one,) = json.loads((tmp_path / "tap.json").read_text())["features"]
+    want = {
+        "t60_s": np.log(1000) / decay_per_s,
+        "loss_factor": decay_per_s / (np.pi * freq_hz),
+        "q": np.pi * freq_hz / decay_per_s,
+    }
+    for name, value in want.items():
+        sd = one["t60_sd_s" if name == "t60_s" else f"{name}_sd"]
+        assert abs(one[name] - value) < 5 * sd < 0.05 * value
+    (row,) = csv.DictReader((tmp_path / "tap.csv").read_text().splitlines())
+    assert {name: float(value) for name, value in row.items()} == one
+
+
+def test_what_has_no_decay_has_no_t60() -> None:
+    assert set(decay_values(100.0, float("nan"), 1.0).values()) == {None}
+    assert set(decay_values(100.0, 0.0, 1.0).values()) == {None}
+    known = decay_values(100.0, 3.0, float("inf"))
+    assert known["q"] == pytest.approx(100 * np.pi / 3) and known["q_sd"] is None

@@ -27,6 +27,7 @@ KEYS = {
     "metric",
     "log_spectral_db",
     "modes",
+    "lines",
 }
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
 
@@ -45,7 +46,20 @@ def run(*words: object) -> int:
 
 
 def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run("fit", folder, "-o", tmp_path / "p.json", "--picture", tmp_path / "p.png", "--json") == 0
+    assert (
+        run(
+            "fit",
+            folder,
+            "-o",
+            tmp_path / "p.json",
+            "--picture",
+            tmp_path / "p.png",
+            "--csv",
+            tmp_path / "p.csv",
+            "--json",
+        )
+        == 0
+    )
     told: dict[str, Any] = json.loads(capfd.readouterr().out)
     assert set(told) == KEYS
     assert told["verdict"] == "fitted"
@@ -54,6 +68,12 @@ def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: py
     assert told["alpha_per_s"] == pytest.approx(8.0, rel=5e-3)
     assert np.array(told["covariance"], float).shape == (5, 5)
     assert set(told["modes"][0]) == {"freq_hz", "decay_per_s", "amplitude"}
+    mode = next(line for line in told["lines"] if line["mode_hz"] is not None)
+    assert mode["freq_hz"] == pytest.approx(mode["mode_hz"], rel=1e-3)
+    assert mode["t60_s"] == pytest.approx(np.log(1000) / mode["decay_per_s"])
+    assert mode["loss_factor"] * mode["q"] == pytest.approx(1.0)
+    head, *rows = (tmp_path / "p.csv").read_text().splitlines()
+    assert head.split(",") == list(mode) and len(rows) == len(told["lines"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
     preset = read_preset(tmp_path / "p.json")
     assert preset.provenance is not None

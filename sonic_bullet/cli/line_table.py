@@ -1,0 +1,56 @@
+"""Damped sinusoids as rows: what of a decay d an acoustician reads, with its spread.
+
+T60 = ln(1000)/d,  η = 2d/ω,  Q = 1/η                                               [Cremer, Heckl & Petersson 2005]
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from typing import Any
+
+Row = dict[str, float | int | None]
+
+
+def decay_values(freq_hz: float, decay_per_s: float, decay_sd_per_s: float) -> Row:
+    """T60 in s, loss factor η and quality factor Q of a line, each with its spread; None for what is not known."""
+    known = math.isfinite(decay_per_s) and decay_per_s > 0
+    values = {
+        "t60_s": math.log(1000) / decay_per_s if known else math.nan,
+        "loss_factor": decay_per_s / (math.pi * freq_hz) if known else math.nan,
+        "q": math.pi * freq_hz / decay_per_s if known else math.nan,
+    }
+    relative = decay_sd_per_s / decay_per_s if known else math.nan
+    row: Row = {}
+    for name, value in values.items():
+        unit = name.removeprefix("t60")
+        row[name] = finite(value)
+        row[f"t60_sd{unit}" if name == "t60_s" else f"{name}_sd"] = finite(value * relative)
+    return row
+
+
+def finite(value: float) -> float | None:
+    """A number, or None for NaN and infinity, which JSON has no word for."""
+    return float(value) if math.isfinite(value) else None
+
+
+def decay_cells(row: Row) -> tuple[str, str, str]:
+    """T60, η and Q as a table shows them."""
+    return tuple("?" if row[name] is None else f"{row[name]:.3g}" for name in ("t60_s", "loss_factor", "q"))  # type: ignore[return-value]
+
+
+def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> None:
+    """Rows with a header line; nothing stands for None. Nowhere for a path of None. Raises FileError."""
+    if path is None:
+        return
+    import csv
+
+    from sonic_bullet.files import replacing
+
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(columns), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with replacing(path) as file:
+        file.write(text.getvalue().encode())
