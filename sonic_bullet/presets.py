@@ -105,8 +105,8 @@ class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in
     the same units, where known.
 
-    assumed: what was taken from the guess. verdict: the fit's own, or the diagnosis' where one wrote it. correction: relative, of each mode's frequency
-    against the mesh's.
+    assumed: what was taken from the guess. verdict: the fit's own, or the diagnosis' where one wrote it. correction:
+    relative, of each mode's frequency against the mesh's.
     """
 
     method: str
