@@ -34,6 +34,7 @@ import numpy as np
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, shown
@@ -104,8 +105,8 @@ class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in
     the same units, where known.
 
-    assumed: what was taken from the guess. verdict: the fit's own. correction: relative, of each mode's frequency
-    against the mesh's.
+    assumed: what was taken from the guess. verdict: the fit's own, or the diagnosis' where one wrote it. correction:
+    relative, of each mode's frequency against the mesh's.
     """
 
     method: str
@@ -215,7 +216,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
 def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
     """Write a preset file, whole or not at all. Raises FileError."""
     with replacing(path) as file:
-        file.write(msgspec.json.format(msgspec.json.encode(preset), indent=2) + b"\n")
+        file.write(json_bytes(preset, indent=2))
 
 
 def material_of(preset: Preset, where: str = "") -> Material:

@@ -7,7 +7,6 @@ schema  JSON Schema of case.json
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from sonic_bullet.cli.output import table, warn
 from sonic_bullet.files import read_audio, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.recordings import channel_of, channel_words
 from sonic_bullet.records.errors import FileError
 
@@ -156,7 +156,7 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
                 with file.open("rb") as source, replacing(place / name) as target:
                     shutil.copyfileobj(source, target)
         with replacing(place / "case.json") as target:
-            target.write((json.dumps(case, indent=2, ensure_ascii=False) + "\n").encode())
+            target.write(json_bytes(case, indent=2))
         read_case(place)
     except BaseException:
         for path in (*made, place / "case.json"):
@@ -225,4 +225,4 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
 
 def run_case_schema() -> None:
     """The `case schema` command."""
-    print(json.dumps(case_schema(), indent=2, ensure_ascii=False))
+    print(json_bytes(case_schema(), indent=2).decode(), end="")

@@ -8,7 +8,6 @@ progress        -> stderr, on a terminal only
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -115,18 +114,20 @@ def folder_place(asked: str, *inside: str) -> str:
 
 
 def write_json(json_to: str | None, value: Any) -> None:
-    """``value`` as JSON (no NaN) to a path, to stdout for "-", nowhere for None. Raises FileError."""
+    """``value`` as strict JSON to a path, to stdout for "-", nowhere for None. Raises FileError."""
     if json_to is None:
         return
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    from sonic_bullet.files.json_text import json_bytes
+
+    text = json_bytes(value, indent=2)
     if json_to == "-":
-        sys.stdout.write(text)
+        sys.stdout.write(text.decode())
         sys.stdout.flush()
         return
     from sonic_bullet.files import replacing
 
     with replacing(json_to) as file:
-        file.write(text.encode())
+        file.write(text)
 
 
 @contextmanager

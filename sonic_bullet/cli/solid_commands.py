@@ -41,14 +41,14 @@ def run_modes(
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
     with clean_stdout(json_to) as say:
-        from sonic_bullet import modal
         from sonic_bullet.modal import read_mesh
+        from sonic_bullet.session.body_models import analyse_body, sounding_material
 
         with status(mesh) as progress:
             shape = read_mesh(mesh, scale)
-            model = modal.analyse(
+            model = analyse_body(
                 (shape,),
-                made,
+                sounding_material(made),
                 count=count,
                 fixed=fixed,
                 thickness_m=thickness_m,
@@ -90,10 +90,8 @@ def chosen_material(
     if youngs_pa is None and poisson is None:
         return replace(base, density_kg_m3=rho)
     elastic = (base.youngs_pa if youngs_pa is None else youngs_pa, base.poisson if poisson is None else poisson)
-    made = Material.isotropic(
-        base.name if name else "constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho
-    )
-    return made if name is None else replace(made, alpha_per_s=base.alpha_per_s, beta_s=base.beta_s)
+    made = Material.isotropic("constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho)
+    return made if name is None else replace(base, density_kg_m3=rho, stiffness_pa=made.stiffness_pa)
 
 
 def run_materials(json_to: str | None) -> None:

@@ -22,6 +22,7 @@ from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files import replacing
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records.errors import CompareError, FileError
@@ -105,7 +106,7 @@ def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) 
 def write_baseline(path: str | Path, baseline: SceneBaseline) -> None:
     """Write it, whole or not at all. Raises FileError."""
     with replacing(str(path)) as file:
-        file.write(msgspec.json.encode(baseline) + b"\n")
+        file.write(json_bytes(baseline) + b"\n")
 
 
 def read_baseline(path: str | Path) -> SceneBaseline:

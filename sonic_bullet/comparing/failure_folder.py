@@ -5,7 +5,6 @@ Comparison -> FOLDER/expected.wav actual.wav difference.wav spectrum.png result.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing, write_audio
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.records import Array
 
 
@@ -28,7 +28,7 @@ def write_failure(folder: Path, found: Comparison) -> None:
         write_audio(str(folder / "difference.wav"), padded[1] - padded[0], sr)
     _picture(folder / "spectrum.png", one, other, sr)
     with replacing(str(folder / "result.json")) as file:
-        file.write((json.dumps(found.described(), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode())
+        file.write(json_bytes(found.described(), indent=2))
 
 
 def _picture(place: Path, one: Array, other: Array, sr: int) -> None:

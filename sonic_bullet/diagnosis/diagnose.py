@@ -210,10 +210,10 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
 
 
 def described(d: Diagnosis) -> dict[str, Any]:
-    """The diagnosis as JSON holds it: null for what is no number."""
+    """The diagnosis as JSON holds it."""
     from sonic_bullet.diagnosis.selection.stepwise import described as tried
 
-    whole = {
+    return {
         "case": d.case.name,
         "verdict": d.verdict,
         "effects": [
@@ -255,13 +255,3 @@ def described(d: Diagnosis) -> dict[str, Any]:
         },
         "warnings": [*d.case.warnings, *d.warnings],
     }
-    return {name: _finite(value) for name, value in whole.items()}
-
-
-def _finite(x: Any) -> Any:
-    """The same, None where a number is not finite."""
-    if isinstance(x, dict):
-        return {k: _finite(v) for k, v in x.items()}
-    if isinstance(x, (list, tuple)):
-        return [_finite(v) for v in x]
-    return None if isinstance(x, float) and not np.isfinite(x) else x

@@ -25,7 +25,15 @@ def preset_of(d: Diagnosis) -> Preset:
     damping = msgspec.structs.replace(
         base.damping, alpha_per_s=max(after.alpha_per_s, 0.0), beta_s=max(after.beta_s, 0.0), includes_radiation=total
     )
-    made = msgspec.structs.replace(base, damping=damping, effects=tuple(stored(e) for e in after.effects if kept(e)))
+    assert base.provenance is not None
+    provenance = msgspec.structs.replace(
+        base.provenance,
+        method=f"{base.provenance.method}; effects by cross-validation on strikes left out",
+        verdict=d.verdict,
+    )
+    made = msgspec.structs.replace(
+        base, damping=damping, provenance=provenance, effects=tuple(stored(e) for e in after.effects if kept(e))
+    )
     for effect in after.effects:
         if effect.stage is Stage.MATERIAL:
             stiffness = effect.apply(material_of(base)).stiffness_pa

@@ -19,7 +19,8 @@ from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
 from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.records import Material, ModalModel
-from sonic_bullet.records.errors import RecordError
+from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.errors import MaterialError, RecordError
 
 KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping, RecordedLines)
 """Effects that a preset may hold.
@@ -56,6 +57,22 @@ def effect_of(data: dict[str, Any]) -> Effect:
     except RecordError as error:
         raise RecordError(f"effect '{name}': {error.what}", error.remedy) from error
     return made
+
+
+PLAYED = (Stage.MATERIAL, Stage.MODES, Stage.BANK)
+"""Stages at which a material's effects act, in this order: the others belong to a strike or to a recording."""
+
+
+def check_effects(material: Material) -> None:
+    """Raise MaterialError where a material has an effect that no scene plays, or what is none."""
+    for number, effect in enumerate(material.effects):
+        where = f"material '{material.name}': effects[{number}]"
+        if isinstance(effect, type) or not callable(getattr(effect, "apply", None)):
+            raise MaterialError(f"{where} is {shown(effect)}", "give effects of sonic_bullet.effects")
+        if getattr(effect, "stage", None) not in PLAYED:
+            raise MaterialError(
+                f"{where}, {shown(effect)}, belongs to a strike or a recording, not to a body", "leave it out"
+            )
 
 
 def with_material(material: Material) -> Material:

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from sonic_bullet.files.cases import FORMAT, _Raw
+from sonic_bullet.files.json_text import json_bytes
 
 ABOUT: dict[str, tuple[str, dict[str, str]]] = {
     "Case": (
@@ -114,7 +115,7 @@ ABOUT: dict[str, tuple[str, dict[str, str]]] = {
 def case_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of case.json. Raises KeyError where a field has no words in ABOUT."""
     made = msgspec.json.schema(_Raw)
-    text = msgspec.json.encode(made).decode()
+    text = json_bytes(made).decode()
     for name in made["$defs"]:  # the classes' own names are private, the schema's are not
         text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{_public(name)}"').replace(
             f'"title":"{name}"', f'"title":"{_public(name)}"'

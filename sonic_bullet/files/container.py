@@ -29,6 +29,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.atomic import replacing
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import read_at
 from sonic_bullet.records import Array
@@ -91,7 +92,7 @@ def write_container(
     """Write header and arrays, whole or not at all; equal input gives equal bytes. packed: what the names of entries
     begin with that are deflated, None: none is. Raises FileError.
     """
-    entries = {HEADER: np.frombuffer(msgspec.json.encode(header), np.uint8), **arrays}
+    entries = {HEADER: np.frombuffer(json_bytes(header), np.uint8), **arrays}
     with replacing(path) as file:
         if _written(file, entries, packed) > UNPACKED * file.tell():  # nothing but zeros: no reader would take it
             file.seek(0)

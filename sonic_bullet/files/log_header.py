@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.container import REMEDY, take
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.models import LoggedModel, as_json_text
 from sonic_bullet.records import Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
 from sonic_bullet.records.contacts import Event
@@ -110,7 +111,7 @@ def material_key(material: Material) -> bytes:
         if material.residual is not None
         else b""
     )
-    return msgspec.json.encode(pack_material(material)) + material.stiffness_pa.tobytes() + more
+    return json_bytes(pack_material(material)) + material.stiffness_pa.tobytes() + more
 
 
 def pack_material(x: Material) -> _Material:

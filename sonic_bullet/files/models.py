@@ -24,6 +24,7 @@ import numpy as np
 from sonic_bullet.files import cache
 from sonic_bullet.files.atomic import cannot
 from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.machine.kept_files import LIMIT, touch
 from sonic_bullet.records import Array, ModalModel
@@ -183,7 +184,7 @@ def _kept_at(place: Path, key: str) -> Path:
 
 def model_key(model: ModalModel) -> str:
     """SHA-256 of a model's content, in hexadecimal: equal models are stored once."""
-    digest = hashlib.sha256(msgspec.json.encode(_pack_model(model)))
+    digest = hashlib.sha256(json_bytes(_pack_model(model)))
     for name, array in _arrays(model).items():
         digest.update(f"model0_{name} {array.shape}".encode() + array.tobytes())
     return digest.hexdigest()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.effects.presets_of_effects import check_effects
 from sonic_bullet.records import Array, Material, Microphone, Sensor, Shape
 from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, shown
 from sonic_bullet.records.errors import MaterialError, MeshError, SceneError
@@ -42,9 +43,8 @@ def as_name(name: object) -> str:
 def as_material(material: str | Path | Material) -> Material:
     """The material itself, or the preset of that name or path.
 
-    Raises MaterialError where it has no damping: it would ring for ever.
+    Raises MaterialError where it has no damping, so that it would ring for ever, or an effect that no scene plays.
     """
-    from sonic_bullet.effects.protocol import Effect
     from sonic_bullet.presets import load_material
 
     remedy = "give a name ('sonic-bullet materials' lists them), a preset file or a Material"
@@ -55,13 +55,7 @@ def as_material(material: str | Path | Material) -> Material:
     )
     if made.alpha_per_s is None:
         raise MaterialError(f"material '{made.name}' states no damping", "give alpha_per_s and beta_s")
-    as_kinds(
-        made.effects,
-        Effect,
-        f"material '{made.name}': effects",
-        "give effects of sonic_bullet.effects",
-        error=MaterialError,
-    )
+    check_effects(made)
     return made
 
 

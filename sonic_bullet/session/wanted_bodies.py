@@ -28,10 +28,10 @@ from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, shown
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
-from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
+from sonic_bullet.session.body_models import analyse_body, sounding_material
 from sonic_bullet.session.directed import direction
 
 Say = Callable[[str], None]
@@ -69,13 +69,11 @@ def wanted_body(
     **options: Any,
 ) -> WantedBody:
     """What `Listener.add` was asked for. options: of modal.ModalOptions. Raises what add raises."""
-    from sonic_bullet.effects.presets_of_effects import with_material
-
     made = as_material(material)
     if roughness_m is not None:
         remedy = "give an rms height in m, zero or above"
         made = replace(made, roughness_m=as_number(roughness_m, "roughness_m", remedy, least=0))
-    made = with_material(made)
+    made = sounding_material(made)
     asked = ModalOptions(**options)
     if model is not None:
         as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)
@@ -177,12 +175,7 @@ def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[Moda
 
 
 def _analysed(shapes: tuple[Shape, ...], one: WantedBody, say: Say) -> ModalModel:
-    from sonic_bullet import modal
-    from sonic_bullet.effects.presets_of_effects import with_modes
-
-    solved = modal.analyse(shapes, one.material, **asdict(one.options), progress=say)
-    made = with_modes(solved, one.material)
-    return made if made is solved else replace(made, shape=rounded(made.shape))  # effects turn shapes
+    return analyse_body(shapes, one.material, **asdict(one.options), progress=say)
 
 
 def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:

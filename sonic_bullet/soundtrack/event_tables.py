@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 from collections import Counter
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from typing import Any
 
 from sonic_bullet.files import replacing
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.soundtrack.sound_events import SOUNDING, SoundEvent
 
 COLUMNS = (
@@ -63,7 +63,7 @@ def write_events(path: str | os.PathLike[str], events: Sequence[SoundEvent], log
         table.writerows(rows)
         content = text.getvalue()
     else:
-        content = json.dumps({"sounding": rows}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        content = json_bytes({"sounding": rows}, indent=1).decode()
     with replacing(path) as file:
         file.write(content.encode("utf-8", "replace"))
     return dict(Counter(row["kind"] for row in rows))

@@ -131,6 +131,25 @@ def test_everything_but_the_listener_lives_without_pybullet(module: str) -> None
     assert done.returncode == 0, done.stderr
 
 
+def called(tree: ast.AST) -> set[str]:
+    """Names of what is called, such as ``json.dumps``."""
+    return {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+
+
+def test_all_json_goes_through_one_encoder() -> None:
+    """json.dumps knows no numpy.bool, and each place had its own answer to NaN."""
+    own = {"json.dump", "json.dumps", "dumps", "msgspec.json.encode", "msgspec.json.Encoder", "msgspec.json.format"}
+    who = {str(path.relative_to(PACKAGE)): called(ast.parse(path.read_text())) & own for path in MODULES}
+    assert {name for name, found in who.items() if found} == {"files/json_text.py"}
+
+
+def test_materials_become_modes_in_one_place() -> None:
+    """What solved a material's elasticity by itself left its effects out."""
+    solving = {"modal.analyse", "analyse", "sonic_bullet.modal.analyse"}
+    who = {str(path.relative_to(PACKAGE)) for path in MODULES if called(ast.parse(path.read_text())) & solving}
+    assert who == {"session/body_models.py"}
+
+
 def public_parts(tree: ast.Module) -> list[ast.FunctionDef | ast.ClassDef]:
     """Public functions and classes of a module, and the public methods of those classes (properties and single
     expressions aside; a protocol's docstring speaks for its words).

@@ -1,0 +1,82 @@
+"""Every verdict of a diagnosis can be written: none, a band off, explained, unexplained, nothing compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sonic_bullet.cli import diagnose_command
+from sonic_bullet.diagnosis.diagnose import Diagnosis
+from sonic_bullet.diagnosis.evidence.baseline import takes_of
+from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.diagnosis.remainder import remainder
+from sonic_bullet.diagnosis.selection.stepwise import closed
+from sonic_bullet.effects.damping_law import DampingLaw
+from tests.diagnosis.test_bands import one_band_louder, one_mode_more
+from tests.diagnosis.test_found_again import BAND, fitted
+from tests.made.body import recorded, truth
+
+
+def lossy() -> Struck:
+    """Recorded with a constant loss factor."""
+    return recorded(DampingLaw("constant-loss", 8e-3))
+
+
+def spoiled() -> Struck:
+    body = recorded()
+    assert body.recorded is not None and body.recorded.signals is not None
+    signals = np.full_like(body.recorded.signals, np.nan)
+    return replace(body, recorded=replace(body.recorded, signals=signals))
+
+
+CASES: list[tuple[Callable[[], Struck], tuple[Any, ...], str, str]] = [
+    (recorded, (), "none", ""),
+    (one_band_louder, (), "unexplained", "dB more than played between"),
+    (one_mode_more, (), "unexplained", "dB more than played between"),
+    (lossy, (DampingLaw,), "explained", ""),
+    (lossy, (), "unexplained", "most of it in the"),
+    (spoiled, (), "unexplained", "nothing could be compared"),
+]
+
+
+@pytest.mark.parametrize(
+    ("made", "effects", "verdict", "words"),
+    CASES,
+    ids=["none", "band off", "band off by a mode more", "explained", "unexplained", "nothing compared"],
+)
+def test_every_verdict_can_be_written(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    made: Callable[[], Struck],
+    effects: tuple[Any, ...],
+    verdict: str,
+    words: str,
+) -> None:
+    body = made()
+    takes, base = takes_of((body,)), truth() if made is spoiled else fitted(body)
+    end = closed(base, (body,), takes, effects, BAND)
+    case: Any = SimpleNamespace(name="made", warnings=())
+    fit: Any = SimpleNamespace(fit=SimpleNamespace(gamma_m2_s2=np.float64("nan"), poisson_ratio=0.3))
+    errors: dict[str, Any] = {"before": {"fit": None}, "after": {"fit": np.float64(1.0)}, "floor": np.nan}
+    left = remainder(end, takes)
+    found = Diagnosis(case, fit, (body,), takes, end, errors, errors, {}, left, {}, ())
+    module = import_module("sonic_bullet.diagnosis.diagnose")  # as an attribute of its package it is the function
+    monkeypatch.setattr(module, "diagnose", lambda *_, **__: found)
+    monkeypatch.setattr(diagnose_command, "read_case", lambda _: case)
+    place = tmp_path / "d.json"
+    diagnose_command.run_diagnose("made", output=None, json_to=str(place), predict=None, report=None, seed=0)
+    written = json.loads(place.read_text())
+    assert written["verdict"] == verdict
+    assert words in written["unexplained"].get("words", "")
+    assert [one["id"] for one in written["effects"]] == ["damping-law"] * (verdict == "explained")
+    assert written["baseline"]["gamma_m2_s2"] is None and written["errors"]["floor"] is None
+    if "dB more" in words:
+        assert all(isinstance(band["early"], bool) for band in written["unexplained"]["bands_off"])
