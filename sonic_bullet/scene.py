@@ -26,8 +26,10 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener import (
     Finding,
+    body_ids,
     diagnose_world,
     direct_client,
+    is_static,
     links_with_shapes,
     own_clients,
     run_script,
@@ -39,6 +41,7 @@ from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletErr
 from sonic_bullet.render import as_tail_db, render_kept, silence_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
+from sonic_bullet.session.links_of_script import add_links
 from sonic_bullet.session.scene_file import defines_build, scene_module, user_code, uses_sonic_bullet
 
 DEFAULT_SECONDS = 4.0
@@ -327,22 +330,23 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
     material = stage.material or as_material(DEFAULT_MATERIAL)
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
     stage.microphones = None
-    known: set[tuple[int, int]] = set()
+    known: set[int] = set()
+    said: list[str] = []
 
     def before(client: int) -> None:
         if stage.listener is None:
             stage.listener = stage.attached(client, places)
-        new = [who for who in links_with_shapes(client) if who not in known]
-        if new:
-            known.update(new)
-            stage.listener.add_all(dict.fromkeys(new, material), progress=say)
+        came = [body for body in body_ids(client) if body not in known]
+        known.update(came)
+        if new := [who for body in came for who in links_with_shapes(client, body)]:
+            said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client), say))
         stage.ready()
 
     def after(_: int) -> None:
         stage.need_listener().step()
 
     run_script(stage.path, (before, after), total, progress=progress)
-    return (f"every body sounds as {material.name}: the script names no materials",)
+    return (f"every body sounds as {material.name}: the script names no materials", *said)
 
 
 def _listener_in(names: dict[str, Any]) -> Listener | None:

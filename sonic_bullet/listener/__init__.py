@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         disconnect,
         is_bullet_client,
         is_connected,
+        is_static,
         links_called,
         links_with_shapes,
         open_world,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     )
     from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
     from sonic_bullet.listener.pybullet.hooks import module_steps
+    from sonic_bullet.listener.pybullet.poses import body_ids
     from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
     from sonic_bullet.listener.pybullet.script import own_clients, run_script
     from sonic_bullet.listener.world import World
@@ -38,12 +40,14 @@ __all__ = [
     "PyBulletWorld",
     "World",
     "bodies_called",
+    "body_ids",
     "client_id_of",
     "diagnose_world",
     "direct_client",
     "disconnect",
     "is_bullet_client",
     "is_connected",
+    "is_static",
     "keep_restitution",
     "links_called",
     "links_with_shapes",
@@ -59,12 +63,14 @@ _HOME = {
     "PyBulletWorld": "pybullet.pybullet_world",
     "World": "world",
     "bodies_called": "pybullet.clients",
+    "body_ids": "pybullet.poses",
     "client_id_of": "pybullet.clients",
     "diagnose_world": "pybullet.doctor",
     "direct_client": "pybullet.clients",
     "disconnect": "pybullet.clients",
     "is_bullet_client": "pybullet.clients",
     "is_connected": "pybullet.clients",
+    "is_static": "pybullet.clients",
     "keep_restitution": "pybullet.doctor",
     "links_called": "pybullet.clients",
     "links_with_shapes": "pybullet.clients",

@@ -14,7 +14,8 @@ import pybullet
 from sonic_bullet.listener.frames import NO_NUMBER, Roster, decode, encode, link_words
 from sonic_bullet.listener.memory import make_ready
 from sonic_bullet.listener.properties import Properties
-from sonic_bullet.listener.pybullet.pieces import collision_pieces
+from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
+from sonic_bullet.listener.pybullet.pieces import collision_pieces, described_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.package_version import find_version
@@ -239,6 +240,11 @@ class AskedLinks(World):
     client_id: int
     properties: Properties
 
+    @property
+    def left_out(self) -> BodiesLeftOut:
+        """Who of the world is left out, and what was said of it."""
+        raise NotImplementedError
+
     def likeness(self, body: int, link: int) -> Hashable:
         """What tells a link that exists from another's that was given its id."""
         return likeness(self.client_id, body, link)
@@ -267,7 +273,10 @@ class AskedLinks(World):
 
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
-        return shapes_of(self.client_id, body, link)
+        shapes = shapes_of(self.client_id, body, link)
+        if described_pieces(self.client_id, body, link)[1]:
+            self.left_out.meet_drawn(body, link_name(self.client_id, body, link))
+        return shapes
 
     def make_ready(self) -> None:
         """Have the machine code that the first step would else wait for."""

@@ -10,6 +10,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import hooks
+from sonic_bullet.listener.pybullet.given_bodies import begin
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
@@ -25,6 +26,7 @@ def direct_client() -> BulletClient:
     """
     with quiet_stdout():
         client = BulletClient(pybullet.DIRECT)
+    begin(client._client)
     if client._client < 0:
         raise SceneError("PyBullet gives no further client", "disconnect those no longer needed")
     return client
@@ -41,6 +43,7 @@ def disconnect(client: BulletClient) -> None:
     Its id is cleared, for BulletClient's finaliser would end whoever has it next.
     """
     client_id, client._client = client._client, -1
+    begin(client_id)
     if client_id >= 0 and pybullet.isConnected(client_id):
         pybullet.disconnect(client_id)
 
@@ -63,6 +66,11 @@ def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[in
         for link in range(-1, ask.getNumJoints(one, physicsClientId=cid))
         if collision_pieces(cid, one, link)
     )
+
+
+def is_static(client_id: int, body: int, link: int) -> bool:
+    """Whether a link that exists can never move: the base of a body of mass 0."""
+    return link < 0 and pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[0] == 0
 
 
 def links_called(world: facts.AskedLinks, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:

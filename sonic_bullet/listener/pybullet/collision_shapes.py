@@ -19,7 +19,9 @@ import pybullet
 
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.listener.frames import link_words
-from sonic_bullet.listener.pybullet.pieces import Piece, collision_pieces, turn_matrix, visual_pieces
+from sonic_bullet.listener.pybullet.filled_space import link_pose
+from sonic_bullet.listener.pybullet.given_bodies import SAME_M, SAME_SHARE, given_triangles, is_maximal, twin
+from sonic_bullet.listener.pybullet.pieces import UNKNOWN, Piece, collision_pieces, turn_matrix, visual_pieces
 from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, hull, joined, read_surfaces
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array, Shape
@@ -33,11 +35,22 @@ def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
 
     The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself.
     """
+    if is_maximal(client_id, body):
+        with twin(client_id, body) as other:
+            if other is not None:
+                return shapes_of(*other, -1)
     pieces = collision_pieces(client_id, body, link)
     if not pieces:
         raise MeshError(
             f"body {body}{link_words(link)} has no collision shape, or one that PyBullet does not describe",
             "add another link, or pass mesh=",
+        )
+    if pieces[0].kind == UNKNOWN:
+        raise MeshError(
+            f"body {body}{link_words(link)} collides as something that PyBullet cannot be asked for, and what is drawn "
+            "does not fill the same space",
+            "attach to the BulletClient before it is loaded, load it without useMaximalCoordinates or fromto, "
+            "or pass mesh=",
         )
     shapes: list[Shape] = []
     filed: set[Piece] = set()
@@ -51,6 +64,16 @@ def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
             filed.add(piece)
             shapes.append(_from_file(client_id, body, link, i, piece))
     return (*shapes, *_unfiled(client_id, body, link, hulls))
+
+
+def _takes_its_box(client_id: int, body: int, vertex_m: Array) -> bool:
+    """Whether vertices (v, 3) in the frame of a base take the box that it takes."""
+    position, turn = link_pose(client_id, body, -1)
+    local = np.array([vertex_m.min(axis=0), vertex_m.max(axis=0)])
+    half, middle = np.abs(turn) @ np.ptp(local, axis=0) / 2, turn @ local.mean(axis=0) + position
+    box = np.array(pybullet.getAABB(body, -1, physicsClientId=client_id))
+    tolerance = SAME_M + SAME_SHARE * float(np.ptp(box, axis=0).max())
+    return bool(np.abs(np.array([middle - half, middle + half]) - box).max() < tolerance)
 
 
 def _file(piece: Piece) -> Path | None:
@@ -126,6 +149,9 @@ def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Arra
     found = tuple(cylinder for cylinder in cylinders if cylinder is not None)
     if not rest:
         return found
+    told = given_triangles(client_id, body) if link < 0 and not found and len(rest) == 1 and not len(rest[0]) else None
+    if told is not None and _takes_its_box(client_id, body, told[0]):
+        return (outward(*told),)
     visual = visual_surface(client_id, body, link)
     known = np.concatenate(rest)
     if visual is not None and len(known) and _same_space(visual[0], known):

@@ -25,6 +25,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.properties import SetValues
+from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, remembering
 from sonic_bullet.records.errors import SceneError
 
 POSE_SETTERS = (
@@ -100,6 +101,7 @@ class Hooks:
             "setPhysicsEngineParameter": self._setting_engine(self._below(client, "setPhysicsEngineParameter")),
             "setDefaultContactERP": self._setting_engine(self._below(client, "setDefaultContactERP"), "contactERP"),
             **{name: self._telling(name, client, lambda world, body: world.mark_moved(body)) for name in POSE_SETTERS},
+            **{name: remembering(name, self._below(client, name), client_id, self._client) for name in MAKERS},
         }
         self._kept = {name: vars(client)[name] for name in self._ours if name in vars(client)}
         vars(client).update(self._ours)
@@ -152,6 +154,7 @@ class Hooks:
 
     def _telling(self, name: str, client: Any, tell: Callable[[Watcher, int], None]) -> Callable[..., Any]:
         below = self._below(client, name)
+        below = remembering(name, below, self._client_id, self._client) if name in ENDERS else below
         of_body = name == "removeBody" or name in POSE_SETTERS
 
         def reporting(*args: Any, **kwargs: Any) -> Any:

@@ -54,6 +54,12 @@ class BodiesLeftOut:
                 )
         self.soft = set(soft)
 
+    def meet_drawn(self, body: int, name: str) -> None:
+        """Note a body whose drawn shape stands in for what it collides as."""
+        text = f"body {body} ({name}) sounds as what is drawn, which fills the same space: how it was made was not seen"
+        if text not in self.notes:
+            self._say(text)
+
     def forget(self, body: int | None) -> None:
         """A body was removed (None: all); its id may be given anew."""
         for group in (self.muted, self.soft):

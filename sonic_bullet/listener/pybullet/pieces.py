@@ -1,7 +1,8 @@
 """The pieces a link's collision geometry is made of, as PyBullet describes them, placed in the body frame.
 
-getCollisionShapeData has no answer for bodies in maximal coordinates and for height fields. For the first their visual
-shape stands in, which is the collision shape unless another was asked for; the second are left out.
+getCollisionShapeData ends the process on capsules that an MJCF file gives by their ends: they are read from the file
+(mjcf_capsules). It has no answer for bodies in maximal coordinates: a twin of what was asked for is asked instead
+(given_bodies), else what is drawn stands in, where it fills the same space. Height fields are left out.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pybullet
 
+from sonic_bullet.listener.pybullet.filled_space import fills
+from sonic_bullet.listener.pybullet.given_bodies import is_maximal, twin
+from sonic_bullet.listener.pybullet.mjcf_capsules import must_not_be_asked, read_capsules
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array
 
@@ -36,21 +40,48 @@ class Piece(NamedTuple):
     quaternion: Any
 
 
+UNKNOWN = -1
+NOBODY_KNOWS = (Piece(UNKNOWN, (0.0, 0.0, 0.0), "", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),)
+
+
 def turn_matrix(quaternion_xyzw: Any) -> Array:
     """Rotation matrix (3, 3) of a quaternion."""
     return np.array(pybullet.getMatrixFromQuaternion(quaternion_xyzw)).reshape(3, 3)
 
 
 def collision_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:
-    """Pieces of an existing link; none where it cannot be touched or PyBullet cannot say how."""
+    """Pieces of an existing link; none where it cannot be touched, one UNKNOWN where nobody can say what it is."""
+    return described_pieces(client_id, body, link)[0]
+
+
+def described_pieces(client_id: int, body: int, link: int) -> tuple[tuple[Piece, ...], bool]:
+    """The same, and whether they are what is drawn, standing in for what collides where both fill the same space."""
+    if is_maximal(client_id, body):
+        return _maximal_pieces(client_id, body)
+    drawn = visual_pieces(client_id, body, link)
+    if must_not_be_asked(client_id, body, drawn):
+        read = read_capsules(client_id, body, link, drawn)
+        return (NOBODY_KNOWS if read is None else read), False
     with quiet_stdout():
         try:
             shapes = pybullet.getCollisionShapeData(body, link, physicsClientId=client_id)
         except pybullet.error:
-            return tuple(piece for piece in visual_pieces(client_id, body, link) if piece.kind in KINDS)
-    return tuple(
+            shapes = ()
+    asked = tuple(
         Piece(kind, size, _name(file), position, quaternion) for _, _, kind, size, file, position, quaternion in shapes
     )
+    return asked, False
+
+
+def _maximal_pieces(client_id: int, body: int) -> tuple[tuple[Piece, ...], bool]:
+    """Pieces of a body in maximal coordinates: its twin's, or those drawn where they fill the space that it takes."""
+    with twin(client_id, body) as other:
+        if other is not None:
+            return collision_pieces(*other, -1), False
+    drawn = tuple(piece for piece in visual_pieces(client_id, body, -1) if piece.kind in KINDS)
+    if fills(client_id, body, -1, drawn):
+        return drawn, True
+    return NOBODY_KNOWS, False
 
 
 def visual_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:

@@ -23,6 +23,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.files.reading import refuse_lfs_pointer
 from sonic_bullet.listener.pybullet.clients import disconnect as end
+from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, begin, remembering
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.errors import SceneError, SonicBulletError
 
@@ -54,6 +55,7 @@ def own_clients() -> Iterator[None]:
             end(client)
         for number in _open_clients() - before:
             pybullet.disconnect(number)
+            begin(number)
 
 
 def _open_clients() -> set[int]:
@@ -124,6 +126,7 @@ def _stage(
         with quiet_stdout():
             number = int(real_connect(pybullet.DIRECT))
         opened.add(number)
+        begin(number)
         return number
 
     def step(physicsClientId: int = 0) -> Any:
@@ -180,6 +183,7 @@ def _stage(
         "setRealTimeSimulation": set_real_time,
         "addUserDebugParameter": add_slider,
         "readUserDebugParameter": read_slider,
+        **{name: remembering(name, getattr(pybullet, name)) for name in (*MAKERS, *ENDERS)},
     }
     forward = BulletClient.__getattr__
 

@@ -1,0 +1,142 @@
+"""Capsules that an MJCF file gives by their two ends (fromto): asked for one, PyBullet's getCollisionShapeData ends the
+process, and what is drawn has lost its place. So they are read from the file, and held against the space they take.
+
+    saveWorld -> names of the MJCF files that a client ever loaded -> geoms of each body of them
+    a link that draws a capsule -> a body of as many geoms, capsules as long -> drawn pieces, placed by fromto
+
+Bullet makes such a capsule of two spheres, whose box is larger by its margin (measured: 0.04 m on each side). By that
+it is told from a capsule that may be asked for.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import numpy as np
+import pybullet
+
+from sonic_bullet.listener.pybullet.filled_space import fills
+from sonic_bullet.listener.pybullet.given_bodies import given_body, search_folders
+from sonic_bullet.listener.quiet import quiet_stdout
+
+if TYPE_CHECKING:
+    from sonic_bullet.listener.pybullet.pieces import Piece
+
+MARGIN_M = 0.04
+FINE = 0.2
+LARGEST_FILE = 1 << 24
+LOADED = re.compile(r'^objects = p\.loadMJCF\("(.*)"\)$', re.MULTILINE)
+Ends = tuple[float, ...] | None
+"""from and to of a geom, 6 numbers, or None where it has none."""
+
+
+def loaded_files(client_id: int) -> tuple[str, ...]:
+    """Names of the MJCF files that a client ever loaded, as they were given."""
+    with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder, quiet_stdout():
+        place = Path(folder, "world.py")
+        try:
+            pybullet.saveWorld(str(place), physicsClientId=client_id)
+            text = place.read_text(errors="replace")
+        except (pybullet.error, OSError):
+            return ()
+    return tuple(dict.fromkeys(LOADED.findall(text)))
+
+
+def must_not_be_asked(client_id: int, body: int, drawn: tuple[Piece, ...]) -> bool:
+    """Whether asking for the shape of a link that draws this could end the process."""
+    given = given_body(client_id, body)
+    if all(piece.kind != pybullet.GEOM_CAPSULE for piece in drawn) or (given is not None and given.call != "loadMJCF"):
+        return False
+    return bool(loaded_files(client_id))
+
+
+def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]) -> tuple[Piece, ...] | None:
+    """What a link that must not be asked collides as, in its body frame, or None where nobody can say."""
+    if fills(client_id, body, link, drawn, fine=FINE):
+        return drawn
+    info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
+    back = pybullet.invertTransform(info[3], info[4])
+    found: list[tuple[Piece, ...]] = []
+    for name in loaded_files(client_id):
+        place = _place(name)
+        for geoms in bodies_with_ends(place, place.stat().st_mtime_ns) if place is not None else ():
+            placed = _placed(drawn, geoms, back)
+            if placed is not None:
+                grown = [MARGIN_M if ends is not None else 0.0 for ends in geoms]
+                if fills(client_id, body, link, placed, grown, fine=FINE) and placed not in found:
+                    found.append(placed)
+    all_by_ends = [MARGIN_M if piece.kind == pybullet.GEOM_CAPSULE else 0.0 for piece in drawn]
+    if not found and fills(client_id, body, link, drawn, all_by_ends, fine=FINE):
+        return drawn
+    return found[0] if len(found) == 1 else None
+
+
+def _place(name: str) -> Path | None:
+    """The file of that name, looked for where PyBullet does."""
+    import pybullet_data
+
+    main = getattr(sys.modules.get("__main__"), "__file__", None)
+    folders = ["", *reversed(search_folders), pybullet_data.getDataPath(), *([str(Path(main).parent)] if main else [])]
+    return next((place for folder in folders if (place := Path(folder, name)).is_file()), None)
+
+
+@lru_cache(maxsize=64)
+def bodies_with_ends(place: Path, _changed_ns: int) -> tuple[tuple[Ends, ...], ...]:
+    """Geoms of each body of an MJCF file, those with fromto by their ends; bodies without one are left out, and each of
+    the world's own geoms is a body.
+    """
+    try:
+        data = place.read_bytes() if place.stat().st_size <= LARGEST_FILE else b""
+        root = ElementTree.fromstring(data) if b"<!" not in data.replace(b"<!--", b"") else None
+    except (OSError, ElementTree.ParseError):
+        return ()
+    return () if root is None else tuple(geoms for geoms in _geoms(root) if any(geoms))
+
+
+def _geoms(root: ElementTree.Element) -> Iterator[tuple[Ends, ...]]:
+    for world in root.iter("worldbody"):
+        for geom in world.findall("geom"):
+            yield (_ends(geom),)
+        for body in world.iter("body"):
+            yield tuple(_ends(geom) for geom in body.findall("geom"))
+
+
+def _ends(geom: ElementTree.Element) -> Ends:
+    try:
+        ends = tuple(float(x) for x in geom.get("fromto", "").split())
+    except ValueError:
+        return None
+    return ends if len(ends) == 6 and np.isfinite(ends).all() else None
+
+
+def _placed(drawn: tuple[Piece, ...], geoms: tuple[Ends, ...], back: tuple[object, object]) -> tuple[Piece, ...] | None:
+    """Drawn pieces, capsules among them placed by the ends of geoms; None where they are not of one length."""
+    if len(drawn) != len(geoms):
+        return None
+    placed = []
+    for piece, ends in zip(drawn, geoms, strict=True):
+        if ends is None or piece.kind != pybullet.GEOM_CAPSULE:
+            placed.append(piece)
+            continue
+        start, end = np.array(ends[:3]), np.array(ends[3:])
+        length = float(np.linalg.norm(end - start))
+        if abs(length - piece.size[0]) > 1e-4 * length + 1e-6:
+            return None
+        axis = (end - start) / length if length else np.array([0.0, 0, 1])
+        position, quaternion = pybullet.multiplyTransforms(*back, (start + end) / 2, _z_to(axis))
+        placed.append(piece._replace(position=position, quaternion=quaternion))
+    return tuple(placed)
+
+
+def _z_to(axis: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, ...]:
+    """Quaternion that turns z to a unit vector (3,), or to its opposite: a capsule has no end that is the first."""
+    x, y, z = axis if axis[2] >= 0 else -axis
+    q = np.array([-y, x, 0.0, 1 + z])
+    return tuple((q / np.linalg.norm(q)).tolist())

@@ -1,0 +1,95 @@
+"""Links of a script that names no materials: who sounds, and who is a silent partner, and why.
+
+link -> its shapes -> ground: a silent partner with concrete's contact
+                   -> not understood, or without modes: a silent partner that is named, with the remedy
+                   -> else it sounds
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from sonic_bullet.geometry.triangles import LARGEST_M
+from sonic_bullet.records import Array, Material, Shape
+from sonic_bullet.records.errors import MaterialError, SonicBulletError
+from sonic_bullet.session.arguments import as_material
+from sonic_bullet.session.listening import Listener
+
+GROUND_M = 5.0
+"""A static, flat body longer than this is ground: no board that is struck to sound is as long."""
+FLATTEST = 0.5
+"""Most of a flat body's thickness, as part of its second side: pybullet_data's planes are 200 x 200 x 10 m."""
+HOW_IT_SOUNDS = "it sounds where the script attaches a listener and adds it with mesh="
+
+
+def add_links(
+    listener: Listener,
+    cast: Mapping[tuple[int, int], Material],
+    static: Callable[[int, int], bool],
+    progress: Callable[[str], None] | None = None,
+) -> tuple[str, ...]:
+    """Let links sound, each as its material, those that can; notes on those that are silent partners.
+
+    static: whether a link can never move. One that fails stops none of the others.
+    """
+    notes: list[str] = []
+    sounding: dict[tuple[int, int], Material] = {}
+    for who, material in cast.items():
+        try:
+            shapes = listener.world.shapes_of(*who)
+            if static(*who) and is_ground(shapes):
+                listener.world.add(*who, material=as_material("concrete"))
+                name = listener.world.name_of(*who)
+                notes.append(f"{name} is ground ({_long(shapes)}): a silent partner with concrete's contact")
+                continue
+            sounding[who] = material
+        except SonicBulletError as error:
+            notes.append(_silent(listener, who, error))
+    try:
+        listener.add_all(sounding, progress=progress)
+    except MaterialError:
+        raise
+    except SonicBulletError:
+        for who, material in sounding.items():
+            try:
+                listener.add_all({who: material}, progress=progress)
+            except SonicBulletError as error:
+                notes.append(_silent(listener, who, error))
+    return tuple(notes)
+
+
+def _silent(listener: Listener, who: tuple[int, int], error: SonicBulletError) -> str:
+    name = listener.world.name_of(*who)
+    what = error.what.removeprefix(f"{name}: ")
+    return f"{name} is a silent partner: {what}; {HOW_IT_SOUNDS}"
+
+
+def is_ground(shapes: tuple[Shape, ...]) -> bool:
+    """Whether a static body of these shapes is what others stand on: a plane, flat and longer than GROUND_M, or larger
+    than anything that is struck to sound.
+    """
+    if any(shape.kind == "plane" for shape in shapes):
+        return True
+    thin, middle, long = sorted(_sides_m(shapes))
+    return bool((long > GROUND_M and thin <= FLATTEST * middle) or long > LARGEST_M)
+
+
+def _long(shapes: tuple[Shape, ...]) -> str:
+    if any(shape.kind == "plane" for shape in shapes):
+        return "an endless plane that never moves"
+    return f"static, {float(_sides_m(shapes).max()):.3g} m long"
+
+
+def _sides_m(shapes: tuple[Shape, ...]) -> Array:
+    """Sides (3,) of the box of all shapes, each in the axes of the body where it is not turned."""
+    corners = []
+    for shape in shapes:
+        if shape.kind == "mesh":
+            corners.append(np.asarray(shape.vertex_m))
+            continue
+        size = np.asarray(shape.size_m, float)
+        half = size / 2 if shape.kind == "box" else np.array([size[0], size[0], size[0] + size[1] / 2])
+        corners.append(np.array([shape.position_m - half, shape.position_m + half]))
+    return np.asarray(np.ptp(np.concatenate(corners), axis=0))

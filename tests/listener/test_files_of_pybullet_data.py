@@ -1,0 +1,41 @@
+"""Robots and worlds that others made, each in a process of its own: none dies, and who stays silent is named."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.made.robots import CANNOT_BE_LOADED, ONE_A_KIND, STEPS, all_files
+
+BOUND_S = 240
+
+
+def heard(name: str, *how: str) -> None:
+    command = [sys.executable, "-m", "tests.made.robots", name, *how]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=BOUND_S, errors="replace", check=False)
+    assert "Traceback" not in done.stderr, done.stderr[-2000:]
+    assert done.returncode == CANNOT_BE_LOADED.get(name, 0), done.stderr[-2000:]
+    if not done.returncode:
+        told = json.loads(done.stdout.splitlines()[-1])
+        assert told["steps"] == STEPS
+        assert all("silent partner" in note for note in told["notes"])
+
+
+@pytest.mark.parametrize("name", ONE_A_KIND)
+def test_one_file_a_kind(name: str) -> None:
+    heard(name)
+
+
+def test_there_are_136_and_20() -> None:
+    names = all_files()
+    assert len(names) == len(set(names)) == 156
+    assert set(ONE_A_KIND) | set(CANNOT_BE_LOADED) <= set(names)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", all_files())
+def test_every_file(name: str) -> None:
+    heard(name, "sound")
