@@ -206,14 +206,16 @@ def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> No
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
     root = Path(folder_place(folder))
-    root.mkdir(parents=True, exist_ok=True)
-    to = places(*(str(root / f"{Path(scene).stem}.json") for scene in scenes))
+    to = [root / f"{Path(scene).stem}.json" for scene in scenes]
+    if len(set(to)) < len(to):
+        raise FileError("two scenes have one name", "give each its own -o DIR")
     with quiet_stderr():
         import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
         from sonic_bullet.comparing.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
         with status(scene) as tell:
             made = make_baseline(scene, reason, tell, runs)
+        root.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)
         what = f"{len(made.features)} runs" if made.features else "no ensemble"
         commit = f"commit {made.commit[:12]}{'' if made.clean else ' with changes'}" if made.commit else "no commit"

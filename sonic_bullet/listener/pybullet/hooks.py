@@ -25,6 +25,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.properties import SetValues
+from sonic_bullet.machine.worker import mark_step
 from sonic_bullet.records.errors import SceneError
 
 POSE_SETTERS = (
@@ -143,6 +144,7 @@ class Hooks:
             for one in reversed(self.listening[:]):
                 one.before()
             result = below(*args, **kwargs)
+            mark_step()
             for one in self.listening[:]:
                 one.after()
             return result
