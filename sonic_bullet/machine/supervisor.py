@@ -36,15 +36,19 @@ IDLE_S = 10.0
 """Wall time without a physics step after which a scene is taken for a viewer's loop."""
 ASK_S = 1.0
 """How often a scene that does not step is asked where it is."""
-END_S = 0.6
+END_S = 0.5
 """For an interrupted command to end by itself; it must be gone within 1 s."""
 CLOSE_S = 20.0
 """For what was made before the interrupt to be written."""
+LEAVE_S = 0.2
+"""For the interpreter of an interrupted command to end once all is said."""
 POLL_S = 0.05
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
 STAND_INS = f"{PACKAGE}/listener/pybullet/"
 """Functions that a script calls in place of PyBullet's: their time is the script's own."""
 LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
+_FORKS_EARLY_ONLY = sys.platform != "linux"
+"""Where libraries forbid a fork once they are there (macOS)."""
 SUBREAPER, DEATH_SIGNAL = 36, 1  # prctl(2)
 
 
@@ -123,8 +127,9 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
     alone: this process is the command's: interrupts are passed on, and the worker ends as an interpreter does; else the
     caller goes on, and what interrupts it ends the worker.
     """
-    if ASK_WHERE is None or not hasattr(os, "fork") or (alone and threading.active_count() > 1):
-        catch_stops()
+    if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
+        if alone:
+            catch_stops()
         return Ending(run())
     said, traces, clock = os.pipe(), os.pipe(), mmap.mmap(-1, 8)
     sys.stdout.flush(), sys.stderr.flush()
@@ -222,7 +227,7 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
 
 
 def _ending(child: _Worker, stops: list[int], ended_idle: tuple[str, str] | None) -> Ending:
-    end = time.monotonic() + END_S
+    end = time.monotonic() + (LEAVE_S if stops else 4 * END_S)
     while not child.has_ended() and child.code is not None and time.monotonic() < end:
         child.listen(0.005)
     running = not child.has_ended()
