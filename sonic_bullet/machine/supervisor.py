@@ -11,6 +11,7 @@ what the worker had started. Where processes do not fork, the command runs here.
 
 from __future__ import annotations
 
+import atexit
 import mmap
 import os
 import re
@@ -21,6 +22,7 @@ import struct
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -169,15 +171,19 @@ def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool,
     code = 2
     try:
         code = run()
+    except BaseException:  # a command with SONIC_BULLET_DEBUG
+        traceback.print_exc()
     finally:
         with suppress(Exception):
             sys.stdout.flush(), sys.stderr.flush()
         if os.getpid() != worker._LINE.process:  # a fork of the scene's own that came this far
             leave(code)
         tell("done", str(code))
-        if not alone:
-            leave(code)
-    sys.exit(code)
+        if alone:  # as an interpreter ends; whoever called `supervised` goes on in the other process alone
+            atexit._run_exitfuncs()
+            with suppress(Exception):
+                sys.stdout.flush(), sys.stderr.flush()
+        leave(code)
 
 
 def _end_idle(_: int, frame: FrameType | None) -> None:

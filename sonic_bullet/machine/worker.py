@@ -31,7 +31,7 @@ Handler = Callable[[int, FrameType | None], Any]
 
 
 @dataclass(slots=True)
-class Line:
+class WorkerState:
     """To the supervisor. fd: of the pipe; clock: 8 bytes, when the scene stepped last, 0: no scene runs."""
 
     fd: int = -1
@@ -41,7 +41,7 @@ class Line:
     stopped: str = ""
 
 
-_LINE = Line()
+_LINE = WorkerState()
 
 
 def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
