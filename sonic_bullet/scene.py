@@ -35,6 +35,7 @@ from sonic_bullet.listener import (
     run_script,
     watch_settings,
 )  # fmt: skip
+from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
@@ -224,7 +225,9 @@ class _Stage:
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
-            return (_run_built if defines_build(self.path) else _run_plain)(self, seconds, progress, say)
+            run = _run_built if defines_build(self.path) else _run_plain
+            with running_scene(self.path):
+                return run(self, seconds, progress, say)
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """A listener that keeps its run, unless somebody hears it at once."""

@@ -11,7 +11,8 @@
     cache                     -> table, JSON
 
 Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name
-half-written. 130 (Ctrl-C), 143 (terminated): what was rendered so far is closed as a valid file and named. With --json
+half-written; a scene that ends its process or never steps is named with its line. 130 (Ctrl-C), 143 (terminated):
+within a second; what was rendered so far is closed as a valid file and named. With --json
 and no path only JSON goes to stdout, whatever a scene prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Everything heavy
 is imported by the command that needs it.
 """

@@ -31,6 +31,10 @@ Examples:
 @click.argument("b", metavar="[B]", required=False)
 @click.option("--ref", metavar="REV", help="Compare A as it was at this git revision with A as it is now.")
 @click.option("--audible", is_flag=True, help="Is the change beyond chance? Runs A 99 times, starts 0.1 mm apart.")
+@click.option(
+    "--tolerance-db", type=click.FloatRange(0, 200), metavar="DB",
+    help="Octave levels may differ by so much. [default: samples are equal]",
+)  # fmt: skip
 @click.option("--report", metavar="OUT.html", help="Also write one page that opens offline: players, pictures, tables.")
 @click.option("--seconds", type=click.FloatRange(0, min_open=True), metavar="S", help="How long to run both scenes.")
 @click.option("--sr", type=click.IntRange(8000, 384000), metavar="HZ", help="Rate of both scenes. [default: 48000]")
@@ -53,7 +57,8 @@ def compare(a: str, b: str | None, **options: Any) -> None:
         if options["ref"] is not None:
             from sonic_bullet.comparing.revisions import at_revision
 
-            a, b = stack.enter_context(at_revision(a, options["ref"])), a
+            there, options["revision"] = stack.enter_context(at_revision(a, options["ref"]))
+            a, b = there, a
         assert b is not None
         tell = stack.enter_context(status("compare"))
         found, stopped = _found(Path(a), Path(b), options, tell, page is not None)
@@ -106,14 +111,16 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
     from sonic_bullet.comparing.compared_sides import compare as compare_both
     from sonic_bullet.comparing.folders import Paired, compare_folders
     from sonic_bullet.comparing.sides import SceneSide
+    from sonic_bullet.comparing.tolerance import found_closeness
 
-    def side(path: Path) -> Any:
+    def side(path: Path, *, old: bool = False) -> Any:
         if path.suffix.lower() != ".py":
             return path
-        return SceneSide(path, seconds=options["seconds"], sr=options["sr"] or 48_000)
+        given = {"seconds": options["seconds"], "sr": options["sr"] or 48_000}
+        return SceneSide(path, **given, revision=options.get("revision") if old else None)
 
     def both(one: Path, other: Path) -> dict[str, Any]:
-        found, refused = compare_both(side(one), side(other), say=tell), ""
+        found, refused = compare_both(side(one, old=True), side(other), say=tell), ""
         if options["audible"] and not found.same and not found.stopped:
             from sonic_bullet.comparing.ensemble import audible
 
@@ -123,10 +130,12 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
                 found = replace(found, stopped=True)
             except CompareError as error:
                 refused = str(error)
+        if options["tolerance_db"] is not None and not found.same:
+            found = replace(found, closeness=found_closeness(found.a, found.b, options["tolerance_db"]))
         return _kept(found, page) | {"refused": refused}
 
     if a.suffix.lower() == ".json":
-        return [Paired(b.name, _against_baseline(a, b, tell))], False
+        return [Paired(b.name, _against_baseline(a, b, tell, options["tolerance_db"]))], False
     if a.is_dir():
         return compare_folders(a, b, both, tell)
     kept = both(a, b)
@@ -143,14 +152,21 @@ def _kept(found: Any, page: bool) -> dict[str, Any]:
     return kept
 
 
-def _against_baseline(a: Path, b: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def _against_baseline(a: Path, b: Path, tell: Callable[[str], None], tolerance_db: float | None) -> dict[str, Any]:
     """A scene held against what it sounded like."""
     from sonic_bullet.comparing.baselines import check_baseline, read_baseline
 
-    checked = check_baseline(read_baseline(a), b, tell)
-    words = [*checked.words, *([checked.audible.words] if checked.audible is not None else [])]
+    checked = check_baseline(read_baseline(a), b, tell, tolerance_db)
+    judged = [one.words for one in (checked.audible, checked.closeness) if one is not None]
+    words = [*checked.words, *judged, *([f"compared: {checked.compared}"] if checked.passed else [])]
     head = "same: all samples are as the baseline's" if checked.same else f"differs from {a.name}"
-    described = {"same": checked.same, "passed": checked.passed, "verdict": head, "effects": words}
+    described = {
+        "same": checked.same,
+        "passed": checked.passed,
+        "verdict": head,
+        "effects": words,
+        "compared": checked.compared,
+    }
     return {"lines": [head, *(f"  {one}" for one in words)], "described": described, "passed": checked.passed,
             "stopped": False, "refused": ""}  # fmt: skip
 
@@ -191,29 +207,37 @@ def _exit(found: list[Any]) -> None:
 
 BASELINE_EPILOG = """\b
 Example:
-  sonic-bullet baseline scenes/bar.py -o tests/sonic_baselines --reason "new cup"
+  sonic-bullet baseline scenes/bar.py --reason "new cup"
 """
 
 
 @click.command(epilog=BASELINE_EPILOG)
 @click.argument("scenes", metavar="SCENE.py...", nargs=-1, required=True)
-@click.option("-o", "--output", "folder", default="sonic_baselines", show_default=True, metavar="DIR", help="Where to.")
+@click.option("-o", "--output", "folder", metavar="DIR", help="Where to. [default: sonic_baselines beside each scene]")
 @click.option("--reason", default="", metavar="WHY", help="Why it is to sound so, for whoever reads the file.")
 @click.option("--runs", type=click.IntRange(0, 9999), default=99, show_default=True, help="Of the ensemble; 0: none.")
-def baseline(scenes: tuple[str, ...], folder: str, reason: str, runs: int) -> None:
+def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int) -> None:
     """Keep what scenes sound like now as small files, for tests to hold them against."""
     for scene in scenes:
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")
-    root = Path(folder_place(folder))
-    root.mkdir(parents=True, exist_ok=True)
-    to = places(*(str(root / f"{Path(scene).stem}.json") for scene in scenes))
+    from sonic_bullet.comparing.baselines import baseline_place
+
+    to = [
+        baseline_place(scene) if folder is None else Path(folder_place(folder)) / f"{Path(scene).stem}.json"
+        for scene in scenes
+    ]
+    for place in {one.parent for one in to}:
+        folder_place(str(place))
+    if len(set(to)) < len(to):
+        raise FileError("two scenes have one name", "give each its own -o DIR")
     with quiet_stderr():
         import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
         from sonic_bullet.comparing.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
         with status(scene) as tell:
             made = make_baseline(scene, reason, tell, runs)
+        place.parent.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)
         what = f"{len(made.features)} runs" if made.features else "no ensemble"
         commit = f"commit {made.commit[:12]}{'' if made.clean else ' with changes'}" if made.commit else "no commit"

@@ -7,17 +7,26 @@ from __future__ import annotations
 
 import io
 import os
-import signal
 import sys
 from typing import NoReturn
 
 import click
 
+from sonic_bullet.machine.supervisor import supervised
+from sonic_bullet.machine.worker import stop_word
 from sonic_bullet.records.errors import SonicBulletError, interrupts
 
 
 def run_and_exit(cli: click.Group) -> NoReturn:
-    """Run the command that the command line asks for, turn every error into one line on stderr, and exit."""
+    """Run the command that the command line asks for, in a process that is waited for, and exit."""
+    ending = supervised(lambda: _run(cli))
+    if ending.words:
+        _say(ending.words)
+    sys.exit(ending.code)
+
+
+def _run(cli: click.Group) -> int:
+    """Run the command, turn every error into one line on stderr; the exit code."""
     import logging
     import warnings
 
@@ -28,19 +37,17 @@ def run_and_exit(cli: click.Group) -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
-    signal.signal(signal.SIGTERM, _terminated)
     try:
         # cli.main() would swallow what an interrupt says
         with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
             cli.invoke(context)
         _say_what_is_not_kept()
         sys.stdout.flush()
-        sys.exit(0)
+        code = 0
     except click.exceptions.Exit as done:
         code = done.exit_code
     except KeyboardInterrupt as error:
-        code = 143 if str(error).startswith("terminated") else 130
-        _say(str(error) or "stopped")
+        code = _stopped(str(error))
     except click.ClickException as error:
         where = getattr(error, "ctx", None)
         code, hint = 2, f"; see '{where.command_path} --help'" if where is not None else ""
@@ -48,22 +55,32 @@ def run_and_exit(cli: click.Group) -> NoReturn:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the reader left; flushing at exit must not complain
         code = 141
-    except SonicBulletError as error:
-        if debug:
-            raise
-        code = 2
-        _say(str(error))
     except Exception as error:
         if debug:
             raise
-        code = 2
-        notes = "; ".join(getattr(error, "__notes__", []))
-        _say(
-            f"{type(error).__name__}: {error}"
-            + (f"; {notes}" if notes else "")
-            + "; set SONIC_BULLET_DEBUG=1 to see where"
-        )
-    sys.exit(code)
+        code = _failed(error)
+    return code
+
+
+def _failed(error: Exception) -> int:
+    """Say what is wrong; the exit code."""
+    if stop_word():  # what an interrupt became on its way out of a library
+        return _stopped()
+    if isinstance(error, SonicBulletError):
+        _say(str(error))
+        return 2
+    notes = "; ".join(getattr(error, "__notes__", []))
+    _say(
+        f"{type(error).__name__}: {error}" + (f"; {notes}" if notes else "") + "; set SONIC_BULLET_DEBUG=1 to see where"
+    )
+    return 2
+
+
+def _stopped(words: str = "") -> int:
+    """Say that the command was interrupted; the exit code."""
+    words = words or stop_word() or "stopped"
+    _say(words)
+    return 143 if "terminated" in (stop_word(), words.partition(";")[0]) else 130
 
 
 def _settled(words: list[str]) -> list[str]:
@@ -75,10 +92,6 @@ def _settled(words: list[str]) -> list[str]:
         "--json=-" if word == "--json" and not after.lower().endswith(".json") else word
         for word, after in zip(words, follows, strict=True)
     ]
-
-
-def _terminated(*_: object) -> None:
-    raise KeyboardInterrupt("terminated")
 
 
 def _say_what_is_not_kept() -> None:

@@ -30,6 +30,7 @@ from sonic_bullet.files import (
     write_audio,
     write_log,
 )
+from sonic_bullet.machine.worker import note_closing, stop_word
 from sonic_bullet.records.errors import AudioError, FileError, SceneError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -287,6 +288,7 @@ def with_partial(
     valid file beside ``to``.
     """
     result: RenderResult | Replay | None = getattr(error, "partial", None)
+    note_closing()
     said = ""
     if result is not None and all(result.sound.shape):
         partial = kept_name(Path(to))
@@ -299,9 +301,10 @@ def with_partial(
                 write_audio(partial, result.sound, result.sr)
         except FileError as failure:  # the error itself is what the user must read first
             said = failure.what
-    if isinstance(error, SonicBulletError):
+    if isinstance(error, SonicBulletError) and not stop_word():
         return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
-    return KeyboardInterrupt("; ".join(part for part in (str(error) or "stopped", said) if part))
+    stopped = stop_word() if isinstance(error, SonicBulletError) else str(error) or "stopped"
+    return KeyboardInterrupt("; ".join(part for part in (stopped, said) if part))
 
 
 def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:

@@ -21,6 +21,14 @@ from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble
 from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
+from sonic_bullet.comparing.tolerance import (
+    Closeness,
+    SoundMeasures,
+    as_tolerance,
+    closeness,
+    compared_words,
+    measure_sound,
+)
 from sonic_bullet.files import replacing
 from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
@@ -28,6 +36,7 @@ from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
 
+FOLDER = "sonic_baselines"
 FORMAT = "sonic_bullet baseline 1"
 MOST_BYTES = 4 << 20
 Tell = Callable[[str], None]
@@ -61,7 +70,7 @@ class SceneBaseline(msgspec.Struct, omit_defaults=True):
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
     """A scene held against its baseline. same: the samples are; audible: within the ensemble or not, None: there is
-    none, or no need to ask; words: one line each of what has changed.
+    none, or no need to ask; words: one line each of what has changed; closeness: see `Comparison`.
     """
 
     baseline: SceneBaseline
@@ -69,11 +78,25 @@ class Checked:
     same: bool
     audible: Audibility | None
     words: tuple[str, ...]
+    closeness: Closeness | None = None
 
     @property
     def passed(self) -> bool:
         """Whether it counts as the same."""
-        return self.same or (self.audible is not None and not self.audible.beyond_chance)
+        if self.same or (self.closeness is not None and self.closeness.within):
+            return True
+        return self.audible is not None and not self.audible.beyond_chance
+
+    @property
+    def compared(self) -> str:
+        """What was looked at, in one line: bodies, events, seconds, tolerance."""
+        exact = self.same or self.closeness is None
+        return compared_words(self.side, None if exact or self.closeness is None else self.closeness.tolerance_db)
+
+
+def baseline_place(scene: str | Path) -> Path:
+    """Where a scene's baseline is looked for and kept if nobody says where: beside the scene."""
+    return Path(scene).resolve().parent / FOLDER / f"{Path(scene).stem}.json"
 
 
 def samples_digest(sound: KeptSound) -> str:
@@ -125,8 +148,13 @@ def read_baseline(path: str | Path) -> SceneBaseline:
         raise FileError(f"{path} is no baseline: {error}", remedy) from None
 
 
-def check_baseline(baseline: SceneBaseline, scene: str | Path, tell: Tell) -> Checked:
-    """The scene as it is now against the baseline. Raises what running it does."""
+def check_baseline(
+    baseline: SceneBaseline, scene: str | Path, tell: Tell, tolerance_db: float | None = None
+) -> Checked:
+    """The scene as it is now against the baseline; tolerance_db: of octave levels, where samples need not be equal.
+
+    Raises what running it does.
+    """
     side = run(SceneSide(scene, sr=baseline.sr), "b")
     assert side.log is not None
     if samples_digest(side.sound) == baseline.samples_sha256:
@@ -136,13 +164,18 @@ def check_baseline(baseline: SceneBaseline, scene: str | Path, tell: Tell) -> Ch
         for name, version in side.log.versions.items()
         if baseline.versions.get(name) != version
     ]
-    audible = None
-    if baseline.features:
+    audible, close = None, None
+    if tolerance_db is not None:
+        kept = SoundMeasures(
+            baseline.frames / baseline.sr, baseline.channels, len(baseline.onsets_s), tuple(baseline.band_db)
+        )
+        close = closeness(kept, measure_sound(side.sound.samples(), side.sr), as_tolerance(tolerance_db))
+    elif baseline.features:
         features, spectra = np.array(baseline.features), np.array(baseline.spectra)
         known = Ensemble(features, spectra, baseline.seconds, baseline.rests)
         again = run(SceneSide(scene, seconds=baseline.seconds, sr=baseline.sr), "b")
         audible = judged(known, *measured(again))
-    return Checked(baseline, side, False, audible, (*words, *_changes(baseline, side)))
+    return Checked(baseline, side, False, audible, (*words, *_changes(baseline, side)), close)
 
 
 def _changes(baseline: SceneBaseline, side: Side) -> list[str]:

@@ -20,6 +20,7 @@ from sonic_bullet.comparing.inputs.put_back import PutBack
 from sonic_bullet.comparing.outcome.modal_effects import modal_effects
 from sonic_bullet.comparing.outcome.recording_effects import recording_effects
 from sonic_bullet.comparing.outcome.sound_effects import at_common_rate, sound_effects
+from sonic_bullet.comparing.revision_tree import unpinned, unpinned_words
 from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, run
 from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
@@ -182,6 +183,9 @@ def _levels(a: Side, b: Side) -> tuple[str, ...]:
 
 
 def _notes(a: Side, b: Side) -> tuple[str, ...]:
+    if a.scene is not None and a.scene.revision is not None:
+        found = unpinned(set(a.read), a.scene.revision, old=True) | unpinned(set(b.read), a.scene.revision, old=False)
+        return unpinned_words(found)
     if (a.log is None) != (b.log is None):
         return ("one is a recording: no cause can be named",)
     if a.log is not None and b.log is not None and (a.scene is None) != (b.scene is None):

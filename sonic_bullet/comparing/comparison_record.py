@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sonic_bullet.comparing.ensemble import Audibility
     from sonic_bullet.comparing.sides import Side
+    from sonic_bullet.comparing.tolerance import Closeness
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +48,8 @@ class Consequence:
 class Comparison:
     """Two sides compared. same: their samples are equal, to the bit. differences: causes first. exact: whether the
     causes put back in B give A to the bit; None: not tried. audible: whether B stands out of an ensemble of A; None:
-    not asked. stopped: it was interrupted, and this is what it had.
+    not asked. stopped: it was interrupted, and this is what it had. closeness: whether B is within a tolerance of A;
+    None: not asked.
     """
 
     a: Side
@@ -59,6 +61,7 @@ class Comparison:
     audible: Audibility | None = None
     notes: tuple[str, ...] = ()
     stopped: bool = False
+    closeness: Closeness | None = None
 
     @property
     def causes(self) -> tuple[Difference, ...]:
@@ -67,8 +70,18 @@ class Comparison:
 
     @property
     def passed(self) -> bool:
-        """Whether the two count as the same: samples equal, or audibility was asked for and there is none."""
-        return self.same or (self.audible is not None and not self.audible.beyond_chance)
+        """Whether the two count as the same: samples equal, or within the tolerance or chance that was asked for."""
+        if self.same or (self.closeness is not None and self.closeness.within):
+            return True
+        return self.audible is not None and not self.audible.beyond_chance
+
+    @property
+    def compared(self) -> str:
+        """What was looked at, in one line: bodies, events, seconds, tolerance."""
+        from sonic_bullet.comparing.tolerance import compared_words
+
+        exact = self.same or self.closeness is None
+        return compared_words(self.b, None if exact or self.closeness is None else self.closeness.tolerance_db)
 
     @property
     def verdict(self) -> str:
@@ -84,7 +97,9 @@ class Comparison:
             self.verdict,
             *(f"  {tag[one.cause]}: {one.words}{f' ({one.kept})' if one.kept else ''}" for one in self.differences),
             *(f"  effect: {one.words}" for one in self.effects),
+            *([f"  tolerance: {self.closeness.words}"] if self.closeness is not None and not self.same else []),
             *([f"  audible: {self.audible.words}"] if self.audible is not None else []),
+            *([f"  compared: {self.compared}"] if self.passed else []),
             *(f"  note: {one}" for one in self.notes),
         ]
 
@@ -104,6 +119,8 @@ class Comparison:
             ],
             "effects": [{"kind": x.kind, "words": x.words, "at_s": x.at_s, "values": x.values} for x in self.effects],
             "audible": None if self.audible is None else self.audible.described(),
+            "compared": self.compared,
+            "tolerance": None if self.closeness is None else asdict(self.closeness),
             "notes": list(self.notes),
             "stopped": self.stopped,
         }  # fmt: skip

@@ -1,20 +1,23 @@
 """A scene as a test: `sonic_scene("scenes/pour.py")` passes where it sounds as it did.
 
     def test_pour(sonic_scene):
-        sonic_scene("scenes/pour.py")          against sonic_baselines/pour.json beside the test, or --sonic-ref REV
+        sonic_scene("scenes/pour.py")          against scenes/sonic_baselines/pour.json, or --sonic-ref REV
 
-Everything else is imported when a test asks for it: pytest loads this module at every start, whatever it tests.
+A scene runs in a process of its own: one that ends it fails its test and no other. Everything else is imported when a
+test asks for it: pytest loads this module at every start, whatever it tests.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-FOLDER = "sonic_baselines"
+PASSED = "sonic_bullet passed"
+"""Name of the property of a test that says what was compared."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -23,81 +26,138 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--sonic-ref", metavar="REV", help="hold scenes against this git revision, not against baselines")
     group.addoption("--sonic-update", action="store_true", help="make the baselines of scenes anew")
     group.addoption(
+        "--tolerance-db", type=float, metavar="DB", help="octave levels of scenes may differ by so much [samples equal]"
+    )
+    group.addoption(
         "--sonic-results", metavar="DIR", default="sonic_results", help="where failures leave what they heard"
     )
 
 
 @pytest.fixture
-def sonic_scene(request: pytest.FixtureRequest) -> Callable[[str], Any]:
+def sonic_scene(request: pytest.FixtureRequest) -> Callable[..., Any]:
     """A function of a scene's path that fails where the scene sounds otherwise than it did.
 
-    The path counts from the test's own folder, or else from where pytest was started.
+    The path counts from the test's own folder, or else from where pytest was started. tolerance_db: instead of
+    --tolerance-db.
     """
 
-    def check(path: str) -> Any:
+    def check(path: str, *, tolerance_db: float | None = None) -> Any:
         __tracebackhide__ = True
-        from sonic_bullet.records.errors import SonicBulletError
-
-        here = request.path.parent
-        scene = next((x for x in (here / path, request.config.rootpath / path) if x.is_file()), None)
+        here, config = request.path.parent, request.config
+        scene = next((x for x in (here / path, config.rootpath / path) if x.is_file()), None)
         if scene is None:
             pytest.fail(f"there is no scene {path}", pytrace=False)
-        results = Path(request.config.getoption("--sonic-results")) / scene.stem
-        try:
-            said = _checked(scene, here / FOLDER / f"{scene.stem}.json", results, request.config)
-        except SonicBulletError as error:
-            said = str(error)
+        results = Path(config.getoption("--sonic-results")) / scene.stem
+        allowed = config.getoption("--tolerance-db") if tolerance_db is None else tolerance_db
+        said, compared = _in_child(lambda: _checked(scene, here, results, config, allowed))
         if said:
             pytest.fail(said, pytrace=False)
+        request.node.user_properties.append((PASSED, f"{path}: {compared}"))
 
     return check
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say what was compared where it passed."""
+    passed = terminalreporter.stats.get("passed", [])
+    lines = [value for one in passed for name, value in one.user_properties if name == PASSED]
+    if lines:
+        terminalreporter.section("scenes that sound as they did")
+        for line in lines:
+            terminalreporter.line(line)
+
+
+def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
+    """What ``check`` gives, called where a scene may end its process."""
+    from sonic_bullet.machine.supervisor import supervised
+    from sonic_bullet.machine.worker import temporary_folder
+    from sonic_bullet.records.errors import SonicBulletError
+
+    with temporary_folder() as folder:
+        answer = folder / "answer.json"
+
+        def run() -> int:
+            try:
+                found = check()
+            except SonicBulletError as error:
+                found = str(error), ""
+            except Exception as error:
+                found = f"{type(error).__name__}: {error}", ""
+            answer.write_text(json.dumps(found), encoding="utf-8")
+            return 0
+
+        ending = supervised(run, alone=False)
+        if not answer.is_file():
+            return ending.words or "the scene's process ended without a result", ""
+        said, compared = json.loads(answer.read_text(encoding="utf-8"))
+        return said, compared
 
 
 def _quiet(text: str) -> None:
     pass
 
 
-def _checked(scene: Path, baseline: Path, results: Path, config: pytest.Config) -> str:
-    """What is wrong, in one line and those that explain it; "": nothing."""
+def _checked(
+    scene: Path, here: Path, results: Path, config: pytest.Config, tolerance_db: float | None
+) -> tuple[str, str]:
+    """What is wrong, in one line and those that explain it, "": nothing; what was compared."""
     ref = config.getoption("--sonic-ref")
     if ref is not None:
-        return _against(scene, ref, [], results)
-    from sonic_bullet.comparing.baselines import check_baseline, make_baseline, read_baseline, write_baseline
+        return _against(scene, ref, [], results, tolerance_db)
+    from sonic_bullet.comparing.baselines import (
+        FOLDER,
+        baseline_place,
+        check_baseline,
+        make_baseline,
+        read_baseline,
+        write_baseline,
+    )
 
+    baseline = baseline_place(scene)
+    with_test = here / FOLDER / baseline.name
+    if not baseline.is_file() and with_test.is_file():  # put there by `baseline -o`
+        baseline = with_test
     if config.getoption("--sonic-update"):
+        made = make_baseline(scene, "pytest --sonic-update", _quiet)
         baseline.parent.mkdir(exist_ok=True)
-        write_baseline(baseline, make_baseline(scene, "pytest --sonic-update", _quiet))
-        return ""
+        write_baseline(baseline, made)
+        return "", f"baseline made anew, {baseline}"
     if not baseline.is_file():
-        command = f"sonic-bullet baseline {scene} -o {baseline.parent} --reason WHY"
-        return f"{scene.name} has no baseline; make it: {command}"
+        return f"{scene.name} has no baseline; make it: sonic-bullet baseline {scene} --reason WHY", ""
     known = read_baseline(baseline)
-    checked = check_baseline(known, scene, _quiet)
+    checked = check_baseline(known, scene, _quiet, tolerance_db)
     if checked.passed:
-        return ""
+        return "", checked.compared
     said = [f"{scene.name} sounds otherwise than its baseline ({known.reason}): {'; '.join(checked.words)}"]
-    if checked.audible is not None:
-        said.append(checked.audible.words)
+    said += [one.words for one in (checked.audible, checked.closeness) if one is not None]
     if not known.commit or not known.clean:
-        return "\n".join([*said, "the baseline was made of files in no commit: no cause can be named"])
-    return _against(scene, known.commit, said, results)
+        return "\n".join([*said, "the baseline was made of files in no commit: no cause can be named"]), ""
+    return _against(scene, known.commit, said, results, None)
 
 
-def _against(scene: Path, ref: str, said: list[str], results: Path) -> str:
+def _against(scene: Path, ref: str, said: list[str], results: Path, tolerance_db: float | None) -> tuple[str, str]:
     """The cause of what was said, from the scene as it was at a revision; "": nothing was said and nothing differs."""
+    from dataclasses import replace
+
     from sonic_bullet.comparing.compared_sides import compare
     from sonic_bullet.comparing.failure_folder import write_failure
     from sonic_bullet.comparing.revisions import at_revision
+    from sonic_bullet.comparing.sides import SceneSide
+    from sonic_bullet.comparing.tolerance import found_closeness
     from sonic_bullet.records.errors import CompareError
 
     try:
-        with at_revision(str(scene), ref) as before:
-            found = compare(before, scene)
+        with at_revision(str(scene), ref) as (before, revision):
+            found = compare(SceneSide(before, revision=revision), scene)
+            if tolerance_db is not None and not found.same:
+                found = replace(found, closeness=found_closeness(found.a, found.b, tolerance_db))
             if not found.passed:
                 write_failure(results, found)
-                return "\n".join([*found.lines(), *said, f"what was heard: {results}"])
-            return "\n".join([*said, f"the scene at {ref[:12]} sounds the same here"] if said else [])
+                return "\n".join([*found.lines(), *said, f"what was heard: {results}"]), ""
+            if said:
+                return "\n".join([*said, f"the scene at {ref[:12]} sounds the same here"]), ""
+            return "", "; ".join([found.compared, *found.notes])
     except CompareError as error:
         if not said:
             raise
-        return "\n".join([*said, f"no cause can be named: {error}"])
+        return "\n".join([*said, f"no cause can be named: {error}"]), ""

@@ -1,49 +1,72 @@
-"""A scene's files at a git revision: a worktree beside the repository's own, gone afterwards.
+"""A repository as it was at a git revision: a whole tree of it in a temporary folder, gone afterwards.
+
+    revision -> an index of its own -> git checkout-index -> TREE      the repository itself is not touched
 
 The package that is installed renders both, so what differs is what the revision's files say.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from sonic_bullet.comparing.revision_tree import RevisionTree
+from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import CompareError
 
 
 @contextmanager
-def at_revision(path: str, revision: str) -> Iterator[str]:
-    """The same file or folder as it was at that revision, while this lasts. Raises CompareError: no git, no such
-    revision, not in it.
+def at_revision(path: str, revision: str) -> Iterator[tuple[str, RevisionTree]]:
+    """The same file or folder as it was at that revision, and the tree that it lies in, while this lasts.
+
+    Raises CompareError: no git, no such revision, not in it.
     """
     place = Path(path).resolve()
     folder = place if place.is_dir() else place.parent
     if not folder.is_dir():
         raise CompareError(f"no file {shown(path)}", "give a scene that is there")
-    top = _git(folder, "rev-parse", "--show-toplevel", error=f"{shown(path)} lies in no git repository")
+    top = Path(_git(folder, "rev-parse", "--show-toplevel", error=f"{shown(path)} lies in no git repository")).resolve()
     commit = _git(
         folder, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}",
         error=f"there is no revision {shown(revision)} in {top}",
     )  # fmt: skip
-    with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as made:
-        tree = Path(made) / "tree"
-        _git(folder, "worktree", "add", "--quiet", "--detach", str(tree), commit, error="git makes no worktree")
-        try:
-            there = tree / place.relative_to(Path(top).resolve())
-            if not there.exists():
-                raise CompareError(f"{shown(path)} is not in revision {shown(revision)}", "give one that has it")
-            yield str(there)
-        finally:
-            _git(folder, "worktree", "remove", "--force", str(tree), error="")
+    with temporary_folder() as made:
+        tree = made.resolve() / "tree"
+        tree.mkdir()
+        index = {"GIT_INDEX_FILE": str(made.resolve() / "index")}
+        no_tree = "git gives no tree of that revision"
+        _git(top, "read-tree", commit, error=no_tree, settings=index)
+        _git(top, "checkout-index", "--all", "--quiet", f"--prefix={tree}{os.sep}", error=no_tree, settings=index)
+        there = tree / place.relative_to(top)
+        if not there.exists():
+            raise CompareError(f"{shown(path)} is not in revision {shown(revision)}", "give one that has it")
+        yield str(there), RevisionTree(top, tree, _link_untracked(top, tree, commit))
 
 
-def _git(folder: Path, *words: str, error: str) -> str:
+def _link_untracked(top: Path, tree: Path, commit: str) -> tuple[str, ...]:
+    """Give the tree what git does not know, by links: generated files, data, modules of other repositories."""
+    listed = _git(top, "ls-files", "--others", "--directory", "--no-empty-directory", "-z", error="").split("\0")
+    entries = _git(top, "ls-tree", "-r", "-z", commit, error="").split("\0")
+    modules = [entry.partition("\t")[2] for entry in entries if entry.startswith("160000")]
+    names = [name.rstrip("/") for name in (*listed, *modules) if name and "__pycache__" not in name.split("/")]
+    for name in names:
+        place, source = tree / name, top / name
+        if place.is_dir() and not any(place.iterdir()):  # of a submodule
+            place.rmdir()
+        if not os.path.lexists(place) and source.exists():
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.symlink_to(source)
+    return tuple(names)
+
+
+def _git(folder: Path, *words: str, error: str, settings: dict[str, str] | None = None) -> str:
+    command, given = ["git", "-C", str(folder), *words], {**os.environ, **(settings or {})}
     try:
-        done = subprocess.run(["git", "-C", str(folder), *words], check=False, capture_output=True, text=True)
+        done = subprocess.run(command, check=False, capture_output=True, text=True, errors="surrogateescape", env=given)
     except OSError:
         raise CompareError("git cannot be run", "install it, or give both scenes") from None
     if done.returncode and error:

@@ -9,15 +9,14 @@ known of where it comes from.
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sonic_bullet.comparing.revision_tree import RevisionTree, noted_files, own_modules
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
@@ -38,7 +37,9 @@ REMEDY = "give a scene (.py), a contact log (.npz), a recording, or a folder of 
 
 @dataclass(frozen=True, slots=True)
 class SceneSide:
-    """A scene to be run, with what `render_scene` is given of it; None: the scene's own."""
+    """A scene to be run, with what `render_scene` is given of it; None: the scene's own. revision: the tree that it
+    lies in, where it is that of a git revision.
+    """
 
     path: str | Path
     seconds: float | None = None
@@ -47,12 +48,14 @@ class SceneSide:
     microphones: Any = None
     material: Any = None
     residual: bool = True
+    revision: RevisionTree | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
     """One of the two. sound (channels, n) at sr; log, calls, scene: where they are known; names: of bodies and links
-    in calls; frames: a digest of each as it came, for runs that are to be the same. notes: what a user should read.
+    in calls; frames: a digest of each as it came, for runs that are to be the same. notes: what a user should read;
+    read: absolute paths of the files that its run has opened.
     """
 
     name: str
@@ -64,6 +67,7 @@ class Side:
     names: Mapping[tuple[Who, int], str] = field(default_factory=dict)
     frames: tuple[bytes, ...] = ()
     notes: tuple[str, ...] = ()
+    read: frozenset[str] = frozenset()
 
 
 class OtherSound(SonicBulletError):
@@ -165,12 +169,14 @@ def run(
     """A scene run, its calls seen; plan: with what asked instead; like: frames that it must have, else OtherSound is
     raised. Raises what `render_scene` does.
     """
+    from sonic_bullet.listener.pybullet.clients import clear_file_cache
     from sonic_bullet.listener.pybullet.interception import Interception
     from sonic_bullet.scene import render_scene
 
     watch = _Run(side, plan, like)
     watch.calls = Interception(side, plan, watch.look)
-    with _own_modules(Path(scene.path)), watch.calls.watching(), directed(watch):
+    clear_file_cache()
+    with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch):
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
             material=scene.material, residual=scene.residual, say=say or (lambda text: None),
@@ -178,21 +184,8 @@ def run(
     names = {(watch.calls.who(body.body_id), body.link): body.name for body in result.log.bodies}
     return Side(
         str(scene.path), result.sound, result.sr, result.log, tuple(watch.calls.calls), scene, names,
-        tuple(watch.frames), result.notes,
+        tuple(watch.frames), result.notes, frozenset(files.paths | set(watch.calls.files)),
     )  # fmt: skip
-
-
-@contextmanager
-def _own_modules(path: Path) -> Iterator[None]:
-    """What a scene imports from beside it is its own: the other version's are others, of the same names."""
-    before, folder = set(sys.modules), path.resolve().parent
-    try:
-        yield
-    finally:
-        for name in set(sys.modules) - before:
-            file = getattr(sys.modules[name], "__file__", None)
-            if file and Path(file).resolve().is_relative_to(folder):
-                del sys.modules[name]
 
 
 def as_side(given: Any, side: str, say: Say | None = None) -> Side:

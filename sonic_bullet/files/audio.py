@@ -32,6 +32,7 @@ from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
 from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.partial_file import PartialFile
+from sonic_bullet.machine.worker import note_closing, stop_word
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
@@ -231,6 +232,8 @@ class AudioWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if error is not None:
+            note_closing()
         try:
             with suppress(RuntimeError):  # LibsndfileError: what became of the file is seen when it is read back
                 self.file.close()
@@ -248,7 +251,7 @@ class AudioWriter:
         if isinstance(error, SonicBulletError):
             raise type(error)(error.what, f"{error.remedy}; {saved}" if error.remedy else saved) from error
         if isinstance(error, KeyboardInterrupt):
-            raise KeyboardInterrupt(f"stopped; {saved}") from error
+            raise KeyboardInterrupt(f"{stop_word() or 'stopped'}; {saved}") from error
         error.add_note(saved)
 
     def _name_it(self) -> None:

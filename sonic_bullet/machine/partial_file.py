@@ -19,6 +19,8 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
+from sonic_bullet.machine.worker import note_leftover
+
 try:
     import fcntl
 except ImportError:  # Windows: nothing is locked there, and nothing swept
@@ -41,6 +43,7 @@ class PartialFile:
         sweep(folder)
         while True:
             self.path = folder / f"sonic-bullet-{secrets.token_hex(8)}.partial"
+            note_leftover(self.path.absolute())
             self.fd = os.open(self.path, OPEN_FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
             if _lock(self.fd) is not False and os.fstat(self.fd).st_nlink:
                 return

@@ -64,6 +64,13 @@ def private_folder(path: Path) -> Path | None:
     return path
 
 
+def cache_folders() -> list[Path]:
+    """Where compiled code and computed models may lie."""
+    named = (os.environ.get(name) for name in ("SONIC_BULLET_CACHE", "NUMBA_CACHE_DIR"))
+    root = _root()
+    return [*(Path(one).absolute() for one in named if one), *([] if root is None else [root])]
+
+
 def _root() -> Path | None:
     from platformdirs import user_cache_path
 

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from sonic_bullet.files.reading import refuse_lfs_pointer
+from sonic_bullet.machine.worker import stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
 
 
@@ -41,6 +42,8 @@ def user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
     except (SonicBulletError, KeyboardInterrupt):
         raise
     except BaseException as error:
+        if stop_word():  # what an interrupt became on its way out
+            raise KeyboardInterrupt(stop_word()) from error
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
         where = f" line {lines[-1]}" if lines else ""
         raise SceneError(f"scene '{path.name}'{where}: {type(error).__name__}: {error}", "mend the scene") from error

@@ -35,6 +35,7 @@ from sonic_bullet.files.atomic import cannot, kept_name
 from sonic_bullet.files.riff.scale import scale_text
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.partial_file import PartialFile
+from sonic_bullet.machine.worker import note_closing
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
@@ -247,6 +248,8 @@ class FilmWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         kept = False
+        if error is not None:
+            note_closing()
         try:
             with suppress(FileError) if error is not None else _nothing():
                 self._finish()

@@ -32,6 +32,14 @@ def direct_client() -> BulletClient:
     return client
 
 
+def clear_file_cache() -> None:
+    """Have PyBullet read files anew: it keeps meshes by name, and a name may be another file by now."""
+    client = direct_client()
+    for kept in (0, 1):
+        client.setPhysicsEngineParameter(enableFileCaching=kept)
+    disconnect(client)
+
+
 def watch_settings(client: BulletClient) -> None:
     """See from now on what is set of engine and bodies, for whoever listens later: PyBullet does not say all of it."""
     hooks.Hooks.of(client, client._client)

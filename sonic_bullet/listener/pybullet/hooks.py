@@ -26,6 +26,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, remembering
+from sonic_bullet.machine.worker import mark_step
 from sonic_bullet.records.errors import SceneError
 
 POSE_SETTERS = (
@@ -145,6 +146,7 @@ class Hooks:
             for one in reversed(self.listening[:]):
                 one.before()
             result = below(*args, **kwargs)
+            mark_step()
             for one in self.listening[:]:
                 one.after()
             return result

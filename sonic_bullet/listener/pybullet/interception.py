@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -94,6 +95,7 @@ class Interception:
         self._shapes: dict[int, Mapping[str, Any]] = {}
         self._count = {"body": 0, "constraint": 0}
         self._folders: list[str] = []
+        self.files: set[str] = set()
         self._real: dict[str, Any] = {}
 
     def who(self, body: int, kind: str = "body") -> Who:
@@ -230,6 +232,7 @@ class Interception:
         for folder in ("", *reversed(self._folders)):
             place = Path(folder, name)
             if place.is_file():
+                self.files.add(os.path.abspath(place))
                 return InputFile(str(place.resolve()), _digest(place))
         return InputFile(name, f"no file {name}")
 

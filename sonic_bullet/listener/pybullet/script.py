@@ -25,6 +25,7 @@ from sonic_bullet.files.reading import refuse_lfs_pointer
 from sonic_bullet.listener.pybullet.clients import disconnect as end
 from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, begin, remembering
 from sonic_bullet.listener.quiet import quiet_stdout
+from sonic_bullet.machine.worker import mark_step, stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError
 
 ClientHook = Callable[[int], None]
@@ -92,17 +93,21 @@ def run_script(
     names = {} if names is None else names
     names |= {"__name__": "__main__", "__file__": str(path), "__builtins__": __builtins__}
     with (
-        _stage(before, after, seconds, progress),
+        _stage(before, after, seconds, progress) as observed,
         patch.object(sys, "argv", [str(path)]),
         patch.object(sys, "path", [str(path.resolve().parent), *sys.path]),
     ):
         try:
             exec(code, names)
-        except (_TimeIsUp, SystemExit):
+        except _TimeIsUp:
             pass
-        except SonicBulletError:
+        except (SonicBulletError, KeyboardInterrupt):
             raise
-        except Exception as error:
+        except BaseException as error:
+            if stop_word():  # what an interrupt became on its way out
+                raise KeyboardInterrupt(stop_word()) from error
+            if isinstance(error, SystemExit) and not error.code and observed:
+                return names
             lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
             raise SceneError(
                 f"scene '{path.name}' line {lines[-1] if lines else 1}: {type(error).__name__}: {error}",
@@ -114,7 +119,8 @@ def run_script(
 @contextmanager
 def _stage(
     before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None
-) -> Iterator[None]:
+) -> Iterator[list[int]]:
+    """Gives a list that the client is in once it steps."""
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
     opened: set[int] = set()
     observed: list[int] = []
@@ -139,6 +145,7 @@ def _stage(
                 )
             observed.append(physicsClientId)
         if physicsClientId != observed[0]:
+            mark_step()
             return real_step(physicsClientId=physicsClientId)
         if elapsed_s >= seconds - 1e-9:
             raise _TimeIsUp
@@ -146,6 +153,7 @@ def _stage(
             before(physicsClientId)
         dt = pybullet.getPhysicsEngineParameters(physicsClientId=physicsClientId)["fixedTimeStep"]
         result = real_step(physicsClientId=physicsClientId)
+        mark_step()
         elapsed_s += dt
         if after is not None:
             after(physicsClientId)
@@ -198,4 +206,4 @@ def _stage(
         patch.object(BulletClient, "__getattr__", forward_stand_ins),
         patch.object(time, "sleep", sleep),
     ):
-        yield
+        yield observed

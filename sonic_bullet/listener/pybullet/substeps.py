@@ -33,6 +33,7 @@ from sonic_bullet.listener.polling import (
     loaded,
     packed,
 )
+from sonic_bullet.machine.worker import note_leftover
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 
@@ -79,6 +80,7 @@ class SubstepLog:
         """Start logging into a temporary file. Raises SceneError where no log appears."""
         self.close()
         self.folder = tempfile.TemporaryDirectory(prefix="sonic-bullet-")
+        note_leftover(self.folder.name)
         self.path = os.path.join(self.folder.name, "contacts.log")
         self.handle = pybullet.startStateLogging(
             pybullet.STATE_LOGGING_CONTACT_POINTS, self.path, physicsClientId=self.client_id

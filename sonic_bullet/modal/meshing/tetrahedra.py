@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
@@ -67,8 +67,8 @@ def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Ar
     otherwise.
     """
     name = script.strip("_").removesuffix(".py").capitalize()
-    with tempfile.TemporaryDirectory(prefix="sonic_bullet-") as folder:
-        source, target = Path(folder) / "in.npz", Path(folder) / "out.npz"
+    with temporary_folder() as folder:
+        source, target = folder / "in.npz", folder / "out.npz"
         limits = {"memory": np.array(MEMORY_LIMIT_BYTES), "seconds": np.array(guard_s)}
         np.savez(source, allow_pickle=False, **given, **limits)
         command = [sys.executable, str(Path(__file__).with_name(script)), str(source), str(target)]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.questions import Settings, contact_points
 from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
+from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
@@ -214,7 +214,7 @@ def _compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
     """A collision shape of one or several; several meshes go through files, of which PyBullet makes hulls."""
     if len(shapes) == 1:
         return int(pybullet.createCollisionShape(**shapes[0], physicsClientId=client_id))
-    with TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         names = [str(Path(folder, f"{number}.obj")) for number in range(len(shapes))]
         for name, shape in zip(names, shapes, strict=True):
             if "vertices" in shape:

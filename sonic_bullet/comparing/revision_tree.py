@@ -1,0 +1,211 @@
+"""A scene run in a whole tree of a revision: its working folder, its import path and its modules are those of the tree.
+
+    working tree   top/scenes/bar.py   top/parts/cup.py   cwd top/scenes
+    revision       tree/scenes/bar.py  tree/parts/cup.py  cwd tree/scenes      what is installed is both sides'
+
+What neither side can pin is noted while it runs: files outside the repository, files by absolute path in the working
+tree, files that git does not know.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import sonic_bullet
+
+INSTALLED = ("site-packages", "dist-packages")
+OF_SYSTEM = ("/proc", "/dev", "/sys", "/etc", "/usr", "/lib", "/run", "/bin", "/opt")
+MOST_NAMED = 8
+
+
+@dataclass(frozen=True, slots=True)
+class RevisionTree:
+    """tree: the files of a revision of the repository at ``top``; untracked: what the tree has from there by links."""
+
+    top: Path
+    tree: Path
+    untracked: tuple[str, ...] = ()
+
+    def place(self, path: Path) -> Path:
+        """Where something of the repository is in the tree; what is elsewhere stays."""
+        return self.tree / path.relative_to(self.top) if path.is_relative_to(self.top) else path
+
+    def is_untracked(self, inside: Path) -> bool:
+        """Whether git does not know that path of the repository."""
+        return any(inside.is_relative_to(one) for one in self.untracked)
+
+
+@dataclass(slots=True)
+class ReadFiles:
+    """Absolute paths of files that were opened for reading while it is `_NOTED`."""
+
+    paths: set[str] = field(default_factory=set)
+
+
+_NOTED: list[ReadFiles] = []
+_HOOKS: list[Any] = []
+
+
+def _audit(event: str, arguments: tuple[Any, ...]) -> None:
+    if event != "open" or not _NOTED:
+        return
+    path, mode, flags = arguments
+    reads = mode is None or "r" in str(mode) or "+" in str(mode)
+    if reads and isinstance(path, (str, bytes)) and not (mode is None and flags & (os.O_WRONLY | os.O_CREAT)):
+        with suppress(OSError, ValueError):
+            _NOTED[-1].paths.add(os.path.join(os.getcwd(), os.fsdecode(path)))
+
+
+@contextmanager
+def noted_files() -> Iterator[ReadFiles]:
+    """The files that Python opens while this lasts."""
+    if not _HOOKS:
+        _HOOKS.append(_audit)
+        sys.addaudithook(_audit)
+    _NOTED.append(ReadFiles())
+    try:
+        yield _NOTED[-1]
+    finally:
+        _NOTED.pop()
+
+
+def unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:
+    """What of the files that a side has read is not of its version, each with the reason."""
+    found = set()
+    temporary = Path(tempfile.gettempdir()).resolve()
+    for name in paths:
+        path = Path(os.path.normpath(name))
+        real = path.resolve()
+        if not path.is_file() or _is_installed(path) or _is_installed(real) or "__pycache__" in path.parts:
+            continue
+        of_system = any(real.is_relative_to(one) for one in (*OF_SYSTEM, sys.prefix, sys.base_prefix))
+        home = revision.tree if old else revision.top
+        inside = next((one.relative_to(home) for one in (path, real) if one.is_relative_to(home)), None)
+        if inside is not None:
+            if revision.is_untracked(inside):
+                found.add(f"{inside} (git does not know it)")
+            elif not real.is_relative_to(home):
+                found.add(f"{real} (outside the repository)")
+        elif real.is_relative_to(revision.top):
+            found.add(f"{real} (by its absolute path: A reads the present one)")
+        elif not (real.is_relative_to(revision.tree) or of_system or real.parent == temporary):
+            found.add(f"{real} (outside the repository)")
+    return found
+
+
+def unpinned_words(found: set[str]) -> tuple[str, ...]:
+    """The note of a report."""
+    if not found:
+        return ()
+    named = sorted(found)
+    more = f", and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
+    return (f"both sides read the same of what no revision holds: {', '.join(named[:MOST_NAMED])}{more}",)
+
+
+def _is_installed(path: Path) -> bool:
+    """Whether it belongs to the interpreter, its packages, this package or its cache."""
+    from sonic_bullet.machine.user_folder import cache_folders
+
+    library = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "platstdlib")]
+    homes: list[Path] = [*library, *_PACKAGE, *cache_folders()]
+    return any(part in INSTALLED for part in path.parts) or any(path.is_relative_to(one) for one in homes)
+
+
+_PACKAGE = tuple(Path(one).resolve() for one in sonic_bullet.__path__)
+
+
+def _places(module: ModuleType) -> list[Path]:
+    """Where a module lies; a package without a file may lie in several folders."""
+    file = getattr(module, "__file__", None)
+    with suppress(Exception):  # a module may be any object
+        places: list[str] = [file] if file else list(getattr(module, "__path__", ()))
+        return [Path(one).resolve() for one in places]
+    return []
+
+
+@contextmanager
+def own_modules(revision: RevisionTree | None) -> Iterator[None]:
+    """What a scene imports, and where from, is its own: another version's is another, of the same names.
+
+    revision: of the old side, which gets nothing of the working tree; None: the scene as it is now.
+    """
+    before, path, finders = dict(sys.modules), list(sys.path), list(sys.meta_path)
+    folder = _folder()
+    importlib.invalidate_caches()
+    try:
+        if revision is not None:
+            for name, module in before.items():
+                if any(one.is_relative_to(revision.top) and not _is_installed(one) for one in _places(module)):
+                    del sys.modules[name]
+            sys.path[:] = [_moved(one, revision) for one in path]
+            sys.meta_path.insert(0, _OfTheTree(revision))
+            if folder is not None and folder.is_relative_to(revision.top):
+                revision.place(folder).mkdir(parents=True, exist_ok=True)
+                os.chdir(revision.place(folder))
+        yield
+    finally:
+        sys.path[:], sys.meta_path[:] = path, finders
+        if folder is not None:
+            os.chdir(folder)
+        for name in set(sys.modules) - set(before):
+            if any(not _is_installed(one) for one in _places(sys.modules[name])):
+                del sys.modules[name]
+        sys.modules.update({name: one for name, one in before.items() if sys.modules.get(name) is not one})
+        importlib.invalidate_caches()
+
+
+def _folder() -> Path | None:
+    with suppress(OSError):
+        return Path.cwd().resolve()
+    return None
+
+
+def _moved(entry: str, revision: RevisionTree) -> str:
+    """An entry of the import path, in the tree where it is of the repository; "" is the working folder."""
+    if not entry:
+        return entry
+    path = Path(entry).resolve()
+    return entry if _is_installed(path) else str(revision.place(path))
+
+
+@dataclass(frozen=True, slots=True)
+class _OfTheTree:
+    """A finder of modules: what others find in the working tree is taken from the revision's, or is not there."""
+
+    revision: RevisionTree
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        for finder in sys.meta_path:
+            if finder is self or not hasattr(finder, "find_spec"):
+                continue
+            spec = finder.find_spec(name, path, target)
+            if spec is not None:
+                return self._moved(name, spec)
+        return None
+
+    def _moved(self, name: str, spec: ModuleSpec) -> ModuleSpec:
+        places = list(spec.submodule_search_locations or ())
+        origin = Path(spec.origin).resolve() if spec.has_location and spec.origin else None
+        if origin is not None and origin.is_relative_to(self.revision.top) and not _is_installed(origin):
+            there = self.revision.place(origin)
+            if not there.is_file():
+                raise ModuleNotFoundError(f"No module named {name!r} in this revision", name=name)
+            inside = [str(self.revision.place(Path(one).resolve())) for one in places] or None
+            return importlib.util.spec_from_file_location(name, there, submodule_search_locations=inside) or spec
+        if origin is None and places:
+            spec.submodule_search_locations = [_moved(one, self.revision) for one in places]
+        return spec

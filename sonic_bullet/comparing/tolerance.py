@@ -1,0 +1,98 @@
+"""What two sounds must have in common where samples need not be equal, and what was compared, in words.
+
+Octave levels within so many decibels, as many onsets, the same length and channels. Bands 60 dB below the loudest do
+not count: T60 calls a sound that has fallen so far silent [ISO 3382-1].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, at_common_rate, band_levels, onsets_s
+from sonic_bullet.records import Array
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.errors import CompareError
+
+if TYPE_CHECKING:
+    from sonic_bullet.comparing.sides import Side
+
+RANGE_DB = 60.0
+MOST_NAMES = 6
+
+
+@dataclass(frozen=True, slots=True)
+class SoundMeasures:
+    """Of a sound. band_db: octave levels, dB re 1 Pa², None: silent."""
+
+    seconds: float
+    channels: int
+    onset_count: int
+    band_db: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Closeness:
+    """Whether one sound is within a tolerance of another, and why, in one line."""
+
+    tolerance_db: float
+    within: bool
+    words: str
+
+
+def as_tolerance(value: object) -> float:
+    """A tolerance in dB. Raises CompareError."""
+    return as_number(value, "tolerance_db", "give decibels, 0 or more", least=0, most=200, error=CompareError)
+
+
+def measure_sound(x: Array, sr: int) -> SoundMeasures:
+    """x (channels, n) in Pa."""
+    levels = tuple(float(v) if np.isfinite(v) else None for v in band_levels(x, sr))
+    return SoundMeasures(x.shape[1] / sr, len(x), len(onsets_s(x, sr)), levels)
+
+
+def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closeness:
+    """Whether b is within that of a."""
+    faults = []
+    if abs(a.seconds - b.seconds) > 1e-6 or a.channels != b.channels:
+        faults.append(f"length {a.seconds:.4g} → {b.seconds:.4g} s, channels {a.channels} → {b.channels}")
+    if a.onset_count != b.onset_count:
+        faults.append(f"events {a.onset_count} → {b.onset_count}")
+    heights = [one for one in (*a.band_db, *b.band_db) if one is not None]
+    floor = max(heights, default=0.0) - RANGE_DB
+    change, most_hz = 0.0, 0.0
+    for f, one, other in zip(OCTAVES_HZ, a.band_db, b.band_db, strict=False):
+        old, new = (floor if level is None else max(level, floor) for level in (one, other))
+        if abs(new - old) > abs(change):
+            change, most_hz = new - old, f
+    said = (
+        f"octave levels differ by {change:+.2g} dB at most, at {most_hz:g} Hz" if change else "octave levels are equal"
+    )
+    if abs(change) > tolerance_db:
+        faults.append(said)
+    where = "beyond" if faults else "within"
+    return Closeness(tolerance_db, not faults, f"{where} {tolerance_db:g} dB: {'; '.join(faults) or said}")
+
+
+def found_closeness(a: Side, b: Side, tolerance_db: float) -> Closeness:
+    """Whether one side is within that of the other; sounds of two rates are compared at the lower."""
+    one, other, sr = at_common_rate(a.sound.samples(), b.sound.samples(), a.sr, b.sr)
+    return closeness(measure_sound(one, sr), measure_sound(other, sr), as_tolerance(tolerance_db))
+
+
+def compared_words(side: Side, tolerance_db: float | None) -> str:
+    """What a comparison that passes has looked at."""
+    x = side.sound.samples()
+    names: Sequence[str] = [] if side.log is None else [one.name for one in side.log.bodies if one.material is not None]
+    rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    who = f"{_count(len(names), 'body', 'bodies')} ({', '.join(names[:MOST_NAMES])}{rest}), " if names else ""
+    events = _count(len(onsets_s(x, side.sr)), "event", "events")
+    how = "to the bit" if tolerance_db is None else f"tolerance {tolerance_db:g} dB"
+    return f"{who}{events}, {x.shape[1] / side.sr:.4g} s, {how}"
+
+
+def _count(number: int, one: str, several: str) -> str:
+    return f"{number} {one if number == 1 else several}"

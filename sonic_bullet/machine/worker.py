@@ -1,0 +1,151 @@
+"""What the process of a command says to the one that waits for it (`supervisor`); where nobody waits, nothing.
+
+A message is one line of a pipe, written at once, so that lines of several processes do not mix:
+
+    scene PATH     whose code is run from here on          left PATH    to be removed where this process is killed
+    exit  STACK    somebody calls os._exit                 closing      what was made so far is being written
+    done  CODE     the command has come to its end
+
+The time of the last physics step stands in memory that both processes have.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
+ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)
+STOPS = {signal.SIGINT: "stopped", signal.SIGTERM: "terminated"}
+Handler = Callable[[int, FrameType | None], Any]
+
+
+@dataclass(slots=True)
+class WorkerState:
+    """To the supervisor. fd: of the pipe; clock: 8 bytes, when the scene stepped last, 0: no scene runs."""
+
+    fd: int = -1
+    clock: Any = None
+    process: int = 0
+    scene: str = ""
+    stopped: str = ""
+
+
+_LINE = WorkerState()
+
+
+def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
+    """Make this process one that is supervised: a crash leaves its Python lines on ``traces``, `os._exit` says where it
+    is called, the first interrupt is a KeyboardInterrupt and all others are ignored. at_idle: is called where a scene
+    has not stepped for too long.
+    """
+    import faulthandler
+
+    _LINE.fd, _LINE.clock, _LINE.process = fd, clock, os.getpid()
+    catch_stops()
+    faulthandler.enable(traces, all_threads=False)
+    faulthandler.register(ASK_WHERE, traces, all_threads=False)  # type: ignore[arg-type]
+    signal.signal(END_IDLE, at_idle)  # type: ignore[arg-type]
+    leave = os._exit
+
+    def tell_and_leave(status: int) -> None:
+        if os.getpid() == _LINE.process:
+            frame: FrameType | None = sys._getframe(1)
+            tell("exit", " ".join(_lines_of(frame))[: LONGEST - 10])
+        leave(status)
+
+    os._exit = tell_and_leave  # type: ignore[assignment]
+
+
+def catch_stops() -> None:
+    """Make the first interrupt a KeyboardInterrupt, and have all others ignored."""
+    for word in STOPS:
+        if signal.getsignal(word) is not signal.SIG_IGN:  # as a shell's background jobs have it
+            signal.signal(word, _stop)
+
+
+def _lines_of(frame: FrameType | None) -> Iterator[str]:
+    while frame is not None:
+        yield f'File "{escaped(frame.f_code.co_filename)}", line {frame.f_lineno}'
+        frame = frame.f_back
+
+
+def escaped(path: str) -> str:
+    """A path as faulthandler writes it."""
+    return path.encode("ascii", "backslashreplace").decode()[:500]
+
+
+def _stop(number: int, _: FrameType | None) -> None:
+    """The first interrupt: whoever cleans up is not interrupted again."""
+    for word in STOPS:
+        signal.signal(word, signal.SIG_IGN)
+    _LINE.stopped = STOPS[signal.Signals(number)]
+    raise KeyboardInterrupt(_LINE.stopped)
+
+
+def stop_word() -> str:
+    """How this process was told to end; "": it was not."""
+    return _LINE.stopped
+
+
+def tell(kind: str, text: str = "") -> None:
+    """Say something to the supervisor, if there is one."""
+    if _LINE.fd >= 0:
+        with suppress(OSError):
+            os.write(_LINE.fd, f"{kind} {' '.join(text.splitlines())}\n".encode("utf-8", "surrogateescape")[:LONGEST])
+
+
+def note_leftover(path: str | Path) -> None:
+    """Have a file or folder removed where this process is killed; one that has got its name by then is none."""
+    tell("left", str(path))
+
+
+def note_closing() -> None:
+    """What was made before an interrupt is being written: wait for it."""
+    tell("closing")
+
+
+@contextmanager
+def running_scene(path: Path) -> Iterator[None]:
+    """The code of a scene runs while this lasts."""
+    before, _LINE.scene = _LINE.scene, str(path)
+    tell("scene", str(path))
+    mark_step()
+    try:
+        yield
+    finally:
+        _LINE.scene = before
+        if not before and _LINE.clock is not None:
+            struct.pack_into("d", _LINE.clock, 0, 0.0)
+        tell("scene", before)
+
+
+def mark_step() -> None:
+    """A physics step is made."""
+    if _LINE.clock is not None and _LINE.scene:
+        struct.pack_into("d", _LINE.clock, 0, time.monotonic())
+
+
+def scene_line(frame: FrameType | None) -> tuple[str, int]:
+    """Name of the scene that runs and the line of it that a frame comes from, 0: none."""
+    while frame is not None and frame.f_code.co_filename != _LINE.scene:
+        frame = frame.f_back
+    return Path(_LINE.scene).name, 0 if frame is None else frame.f_lineno
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder that is gone afterwards, however this process ends."""
+    with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder:
+        note_leftover(folder)
+        yield Path(folder)
