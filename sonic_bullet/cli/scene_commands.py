@@ -86,7 +86,7 @@ def run_render(
                 raise with_partial(error, to, output, peak_dbfs, lufs) from error
         try:
             with progress_bar("stems and events") as (progress, tell):
-                made = extras.made(result.log, result.sr, events_to, progress, tell)
+                made = extras.made(result.log, result.sr, events_to, progress, tell, drawn=picture is not None)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, to, output, peak_dbfs, lufs) from error
@@ -96,7 +96,8 @@ def run_render(
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture
 
-            render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
+            seen = made.events if made is not None else ()
+            render_picture(picture, result.sound, result.sr, result.log, Path(scene).name, seen)
         notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         for note in notes:
