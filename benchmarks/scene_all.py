@@ -5,7 +5,7 @@
 scenes/NAME.json -> `claims` -> (claim, measured, low, high). Each measurement is a range [low, high] under its name;
     "why" says where it comes from.
 
-    first_strike_s, strikes         of all sounding bodies, as `picture.find_events` finds them
+    first_strike_s, strikes         of all sounding bodies, as `load_leaps.find_leaps` finds them
     peak_db_spl                     20 log10(peak / 20 µPa) over all channels
     sound_j
         Σp² 4πr²/(ρ₀c sr): energy that left as sound, r from the origin to the first microphone
@@ -30,8 +30,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.load_leaps import find_leaps
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.plots.scene_plot import find_events
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.scene import RenderResult, render_scene
 
@@ -67,7 +67,7 @@ def claims(result: RenderResult, told: dict[str, Any]) -> Iterator[Claim]:
     """Each measurement that the scene promises, as it is and as it should be."""
     samples, log, sr = result.samples, result.log, result.sr
     seconds = samples.shape[1] / sr
-    events = find_events(log)
+    events = find_leaps(log)
     freq = np.fft.rfftfreq(samples.shape[1], 1 / sr)
     size = np.abs(np.fft.rfft(samples, axis=1)).max(axis=0)
     simple = {

@@ -23,9 +23,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
+from benchmarks.load_leaps import find_leaps
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.plots.scene_plot import find_events
 from sonic_bullet.records import Array
 from sonic_bullet.render import Synthesizer, render_log
 from sonic_bullet.render.standing import supports
@@ -87,7 +87,7 @@ def rough_share(state: Any, b: int, touches: Any, load_n: Array) -> float:
 
 
 def levels(log: ContactLog, sounds: dict[str, Array]) -> Iterator[str]:
-    last_s = float(find_events(log).strike_s.max())
+    last_s = float(find_leaps(log).strike_s.max())
     at = round((last_s + AFTER_S) / WINDOW_S)
     for name, samples in sounds.items():
         level = level_db(samples, log.sr)
@@ -163,7 +163,7 @@ def rod() -> Iterator[str]:
     for supported in (False, True):
         client, listener = fallen(shape, 0.05, (0, 1.2, 0.3), 4.0, 7850 * np.pi * 0.006**2 * 0.16, supported)
         level = level_db(listener.sound(), listener.sr)
-        last = float(find_events(listener.contacts).strike_s.max())
+        last = float(find_leaps(listener.contacts).strike_s.max())
         at = round((last + 1.5) / WINDOW_S)
         yield (
             f"rod alone, {'in place' if supported else 'hung'}: below its loudest by {level.max() - level[at]:.0f} dB "
@@ -187,7 +187,7 @@ def clicks() -> Iterator[str]:
         client, listener = fallen(shape, 0.06, (0.5, 0.2, 0), 5.0, 7850 * 75.1e-6)
     finally:
         supports._stand = old
-    sound, sr, struck = listener.sound()[0], listener.sr, find_events(listener.contacts).strike_s
+    sound, sr, struck = listener.sound()[0], listener.sr, find_leaps(listener.contacts).strike_s
     disconnect(client)
     travel = round(np.hypot(0.7, 0.5) / 343 * sr)
     starts = np.unique([-(-at // BLOCK) * BLOCK for at in made]) + travel

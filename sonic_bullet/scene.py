@@ -33,6 +33,7 @@ from sonic_bullet.listener import (
     links_with_shapes,
     own_clients,
     run_script,
+    seen_settings,
     watch_settings,
 )  # fmt: skip
 from sonic_bullet.machine.worker import running_scene
@@ -154,10 +155,11 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
     Raises SonicBulletError.
     """
     as_call(say, "say")
-    with _stage(path, sr=8_000, seed=0, microphones=(), material=None) as stage:  # nobody hears it: contacts alone
+    quiet = _stage(path, sr=8_000, seed=0, microphones=(), material=None)  # nobody hears it: contacts alone
+    with quiet as stage, seen_settings() as seen:
         stage.run(as_seconds(seconds, "seconds"), None, say)
         listener = stage.need_listener()
-        return (*diagnose_world(listener.world), *_nothing_added(listener), *_mute_bodies(listener))
+        return (*diagnose_world(listener.world, seen=seen), *_nothing_added(listener), *_mute_bodies(listener))
 
 
 def _nothing_added(listener: Listener) -> tuple[Finding, ...]:

@@ -99,7 +99,7 @@ def run_render(
                 raise with_partial(error, to, output, level) from error
         try:
             with progress_bar("stems and events") as (progress, tell):
-                made = extras.made(result, events_to, progress, tell)
+                made = extras.made(result, events_to, progress, tell, drawn=picture is not None)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, to, output, level) from error
@@ -109,7 +109,8 @@ def run_render(
         if picture is not None:
             from sonic_bullet.plots.scene_plot import render_picture
 
-            render_picture(picture, result.sound, result.sr, result.log, Path(scene).name)
+            seen = made.events if made is not None else ()
+            render_picture(picture, result.sound, result.sr, result.log, Path(scene).name, seen)
         notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *level_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
         told = level.say(to, report.gain_per_pa, report.peak_pa, result.log) if report.channels else {}

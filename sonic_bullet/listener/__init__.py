@@ -28,10 +28,12 @@ if TYPE_CHECKING:
         open_world,
         watch_settings,
     )
-    from sonic_bullet.listener.pybullet.doctor import Finding, diagnose_world, keep_restitution
-    from sonic_bullet.listener.pybullet.hooks import module_steps
+    from sonic_bullet.listener.pybullet.doctor import diagnose_world
+    from sonic_bullet.listener.pybullet.findings import Finding
+    from sonic_bullet.listener.pybullet.hooks import module_steps, seen_settings
     from sonic_bullet.listener.pybullet.poses import body_ids
     from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
+    from sonic_bullet.listener.pybullet.restitution import keep_restitution
     from sonic_bullet.listener.pybullet.script import own_clients, run_script
     from sonic_bullet.listener.world import World
 
@@ -55,11 +57,12 @@ __all__ = [
     "open_world",
     "own_clients",
     "run_script",
+    "seen_settings",
     "watch_settings",
 ]
 
 _HOME = {
-    "Finding": "pybullet.doctor",
+    "Finding": "pybullet.findings",
     "PyBulletWorld": "pybullet.pybullet_world",
     "World": "world",
     "bodies_called": "pybullet.clients",
@@ -71,13 +74,14 @@ _HOME = {
     "is_bullet_client": "pybullet.clients",
     "is_connected": "pybullet.clients",
     "is_static": "pybullet.clients",
-    "keep_restitution": "pybullet.doctor",
+    "keep_restitution": "pybullet.restitution",
     "links_called": "pybullet.clients",
     "links_with_shapes": "pybullet.clients",
     "module_steps": "pybullet.hooks",
     "open_world": "pybullet.clients",
     "own_clients": "pybullet.script",
     "run_script": "pybullet.script",
+    "seen_settings": "pybullet.hooks",
     "watch_settings": "pybullet.clients",
 }
 

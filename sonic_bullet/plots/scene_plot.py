@@ -3,16 +3,15 @@
     samples (channels, n) Pa -> pressure p(t)
                              -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P|
                                  the amplitude of a sine
-    ContactLog               -> per sounding body one lane: strikes (area ∝ impulse), sliding and rolling bars
+    SoundEvent (soundtrack)  -> per sounding body one lane: strikes (area ∝ impulse), sliding and rolling bars
 
-A pair of bodies strikes in a step where its impulse leaps above what it carried in the step before. Between strikes a
-pair that is loaded for five steps or more slides where its slip passes 1 mm/s, else rolls where its contact moves
-faster than 1 mm/s, else rests.
+Events are those of the table that `--events` writes, and what rests beside them.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,11 +25,10 @@ from sonic_bullet.files.rows.spool import READ_FRAMES, KeptSound
 from sonic_bullet.records import Array, Microphone, Sensor, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
+from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, SoundEvent, find_sound_events
 
 EXTENSIONS = (".png", ".pdf", ".svg")
-MOVING_M_S = 1e-3
-LASTING_STEPS = 5
-LEAP = 2.0  # a strike at least doubles the impulse of the step before
+BARS = {SUPPORT: "rests", ROLL: "rolls", SLIDE: "slides"}
 WINDOW_S = 0.010
 COLUMNS_MAX = 1600
 DYNAMICS_DB = 90.0
@@ -52,41 +50,16 @@ class Events:
     bar_kind: tuple[str, ...]
 
 
-def find_events(log: ContactLog) -> Events:
-    """Strikes and lasting contacts of every body that sounds (those with a model), by the rules of the
-    module's head.
-    """
-    step, start_s = log.step, np.append(log.start_s, log.duration_s)
-    touching, normal_n_s, slip, sweep = _loads(log)
-    pair, index = np.unique(touching, axis=0, return_inverse=True)
+def drawn_events(log: ContactLog, events: Sequence[SoundEvent]) -> Events:
+    """Those of every body that has a model: what strikes, and what rests, rolls or slides."""
     strikes: list[tuple[int, float, float]] = []
     bars: list[tuple[int, float, float, str]] = []
-    for number, (a, b) in enumerate(pair):
-        mine = np.flatnonzero(index.ravel() == number)
-        steps, at = np.unique(step[mine], return_inverse=True)
-        impulse = np.bincount(at, normal_n_s[mine])
-        before = np.where(np.diff(steps, prepend=-2) == 1, np.append(0.0, impulse[:-1]), 0.0)
-        hit = impulse > LEAP * before
-        hit &= ~np.append(False, hit[:-1] & (np.diff(steps) == 1))  # a strike that spans two steps is one
-        bodies = [int(i) for i in (a, b) if log.bodies[i].model is not None]
-        strikes += [
-            (body, float(start_s[steps[i]]), float(impulse[i] - before[i]))
-            for body in bodies
-            for i in np.flatnonzero(hit)
-        ]
-        moving = [
-            np.bincount(at, normal_n_s[mine] * speed[mine]) / np.maximum(impulse, 1e-300) for speed in (slip, sweep)
-        ]
-        kind = np.where(moving[0] > MOVING_M_S, 2, np.where(moving[1] > MOVING_M_S, 1, 0))
-        cuts = np.flatnonzero((np.diff(steps) != 1) | (np.diff(kind) != 0)) + 1
-        for run in np.split(np.arange(len(steps)), cuts):
-            if len(run) >= LASTING_STEPS:
-                span = (
-                    float(start_s[steps[run[0]]]),
-                    float(start_s[steps[run[-1]] + 1]),
-                    ("rests", "rolls", "slides")[kind[run[0]]],
-                )
-                bars += [(body, *span) for body in bodies]
+    for one in events:
+        bodies = [i for i in (one.low, one.high) if log.bodies[i].model is not None]
+        if one.kind == IMPACT:
+            strikes += [(body, one.start_s, one.impulse_n_s) for body in bodies]
+        elif one.kind in BARS:
+            bars += [(body, one.start_s, one.end_s, BARS[one.kind]) for body in bodies]
     return Events(
         np.array([s[0] for s in strikes], int),
         np.array([s[1] for s in strikes], float),
@@ -95,20 +68,6 @@ def find_events(log: ContactLog) -> Events:
         np.array([r[1:3] for r in bars], float).reshape(-1, 2),
         tuple(r[3] for r in bars),
     )
-
-
-def _loads(log: ContactLog) -> tuple[Array, Array, Array, Array]:
-    """(k, 2) bodies that touch, the lower index first, (k,) normal impulse in N·s, slip and sweep in m/s of all rows: a
-    fifth of what the rows themselves take, made block by block.
-    """
-    pair, normal_n_s = [np.zeros((0, 2), np.int32)], [np.zeros(0)]
-    slip, sweep = [np.zeros(0)], [np.zeros(0)]
-    for row in (block.contact for block in log.blocks()):
-        pair.append(np.sort(np.stack([row["a"], row["b"]], 1), axis=1))
-        normal_n_s.append(np.abs(np.einsum("ki,ki->k", row["impulse_n_s"], row["normal"])))
-        slip.append(np.linalg.norm(row["slip_m_s"], axis=1))
-        sweep.append(row["sweep_m_s"].max(1, initial=0))
-    return np.concatenate(pair), np.concatenate(normal_n_s), np.concatenate(slip), np.concatenate(sweep)
 
 
 def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, Array]:
@@ -153,12 +112,18 @@ def check_picture_output(path: str | os.PathLike[str]) -> Path:
 
 
 def render_picture(
-    path: str | os.PathLike[str], samples: Array | KeptSound, sr: int, log: ContactLog | None = None, title: str = ""
+    path: str | os.PathLike[str],
+    samples: Array | KeptSound,
+    sr: int,
+    log: ContactLog | None = None,
+    title: str = "",
+    events: Sequence[SoundEvent] | None = None,
 ) -> None:
     """Draw ``samples`` (channels, n) in Pa, and the events of ``log`` where there is one, to a PNG, PDF or SVG.
 
-    Of several channels the first is drawn, and the picture says so. Equal input gives equal bytes. Raises FileError
-    (place, extension) and AudioError (rate, shape, NaN).
+    events: the log's, where they are known already; None: they are found (`find_sound_events`). Of several channels the
+    first is drawn, and the picture says so. Equal input gives equal bytes. Raises FileError (place, extension) and
+    AudioError (rate, shape, NaN).
     """
     check_picture_output(path)
     rate = check_sr(sr)
@@ -170,9 +135,11 @@ def render_picture(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    events = None if log is None else find_events(log)
-    lanes = [] if log is None or events is None else _lanes(log, events)
-    heights = [1.6, 3.2] + ([0.45 + 0.24 * len(lanes)] if events is not None else [])
+    shown = None
+    if log is not None:
+        shown = drawn_events(log, events if events is not None else find_sound_events(log, sr=rate))
+    lanes = [] if log is None or shown is None else _lanes(log, shown)
+    heights = [1.6, 3.2] + ([0.45 + 0.24 * len(lanes)] if shown is not None else [])
     figure = Figure(figsize=(12, sum(heights) + 1.2), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
@@ -187,8 +154,8 @@ def render_picture(
             pad=0.01,
             fraction=0.03,
         )
-    if log is not None and events is not None:
-        _draw_events(axes[2], log, events, lanes)
+    if log is not None and shown is not None:
+        _draw_events(axes[2], log, shown, lanes)
     axes[-1].set_xlabel("time in s")
     axes[-1].set_xlim(0, max(sound.shape[1] / rate, log.duration_s if log is not None else 0, 1e-3))
     observed = f"channel 1 of {sound.shape[0]}" if sound.shape[0] > 1 else ""

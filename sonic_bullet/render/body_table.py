@@ -21,6 +21,10 @@ from sonic_bullet.synth.strikes import SPAN
 EDGE_RADIUS_SHARE = 0.005
 """Radius of a body's edges, as a share of its size: broken, as made things have them."""
 EDGE_RADIUS_LEAST_M = 2e-4
+UNKNOWN_REBOUND = 0.7
+"""Restitution of a body whose log does not say; a pair's is 0.5 then."""
+NEVER = -(1 << 40)
+"""Number of a step that was long ago."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +132,8 @@ class BodyTable:
         _stand(row, place)
         # a silent partner's record begins where it first touches, not where it was put
         row["placed"] = -SPAN if material is None else body.since_step
+        row["rebound"] = body.dynamics.get("restitution", UNKNOWN_REBOUND)
+        row["loaded"] = row["cause_step"] = NEVER
         return self._bodies.append(row)
 
     def copy(self) -> BodyTable:

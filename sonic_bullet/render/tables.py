@@ -47,6 +47,10 @@ BODY = np.dtype(
         ("faces", "i8"),  # 0: no surface
         ("node_at", "i8"),
         ("placed", "i8"),  # step in which it began or was last moved by hand
+        ("rebound", "f8"),  # restitution as the simulator has it; a pair's is the product
+        ("loaded", "i8"),  # last step before the one looked at in which it carried load
+        ("cause_m_s", "f8"),  # approach of its last strike that gravity and bouncing did not make, and its step
+        ("cause_step", "i8"),
     ],
     align=True,
 )

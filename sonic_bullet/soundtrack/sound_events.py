@@ -2,7 +2,9 @@
 
     ContactLog -> render_apart, step by step -> EventWitness: PULSE (strikes that are accepted), drives (friction), PAIR
         -> one impact of all pulses that a strike was told in; steps of one kind -> one span -> SoundEvent
-        + stems -> level at the first microphone
+        + what each sends by itself (own_sound.py) -> level at the first microphone
+
+Table, cues, overlay and picture show this one list.
 
 Nothing is judged here a second time: an impact is a pulse that the run time plays (render.strike_pulses), a roll or a
 slide a pair whose surface voice makes a force (render.friction). Which of both is by slip: a contact that slips faster
@@ -12,7 +14,7 @@ is a strike without a cause.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import NamedTuple
@@ -25,9 +27,10 @@ from sonic_bullet.listener.animated import matrices
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
+from sonic_bullet.render.apart import render_apart
 from sonic_bullet.render.friction import SWEEP_FLOOR_M_S
 from sonic_bullet.render.synthesis_state import State
-from sonic_bullet.soundtrack.stems import Stem, pair_sound
+from sonic_bullet.soundtrack.own_sound import OwnSound
 from sonic_bullet.synth.fractional_delay import AHEAD
 from sonic_bullet.synth.strikes import NOW, SPAN
 
@@ -48,8 +51,9 @@ class SoundEvent:
     low, high: indices into the log's bodies. place_m (3,): world frame, where it begins. impulse_n_s: of an impact the
     magnitude that the run time plays, else the load's time integral. speed_m_s: of an impact the approach, of a slide
     the slip, of a roll the sweep, means by load. arrival_s: when its first sound is at the first microphone. level_db:
-    re 20 µPa there, of both bodies together: the peak within `LEVEL_S` of an impact, the rms of a roll or slide; None
-    where nothing of it is in the sound, or it is no pressure. reason: why it is silent, empty where it sounds.
+    re 20 µPa there, of what this event alone makes both bodies send (`own_sound`), whatever else they ring with: the
+    peak within `LEVEL_S` of an impact, the rms of a roll or slide; None where it sends nothing, or it is no pressure.
+    reason: why it is silent, empty where it sounds.
     """
 
     kind: str
@@ -90,11 +94,15 @@ class _Moment(NamedTuple):
     impulse_n_s: float
     speed_m_s: float
     reason: str = ""
+    own: float = 0.0
+    """Of a pulse the peak in Pa of its strike so far, of a step of friction the sum of p² over its samples."""
 
 
 @dataclass(slots=True)
 class _Run:
-    """Steps of a pair and a kind, from the first on; step: the last of `steps`, travel: sum of speeds times loads."""
+    """Steps of a pair and a kind, from the first on; step: the last of `steps`, travel: sum of speeds times loads, own:
+    sum of p².
+    """
 
     first: _Moment
     step: int
@@ -102,32 +110,39 @@ class _Run:
     steps: int
     load_n_s: float
     travel: float
+    own: float
 
     @classmethod
     def of(cls, one: _Moment) -> _Run:
-        return cls(one, one.step, one.end_s, 1, one.impulse_n_s, (one.impulse_n_s + 1e-300) * one.speed_m_s)
+        travel = (one.impulse_n_s + 1e-300) * one.speed_m_s
+        return cls(one, one.step, one.end_s, 1, one.impulse_n_s, travel, one.own)
 
     def add(self, other: _Run) -> None:
         """Go on with what came next."""
         self.step, self.end_s, self.steps = other.step, other.end_s, self.steps + other.steps
         self.load_n_s, self.travel = self.load_n_s + other.load_n_s, self.travel + other.travel
+        self.own += other.own
 
 
 class EventWitness:
     """Sees every step of a log's run; `events` are what it saw."""
 
     def __init__(self, log: ContactLog) -> None:
-        self._log, self._steps = log, iter(log.steps)
+        self._log, self._steps, self._sr = log, iter(log.steps), log.sr
         self._known: dict[int, Mapping[tuple[int, int], _Touch]] = {}
         self._seen: list[_Moment] = []
         self._runs: dict[tuple[int, int], list[_Run]] = {}  # grown in place: what rests rests for hours
         self._struck: dict[tuple[int, int], int] = {}
+        first = log.sensors[0] if log.sensors else None
+        self._own = OwnSound(first, log.air.sound_speed_m_s) if isinstance(first, Microphone) else None
+        self._strike: dict[tuple[int, int], tuple[int, float, Array]] = {}  # step, start, pressure of a pair's last
 
     def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:
         """Take in the pulses and drives of step ``number``, and which pairs carry load without them."""
+        self._sr = state.bank.sr
         here, there = self._touching(number), self._touching(number + 1)
         begin_s, after_s = float(step["begin_s"]), float(step["after_s"])
-        for pulse in state.scratch.pulse[:found]:
+        for at, pulse in enumerate(state.scratch.pulse[:found]):
             low, high = (int(state.body[i]) for i in pulse["body"])
             ahead = int(pulse["ahead"])
             of, start_s = (there, after_s) if ahead else (here, begin_s)
@@ -135,14 +150,17 @@ class EventWitness:
             touch = of.get((low, high)) or here.get((low, high)) or _NOWHERE
             self._struck[low, high] = number + ahead
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
+            speed, own = max(touch.approach_m_s, 0), self._peak_pa(state, number + ahead, start_s, at, (low, high))
             self._seen.append(
-                _Moment(low, high, number + ahead, start_s, start_s, IMPACT, touch, impulse, max(touch.approach_m_s, 0))
+                _Moment(low, high, number + ahead, start_s, start_s, IMPACT, touch, impulse, speed, "", own)
             )
         active = state.pairs.active[: state.pairs.count[0]]
         pair, driven = state.pairs.pair[active], np.isin(active, state.scratch.slot[:drives])
         force, before, used = pair["force_n"][:, NOW], pair["force_n"][:, NOW - 1], pair["struck_n"][:, NOW]
         leaps, carries = (force > before) & (used > 0), (pair["support_n"][:, 1] > 0) & (force > 0)
         table = state.table.bodies
+        frames = int(step["count"])
+        rubs = {} if self._own is None else self._own.friction_pa2(state, number, drives, frames)
         mute = (table["modes"] + table["rigid"] == 0)[pair["body"]].all(axis=1)
         bodies = state.body[pair["body"]].tolist()
         for i in np.flatnonzero(driven | leaps | carries).tolist():
@@ -159,7 +177,8 @@ class EventWitness:
             else:
                 continue
             reason = NO_VOICE if mute[i] else reason
-            moment = _Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason)
+            own = rubs.get(int(active[i]), 0.0)
+            moment = _Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason, own)
             if kind == UNCAUSED:
                 self._seen.append(moment)
                 continue
@@ -169,6 +188,21 @@ class EventWitness:
             else:
                 runs.append(_Run.of(moment))
 
+    def _peak_pa(self, state: State, number: int, start_s: float, at: int, who: tuple[int, int]) -> float:
+        """Of the strike whose pulse this is, as far as it is known: what follows a step later is added to it."""
+        if self._own is None:
+            return 0.0
+        sr = state.bank.sr
+        sound = self._own.strike_pa(state, number, at, max(round(LEVEL_S * sr), 1))
+        step, first_s, before = self._strike.get(who, (-SPAN, 0.0, sound))
+        if 0 <= number - step <= 1:
+            late = min(max(round((start_s - first_s) * sr), 0), len(sound))
+            joined = before.copy()
+            joined[late:] += sound[: len(sound) - late]
+            sound, start_s = joined, first_s
+        self._strike[who] = (number, start_s, sound)
+        return float(np.abs(sound).max())
+
     def _touching(self, number: int) -> Mapping[tuple[int, int], _Touch]:
         """The pairs that touch in a step of the log; behind its last nobody does."""
         while number not in self._known:
@@ -176,7 +210,7 @@ class EventWitness:
             self._known = {k: v for k, v in self._known.items() if k >= at - SPAN} | {at: touching_pairs(step)}
         return self._known[number]
 
-    def events(self, stems: Sequence[Stem], sr: int) -> tuple[SoundEvent, ...]:
+    def events(self) -> tuple[SoundEvent, ...]:
         """All of them in the order of their times, with their levels."""
         order = sorted(self._seen, key=lambda one: (one.low, one.high, one.step, one.start_s))
         found: list[SoundEvent] = []
@@ -185,29 +219,27 @@ class EventWitness:
             for kind, apart in ((IMPACT, 1), (UNCAUSED, SPAN)):
                 found += [self._impact(group) for group in _strikes([x for x in moments if x.kind == kind], apart)]
         found += [self._span(run) for runs in self._runs.values() for run in _spans(runs)]
-        by_index = {stem.index: stem for stem in stems}
-        pressure = bool(self._log.sensors) and isinstance(self._log.sensors[0], Microphone)
-        return tuple(
-            replace(one, level_db=_level_db(one, by_index, sr) if pressure and not one.reason else None)
-            for one in sorted(found, key=lambda one: (one.start_s, one.low, one.high, one.kind))
-        )
+        return tuple(sorted(found, key=lambda one: (one.start_s, one.low, one.high, one.kind)))
 
     def _impact(self, pulses: list[_Moment]) -> SoundEvent:
         first = pulses[0]
         impulse = sum(one.impulse_n_s for one in pulses)
-        return self._event(first, pulses[-1].end_s, impulse, max(one.speed_m_s for one in pulses))
+        peak_pa = pulses[-1].own
+        return self._event(first, pulses[-1].end_s, impulse, max(one.speed_m_s for one in pulses), peak_pa)
 
     def _span(self, run: _Run) -> SoundEvent:
-        return self._event(run.first, run.end_s, run.load_n_s, run.travel / (run.load_n_s + run.steps * 1e-300))
+        speed_m_s = run.travel / (run.load_n_s + run.steps * 1e-300)
+        rms_pa = float(np.sqrt(run.own / max((run.end_s - run.first.start_s) * self._sr, 1.0)))
+        return self._event(run.first, run.end_s, run.load_n_s, speed_m_s, rms_pa)
 
-    def _event(self, first: _Moment, end_s: float, impulse_n_s: float, speed_m_s: float) -> SoundEvent:
+    def _event(self, first: _Moment, end_s: float, impulse_n_s: float, speed_m_s: float, own_pa: float) -> SoundEvent:
         log, late_s, place_m = self._log, 0.0, np.array(first.touch.place_m)
         if log.sensors and isinstance(log.sensors[0], Microphone):
             away = float(np.linalg.norm(place_m - log.sensors[0].position_m))
             late_s = max(away / log.air.sound_speed_m_s, AHEAD / log.sr)
         return SoundEvent(
             first.kind, first.start_s, end_s, first.low, first.high, place_m, impulse_n_s, speed_m_s,
-            first.start_s + late_s, None, first.reason,
+            first.start_s + late_s, level_db(own_pa) if not first.reason and own_pa > 0 else None, first.reason,
         )  # fmt: skip
 
 
@@ -262,15 +294,23 @@ def _spans(runs: Sequence[_Run]) -> list[_Run]:
     return spans
 
 
-def _level_db(event: SoundEvent, stems: Mapping[int, Stem], sr: int) -> float | None:
-    """Peak of an impact, rms of a span, as the two bodies send it to the first microphone."""
-    late_s = event.arrival_s - event.start_s
-    stop_s = event.arrival_s + LEVEL_S if event.kind == IMPACT else event.end_s + late_s
-    sound = pair_sound(dict(stems), (event.low, event.high), int(event.arrival_s * sr), int(stop_s * sr) + 1)[0]
-    if not sound.any():
-        return None
-    level = float(np.abs(sound).max() if event.kind == IMPACT else np.sqrt(np.mean(sound**2)))
-    return 20 * float(np.log10(level / REFERENCE_PRESSURE_PA))
+def level_db(pressure_pa: float) -> float:
+    """Level re 20 µPa."""
+    return 20 * float(np.log10(pressure_pa / REFERENCE_PRESSURE_PA))
+
+
+def find_sound_events(
+    log: ContactLog,
+    *,
+    sr: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> tuple[SoundEvent, ...]:
+    """All events of a log, whose sound is made for it and not kept. Arguments, errors: as `render_apart` has them."""
+    witness = EventWitness(log)
+    for _ in render_apart(log, sr=sr, witness=witness, progress=progress, say=say):
+        pass
+    return witness.events()
 
 
 def cues_of(

@@ -20,7 +20,6 @@ from sonic_bullet.files import AudioReport, cannot, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
-from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.apart import render_apart
 from sonic_bullet.render.synthesis_state import Witness
@@ -104,9 +103,3 @@ def write_stems(
             cues=None if cues is None else cues(stem.index),
             time_reference=time_reference,
         )
-
-
-def pair_sound(stems: dict[int, Stem], bodies: tuple[int, int], start: int, stop: int) -> Array:
-    """(channels, ≤ stop - start) what two bodies send together; of one channel and no sample where neither does."""
-    found = [stems[index].sound.read(max(start, 0), max(stop, 0)) for index in bodies if index in stems]
-    return np.sum(found, axis=0) if found else np.zeros((1, 0))

@@ -147,3 +147,74 @@ def test_a_lost_client_is_named() -> None:
         diagnose_world(4000)
     with pytest.raises(SceneError, match="not connected"):
         keep_restitution(4000)
+
+
+def test_a_contact_threshold_that_the_scene_sets_itself_is_known(clean: Any) -> None:
+    world, _ = listen(clean)
+    for body in range(4):
+        clean.changeDynamics(body, -1, restitution=0.5)
+    assert ids(diagnose_world(world)) == {"restitution-lost"}
+    for body in range(4):
+        clean.changeDynamics(body, -1, contactProcessingThreshold=0)
+    assert ids(diagnose_world(world)) == set()
+
+
+@pytest.mark.parametrize(
+    ("threshold", "step_s", "restitution", "named"),
+    [(0.0, 1 / 240, 0.7, True), (0.0, 1 / 1000, 0.9, True), (0.01, 1 / 240, 0.8, True), (0.2, 1 / 240, 0.7, False),
+     (0.0, 1 / 240, 0.0, False)],
+)  # fmt: skip
+def test_what_never_comes_to_rest_is_named(
+    clean: Any, threshold: float, step_s: float, restitution: float, named: bool
+) -> None:
+    world, _ = listen(clean)
+    clean.setTimeStep(step_s)
+    for body in range(4):
+        clean.changeDynamics(body, -1, restitution=restitution, contactProcessingThreshold=0)
+    clean.setPhysicsEngineParameter(restitutionVelocityThreshold=threshold)
+    found = [one for one in diagnose_world(world) if one.id == "restitution-threshold"]
+    assert len(found) == named
+    if named:
+        e = restitution**2
+        assert f"{9.81 * step_s * e / (1 - e):.2g} m/s" in found[0].what
+
+
+BUILT = """
+def build(client):
+    client.setGravity(0, 0, -9.81)
+    client.setPhysicsEngineParameter(restitutionVelocityThreshold=0)
+    half = [0.1, 0.02, 0.01]
+    ground = client.createMultiBody(0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[1, 1, 0.1]),
+                                    basePosition=[0, 0, -0.1])
+    bar = client.createMultiBody(0.1, client.createCollisionShape(client.GEOM_BOX, halfExtents=half),
+                                 basePosition=[0, 0, 0.012])
+    for body in (ground, bar):
+        client.changeDynamics(body, -1, restitution=0.7, contactProcessingThreshold=0)
+    return {bar: "wood"}
+"""
+PLAIN = """
+import pybullet as p
+p.connect(p.DIRECT)
+p.setGravity(0, 0, -9.81)
+p.setPhysicsEngineParameter(restitutionVelocityThreshold=0)
+ground = p.createMultiBody(0, p.createCollisionShape(p.GEOM_BOX, halfExtents=[1, 1, 0.1]), basePosition=[0, 0, -0.1])
+bar = p.createMultiBody(0.1, p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.02, 0.01]),
+                        basePosition=[0, 0, 0.012])
+for body in (ground, bar):
+    p.changeDynamics(body, -1, restitution=0.7, contactProcessingThreshold=0)
+for _ in range(240):
+    p.stepSimulation()
+"""
+
+
+@pytest.mark.parametrize("scene", [BUILT, PLAIN])
+def test_the_doctor_names_what_keeps_a_bar_from_resting(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from sonic_bullet.cli import main
+
+    (tmp_path / "still.py").write_text(scene)
+    assert main(["doctor", str(tmp_path / "still.py"), "--seconds", "0.2"]) == 0
+    said = capsys.readouterr().out
+    assert "restitution-threshold" in said
+    assert "restitution-lost" not in said

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.load_leaps import find_leaps
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows import spool
 from sonic_bullet.plots import scene_plot
@@ -58,7 +59,7 @@ def test_a_strike_is_one_event_at_its_step_with_its_impulse() -> None:
     steps[7] = [rows(1, 0, 0.02)]
     steps[8] = [rows(1, 0, 0.05)]  # the same blow, second step
     steps[15] = [rows(0, 1, 0.01)]
-    events = scene_plot.find_events(log_of(steps))
+    events = find_leaps(log_of(steps))
     np.testing.assert_array_equal(events.strike_body, [1, 1])
     np.testing.assert_allclose(events.strike_s, [7 * DT, 15 * DT])
     np.testing.assert_allclose(events.strike_n_s, [0.02, 0.01])
@@ -66,7 +67,7 @@ def test_a_strike_is_one_event_at_its_step_with_its_impulse() -> None:
 
 
 def test_both_sounding_bodies_of_a_pair_are_struck() -> None:
-    events = scene_plot.find_events(log_of([[], [rows(2, 1, 0.3)], []]))
+    events = find_leaps(log_of([[], [rows(2, 1, 0.3)], []]))
     assert sorted(events.strike_body) == [1, 2]
 
 
@@ -77,7 +78,7 @@ def test_lasting_contacts_are_bars_of_their_kind(slip: float, sweep: float, kind
     steps: list[list[Contacts]] = [[] for _ in range(40)]
     for i in range(10, 30):
         steps[i] = [rows(1, 0, 0.004, slip_m_s=slip, sweep_m_s=sweep, points=1 + i % 4)]
-    events = scene_plot.find_events(log_of(steps))
+    events = find_leaps(log_of(steps))
     assert (events.bar_kind, list(events.bar_body)) == ((kind,), [1])
     np.testing.assert_allclose(events.bar_s, [[10 * DT, 30 * DT]])
     assert len(events.strike_s) == 1  # the landing
@@ -86,13 +87,13 @@ def test_lasting_contacts_are_bars_of_their_kind(slip: float, sweep: float, kind
 def test_a_blow_on_a_resting_body_is_seen_above_its_weight() -> None:
     steps = [[rows(1, 0, 0.004)] for _ in range(60)]
     steps[30] = [rows(1, 0, 0.1)]
-    events = scene_plot.find_events(log_of(steps))
+    events = find_leaps(log_of(steps))
     np.testing.assert_allclose(events.strike_s, [0, 30 * DT])
     np.testing.assert_allclose(events.strike_n_s, [0.004, 0.096])
 
 
 def test_no_contacts_no_events() -> None:
-    events = scene_plot.find_events(log_of([[], []]))
+    events = find_leaps(log_of([[], []]))
     assert (len(events.strike_s), len(events.bar_kind)) == (0, 0)
 
 

@@ -20,9 +20,8 @@ from sonic_bullet.records.errors import AudioError, FileError, RecordError, Scen
 from sonic_bullet.render import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
 from sonic_bullet.soundtrack.overlay import COLOURS, pixel, shown_at, with_contacts
-from sonic_bullet.soundtrack.sound_events import IMPACT, EventWitness
+from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events
 from sonic_bullet.soundtrack.staging import chosen_camera, duration_of, staged
-from sonic_bullet.soundtrack.stems import render_stems
 from tests.made.films import decoded
 from tests.made.models import STEEL, box_body, box_surface
 from tests.made.soundtracks import MICROPHONES, table_log
@@ -167,8 +166,7 @@ def test_a_film_has_its_sound_and_follows(tmp_path: Path) -> None:
 
 def test_contacts_are_drawn_where_they_are() -> None:
     log = table_log()
-    witness = EventWitness(log)
-    events = witness.events(render_stems(log, witness=witness), log.sr)
+    events = find_sound_events(log)
     hit = max((one for one in events if one.kind == IMPACT), key=lambda one: one.impulse_n_s)
     camera, size = Camera(hit.place_m + np.array([0.0, -1.0, 0.5]), hit.place_m), (200, 120)
     time_s = hit.start_s + 0.02

@@ -55,7 +55,7 @@ def run(setup: Callable[[Any, sb.Listener], object], seconds: float, step_s: flo
 def looked(log: ContactLog) -> tuple[tuple[SoundEvent, ...], tuple[Stem, ...]]:
     witness = EventWitness(log)
     stems = render_stems(log, witness=witness)
-    return witness.events(stems, log.sr), stems
+    return witness.events(), stems
 
 
 def falling(client: Any, listener: sb.Listener) -> None:
@@ -104,7 +104,8 @@ def test_a_fall_is_an_impact_when_where_and_as_strong_as_it_must() -> None:
     first = int(np.flatnonzero(np.abs(sound) > 1e-3 * np.abs(sound).max())[0])
     # the ball's own middle is a radius nearer
     assert first / log.sr == pytest.approx(hit.arrival_s, abs=RADIUS_M / 343 + 10 / log.sr)
-    assert hit.level_db == pytest.approx(20 * np.log10(np.abs(sound).max() / REFERENCE_PRESSURE_PA), abs=1e-9)
+    # the closed form of one strike: it leaves out where within a sample the pulse begins
+    assert hit.level_db == pytest.approx(20 * np.log10(np.abs(sound).max() / REFERENCE_PRESSURE_PA), abs=0.5)
 
 
 @pytest.mark.parametrize(("setup", "kind", "speed"), [(rolling, ROLL, 0.5), (sliding, SLIDE, 0.9)])
@@ -138,7 +139,7 @@ def test_who_rests_takes_no_memory_for_it() -> None:
     render_stems(log, witness=witness)
     kept = len(witness._seen) + sum(len(runs) for runs in witness._runs.values())
     assert kept < 0.1 * len(log.steps)
-    assert sum(one.end_s - one.start_s for one in witness.events((), log.sr) if one.kind == SUPPORT) > 0.8
+    assert sum(one.end_s - one.start_s for one in witness.events() if one.kind == SUPPORT) > 0.8
 
 
 def test_two_bodies_without_a_voice_are_said_to_have_none() -> None:
@@ -164,8 +165,8 @@ def test_events_are_those_that_the_run_time_plays() -> None:
             seen.extend(np.linalg.norm(state.scratch.pulse["impulse_n_s"][:found], axis=1).tolist())
 
     witness = Counting(log)
-    stems = render_stems(log, witness=witness)
-    events = witness.events(stems, log.sr)
+    render_stems(log, witness=witness)
+    events = witness.events()
     hits = [one for one in events if one.kind == IMPACT]
     assert len(hits) > 5
     assert sum(one.impulse_n_s for one in hits) == pytest.approx(sum(seen), rel=1e-12)
@@ -210,3 +211,67 @@ def test_cues_stand_where_events_arrive() -> None:
     own = cues_of(events, log, log.sr, frames, marble)
     assert 0 < len(own) < len(cues)
     assert all("marble" in cue.label for cue in own)
+
+
+@pytest.mark.parametrize("what", ["later and softer", "a neighbour", "another material"])
+def test_a_strike_has_the_level_that_it_has_alone(what: str) -> None:
+    """Played together with louder ones that ring on, each has the level of a run in which it is alone."""
+    soft = {"later and softer": (0.05, 0.02), "a neighbour": (0.06, 0.03), "another material": (0.04, 0.01)}[what]
+    hard, other = GLASS, STEEL if what == "another material" else GLASS
+
+    def drop(client: Any, listener: sb.Listener, falls: list[tuple[float, float, Any]]) -> None:
+        floor(client)
+        for x_m, height_m, material in falls:
+            body = ball(client, (x_m, 0, RADIUS_M + height_m), radius=RADIUS_M, mass=MASS_KG)
+            listener.add(body, material=material, model=ball_body(RADIUS_M, material).model)
+
+    both = run(lambda c, x: drop(c, x, [(0.0, 0.02, hard), (0.1, 0.08 + soft[0], other)]), 0.3)
+    alone = run(lambda c, x: drop(c, x, [(0.1, 0.08 + soft[0], other)]), 0.3)
+    mine = [one for one in looked(both)[0] if one.kind == IMPACT and one.place_m[0] > 0.05]
+    apart = [one for one in looked(alone)[0] if one.kind == IMPACT]
+    assert len(mine) == len(apart) > 0
+    for one, same in zip(mine, apart, strict=True):
+        assert one.level_db == pytest.approx(same.level_db, abs=0.01)
+
+
+@pytest.mark.parametrize(("setup", "kind"), [(rolling, ROLL), (sliding, SLIDE)])
+def test_a_roll_is_as_loud_as_its_stem(setup: Any, kind: str) -> None:
+    """A body that only rolls or slides: its stem's rms over that time."""
+    log = run(setup, 0.3)
+    events, stems = looked(log)
+    (lasting,) = [one for one in events if one.kind == kind and one.end_s - one.start_s > 0.05]
+    late = lasting.arrival_s - lasting.start_s
+    sound = stems[0].sound.samples()[0][round(lasting.arrival_s * log.sr) : round((lasting.end_s + late) * log.sr)]
+    rms_db = 20 * np.log10(np.sqrt(np.mean(sound**2)) / REFERENCE_PRESSURE_PA)
+    struck = [one for one in events if one.kind == IMPACT]
+    assert not struck
+    assert lasting.level_db == pytest.approx(rms_db, abs=1.0)
+
+
+def test_no_event_is_louder_than_what_its_bodies_send() -> None:
+    """By more than strikes that cancel what rang before."""
+    log = table_log()
+    events, stems = looked(log)
+    peak = {stem.index: float(stem.sound.peaks()[0]) for stem in stems}
+    sounding = [one for one in events if one.level_db is not None]
+    assert len(sounding) > 5
+    for one in sounding:
+        loudest = sum(peak.get(body, 0.0) for body in (one.low, one.high))
+        assert one.level_db is not None and one.level_db < 20 * np.log10(loudest / REFERENCE_PRESSURE_PA) + 3
+    levels = [round(one.level_db or 0.0, 3) for one in sounding if one.kind == IMPACT]
+    assert len(set(levels)) == len(levels)  # none repeats its neighbour's
+
+
+def test_picture_table_and_cues_show_one_list(tmp_path: Path) -> None:
+    from sonic_bullet.plots.scene_plot import drawn_events
+
+    log = table_log()
+    events, _ = looked(log)
+    shown = drawn_events(log, events)
+    table = write_events(tmp_path / "events.csv", events, log)
+    hits = [one for one in events if one.kind == IMPACT]
+    assert table[IMPACT] == len(hits)
+    assert sorted(set(shown.strike_s.tolist())) == sorted({one.start_s for one in hits})
+    assert shown.bar_kind.count("rolls") == sum(
+        sum(log.bodies[i].model is not None for i in (one.low, one.high)) for one in events if one.kind == ROLL
+    )

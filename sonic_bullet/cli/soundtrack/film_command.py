@@ -114,15 +114,9 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
             import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
         with progress_bar("film") as (progress, tell):
             if options["overlay"]:
-                from sonic_bullet.soundtrack.sound_events import EventWitness
-                from sonic_bullet.soundtrack.stems import render_stems
+                from sonic_bullet.soundtrack.sound_events import find_sound_events
 
-                witness = EventWitness(result.log)
-                frames = result.sound.shape[1]
-                stems = render_stems(
-                    result.log, sr=result.sr, frames=frames, witness=witness, progress=progress, say=tell
-                )
-                events = witness.events(stems, result.sr)
+                events = find_sound_events(result.log, sr=result.sr, progress=progress, say=tell)
             report = make_film(
                 str(to),
                 result.log,

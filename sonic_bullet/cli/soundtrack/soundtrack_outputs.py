@@ -94,18 +94,25 @@ class SoundtrackWish:
         events_to: str | None,
         progress: Callable[[float], None],
         say: Callable[[str], None],
+        *,
+        drawn: bool = False,
     ) -> Soundtrack | None:
-        """Stems and events of a render, as long as it is; None where nothing is asked for. Raises SonicBulletError."""
-        if self.stems is None and self.events is None and not self.cues:
+        """Stems and events of a render, as long as it is; None where nothing is asked for. drawn: events are wanted for
+        a picture. Raises SonicBulletError.
+        """
+        wanted = self.events is not None or self.cues or drawn
+        if self.stems is None and not wanted:
             return None
-        from sonic_bullet.soundtrack.sound_events import EventWitness
+        from sonic_bullet.soundtrack.sound_events import EventWitness, find_sound_events
         from sonic_bullet.soundtrack.stems import render_stems
 
         log, sr = result.log, result.sr
-        witness = EventWitness(log) if self.events is not None or self.cues else None
+        if self.stems is None:
+            events = find_sound_events(log, sr=sr, progress=progress, say=say)
+            return Soundtrack(self, log, sr, (), events, events_to)
+        witness = EventWitness(log) if wanted else None
         stems = render_stems(log, sr=sr, frames=result.sound.shape[1], witness=witness, progress=progress, say=say)
-        events = witness.events(stems, sr) if witness is not None else ()
-        return Soundtrack(self, log, sr, stems, events, events_to)
+        return Soundtrack(self, log, sr, stems, witness.events() if witness is not None else (), events_to)
 
 
 @dataclass(slots=True)

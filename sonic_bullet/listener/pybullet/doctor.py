@@ -1,16 +1,15 @@
 """Settings of a PyBullet world that spoil its sound, and how to mend them.
 
 Nothing here is a guess about taste: each finding names what was measured to go wrong. What PyBullet does not tell is
-left out: contactProcessingThreshold can be set but not read, so `keep_restitution` leaves a mark (user data) beside it,
-and damping and activation states cannot be read at all (sleep is recognised by bodies that bear load and stand exactly
-still).
+left out: damping and activation states cannot be read at all (sleep is recognised by bodies that bear load and stand
+exactly still).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pybullet
@@ -18,12 +17,15 @@ import pybullet
 from sonic_bullet.geometry import LARGEST_M, oversize
 from sonic_bullet.listener.frames import NO_NUMBER
 from sonic_bullet.listener.polling import FORCE
+from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.listener.pybullet import collision_shapes
 from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
 from sonic_bullet.listener.pybullet.clients import client_id_of
+from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import read_motion, read_roster
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
+from sonic_bullet.listener.pybullet.restitution import endless_bounces, lost_restitution
 from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m, read_surfaces
 from sonic_bullet.records.errors import MeshError, SceneError
 
@@ -31,52 +33,26 @@ LONGEST_STEP_S = 1 / 120
 SMALLEST_M = 1e-3
 DENSITY_RATIO = 3.0
 LID_SHARE = 0.15
-KEPT = "sonic_bullet.contactProcessingThreshold"
-Severity = Literal["error", "warning", "info"]
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """id: of the kind.
-
-    severity: "error" (no sound), "warning" (wrong sound), "info". what is so, and its remedy: one line each.
-    """
-
-    id: str
-    severity: Severity
-    what: str
-    remedy: str
-
-
-def keep_restitution(client: Any) -> int:
-    """Let small steps bounce: contactProcessingThreshold = 0 on every link of every body loaded so far; how many links.
-
-    With the default, restitution 0.5 gives rebounds of 0.36–0.57 at 1/240 s and 0.000 at 1/4000 s; with 0, 0.51–0.59 at
-    both (bullet3 issues 3094, 1530, 4341). Call it after loading. Raises SceneError for a client that is not connected.
-    """
-    client_id = client_id_of(client)
-    links = _links(client_id)
-    for body, link in links:
-        pybullet.changeDynamics(body, link, contactProcessingThreshold=0, physicsClientId=client_id)
-        pybullet.addUserData(body, KEPT, "0", link, physicsClientId=client_id)
-    return len(links)
-
-
-def _links(client_id: int) -> list[tuple[int, int]]:
-    return [(body, link) for body, joints, _ in read_roster(client_id).bodies for link in range(-1, joints)]
-
-
-def diagnose_world(world: PyBulletWorld | Any, steps: int = 0) -> tuple[Finding, ...]:
+def diagnose_world(
+    world: PyBulletWorld | Any, steps: int = 0, *, seen: Mapping[int, SetValues] | None = None
+) -> tuple[Finding, ...]:
     """What in a world would spoil its sound. world: a PyBulletWorld, or what `open_world` takes.
 
-    steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. Raises SceneError
-    where the client is not connected.
+    steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. seen: what was
+    set, by the client's number; None: what the world's own hooks saw. Raises SceneError where the client is not
+    connected.
     """
     client_id = world.client_id if isinstance(world, PyBulletWorld) else client_id_of(world)
+    known = (seen or {}).get(client_id) or (
+        world.properties.set_values if isinstance(world, PyBulletWorld) else SetValues()
+    )
     findings = [*_settings(client_id), *_empty(client_id), *_masses(client_id)]
     if not any(finding.severity == "error" for finding in findings):
         findings += [
-            *_restitution(client_id),
+            *lost_restitution(client_id, known),
+            *endless_bounces(client_id, known),
             *_lids(client_id),
             *_scale(client_id, _sounding(world)),
             *_ahead(client_id, steps),
@@ -122,7 +98,7 @@ def _settings(client_id: int) -> list[Finding]:
 
 def _empty(client_id: int) -> list[Finding]:
     """A world in which nothing can touch."""
-    links = _links(client_id)
+    links = all_links(client_id)
     if not links:
         what, remedy = "there is no body in this world", "load some before stepping, into the client that steps"
         return [Finding("no-body", "error", what, remedy)]
@@ -138,7 +114,7 @@ def _empty(client_id: int) -> list[Finding]:
 
 def _masses(client_id: int) -> list[Finding]:
     found = []
-    for body, link in _links(client_id):
+    for body, link in all_links(client_id):
         try:
             checked_mass_kg(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id), body, link)
         except SceneError as error:
@@ -149,46 +125,12 @@ def _masses(client_id: int) -> list[Finding]:
     return found
 
 
-def _restitution(client_id: int) -> list[Finding]:
-    links = _links(client_id)
-    bouncy = {entry: pybullet.getDynamicsInfo(*entry, physicsClientId=client_id)[5] for entry in links}
-    movable = [
-        (body, link) for body, link in links if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] > 0
-    ]
-    springy = {body for (body, _), value in bouncy.items() if value > 0}
-    lost = [
-        e
-        for e in movable
-        if bouncy[e] > 0
-        and springy - {e[0]}
-        and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0
-    ]
-    if not lost:
-        return []
-    dt = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)["fixedTimeStep"]
-    names = _names(client_id, lost)
-    return [
-        Finding(
-            "restitution-lost",
-            "warning",
-            f"{names}: restitution {bouncy[lost[0]]:g} is asked for, but Bullet's default contact threshold "
-            f"loses some or all of it at a step of {dt:.4g} s",
-            "call sonic_bullet.keep_restitution(client) after loading",
-        )
-    ]
-
-
-def _names(client_id: int, links: list[tuple[int, int]]) -> str:
-    first = f"body {links[0][0]} ({link_name(client_id, *links[0])})"
-    return first if len(links) == 1 else f"{first} and {len(links) - 1} more"
-
-
 def _lids(client_id: int) -> list[Finding]:
     """Moving meshes whose hull closes what is open: judged object by object, as Bullet makes a hull of each object of a
     file.
     """
     found = []
-    for body, link in _links(client_id):
+    for body, link in all_links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
             continue
         deep = 0.0
@@ -236,7 +178,7 @@ def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
 
 def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
     found = []
-    for body, link in _links(client_id):
+    for body, link in all_links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(
             client_id, body, link
         ):
@@ -291,7 +233,7 @@ def _sleepers(client_id: int) -> list[Finding]:
         Finding(
             "sleeping",
             "info",
-            f"{_names(client_id, asleep)} sleeps: its contacts are frozen and make no sound until it wakes",
+            f"{name_links(client_id, asleep)} sleeps: its contacts are frozen and make no sound until it wakes",
             "changeDynamics(activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)",
         )
     ]

@@ -50,6 +50,7 @@ DYNAMICS_IN_ORDER = (
     "frictionAnchor",
 )
 """changeDynamics' arguments as far as anybody gives them by place."""
+SETTERS = ("changeDynamics", "setPhysicsEngineParameter", "removeBody", "resetSimulation")
 BODY_KEYWORDS = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
 
 
@@ -175,9 +176,8 @@ class Hooks:
     def _setting_link(self, below: Callable[..., Any]) -> Callable[..., Any]:
         def setting(*args: Any, **kwargs: Any) -> Any:
             result = below(*args, **kwargs)
-            values = {**dict(zip(DYNAMICS_IN_ORDER, args, strict=False)), **kwargs}
-            body, link = int(values.pop("bodyUniqueId")), int(values.pop("linkIndex"))
-            self.set_values.set_link(body, link, without_client(values))
+            body, link, values = named_dynamics(args, kwargs)
+            self.set_values.set_link(body, link, values)
             for one in self.listening[:]:
                 one.world.mark_changed(body, link)
             return result
@@ -196,6 +196,12 @@ class Hooks:
             return result
 
         return setting
+
+
+def named_dynamics(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[int, int, dict[str, Any]]:
+    """Body, link and what is set of it, of changeDynamics' arguments."""
+    values = {**dict(zip(DYNAMICS_IN_ORDER, args, strict=False)), **kwargs}
+    return int(values.pop("bodyUniqueId")), int(values.pop("linkIndex")), without_client(values)
 
 
 def without_client(values: dict[str, Any]) -> dict[str, Any]:
@@ -241,3 +247,34 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
 
     with patch.object(pybullet, "stepSimulation", step), patch.object(BulletClient, "__getattr__", forward_step):
         yield
+
+
+@contextmanager
+def seen_settings() -> Iterator[dict[int, SetValues]]:
+    """What is set of engines and links within the block, by the client's number, whoever sets it."""
+    seen: dict[int, SetValues] = {}
+    forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in SETTERS}
+
+    def setter(name: str) -> Callable[..., Any]:
+        def setting(*args: Any, **kwargs: Any) -> Any:
+            result = real[name](*args, **kwargs)
+            known = seen.setdefault(int(kwargs.get("physicsClientId", 0)), SetValues())
+            if name == "resetSimulation":
+                known.forget()
+            elif name == "removeBody":
+                known.forget(body_argument(args, kwargs))
+            elif name == "changeDynamics":
+                known.set_link(*named_dynamics(args, kwargs))
+            else:
+                known.set_engine(without_client(kwargs))
+            return result
+
+        return setting
+
+    ours = {name: setter(name) for name in SETTERS}
+
+    def forward_setting(self: Any, name: str) -> Any:
+        return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
+
+    with patch.multiple(pybullet, **ours), patch.object(BulletClient, "__getattr__", forward_setting):
+        yield seen

@@ -4,7 +4,7 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,29 @@ from sonic_bullet.records.errors import AnimationError
 SLOWEST_FPS, FASTEST_FPS = 5.0, 10_000.0
 STILL_M, STILL_RAD = 1e-5, 1e-4
 """What moves less from its first pose all the time does not move: a hundredth of a millimetre."""
+
+
+UNIT = 0.1
+"""By how much the length of a quaternion may differ from 1: rounding, and keys that are blended linearly."""
+QUARTER_RAD = np.pi / 2
+"""A turn from frame to frame above which the frame rate hides how a body turns: between frames turns are known but for
+whole ones, and the next that fits, 2π less this one the other way, is no three times as fast."""
+
+
+def check_orientations(names: Sequence[str], turn: Array) -> None:
+    """Raise AnimationError, with body and frame, where a quaternion (t, b, 4) is no number or has not the length 1."""
+    if turn.ndim != 3 or turn.dtype.kind not in "fiu":
+        return  # the record's own check says so
+    length = np.linalg.norm(turn.astype(float), axis=2)
+    wrong = ~(np.abs(length - 1) <= UNIT)
+    if wrong.any():
+        frame, body = (int(i) for i in np.argwhere(wrong)[0])
+        found = length[frame, body]
+        what = "no number" if not np.isfinite(found) else "zero" if found == 0 else f"{found:.3g} long, not 1"
+        raise AnimationError(
+            f"the quaternion of {shown(names[body])} in frame {frame} (the first is 0) is {what}",
+            "export orientations as unit quaternions (x, y, z, w)",
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +63,7 @@ class Animation:
         fps = as_number(self.fps, "fps", remedy, least=SLOWEST_FPS, most=FASTEST_FPS, error=AnimationError)
         bodies = as_kinds(self.bodies, AnimatedBody, "bodies", "give AnimatedBody", error=AnimationError)
         place = frozen_array(self.position_m, float, (None, len(bodies), 3), "animation: position_m")
+        check_orientations([one.name for one in bodies], np.asarray(self.quaternion_xyzw))
         turn = np.array(
             frozen_array(self.quaternion_xyzw, float, (len(place), len(bodies), 4), "animation: quaternion")
         )
@@ -48,8 +72,6 @@ class Animation:
             raise AnimationError(
                 f"{len(bodies)} bodies in {len(place)} frames", "an animation needs a body and three frames"
             )
-        if (length < 1e-6).any():
-            raise AnimationError("an orientation of no length", "export quaternions (x, y, z, w)")
         turn /= length
         names = [one.name for one in bodies]
         twice = next((name for name in names if names.count(name) > 1), None)
@@ -75,6 +97,11 @@ class Animation:
     def free(self) -> Array:
         """(b,) who is moved by gravity and contacts alone."""
         return np.array([one.mass_kg > 0 and not one.driven for one in self.bodies], bool)
+
+    @property
+    def turn_rad(self) -> Array:
+        """(t - 1, b) angle by which each turns from frame to frame, whole turns left out."""
+        return np.asarray(np.linalg.norm(rotation(self.quaternion_xyzw[:-1], self.quaternion_xyzw[1:]), axis=-1))
 
     def poses(self) -> Array:
         """MOTION (t, b) of all frames, with the mean speeds since the frame before; in the first, those since a frame

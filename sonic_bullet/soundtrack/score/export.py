@@ -19,7 +19,7 @@ from sonic_bullet.listener.animated import AnimatedBody, matrices
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
-from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.animation import Animation, check_orientations
 
 ONE_SPOT_M = 1e-4
 RESTITUTION, FRICTION = 0.7, 0.7
@@ -79,6 +79,7 @@ def assembled(
     place = np.stack([one.position_m for one in export.objects], axis=1)
     turn = np.stack([one.quaternion_xyzw for one in export.objects], axis=1)
     names = [one.name for one in export.objects]
+    check_orientations(names, turn)
     blank = [AnimatedBody(name, (Shape("sphere"),), 0.0, np.zeros(3)) for name in names]
     moving = Animation(export.fps, tuple(blank), place, turn).moving  # checks them, too
     notes, bodies, materials, plain = list(export.notes), [], {}, []

@@ -10,7 +10,7 @@ import numpy as np
 
 from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.score.animation import Animation
+from sonic_bullet.soundtrack.score.animation import QUARTER_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import near_pairs, speeds
 
 STEADY = 0.1
@@ -131,3 +131,20 @@ def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = No
     enough = flies.sum(axis=0) >= LEAST_FRAMES
     share = (wrong & flies).sum(axis=0) / np.maximum(flies.sum(axis=0), 1)
     return np.asarray(found | (moving & enough & (share > HANDED)))
+
+
+def hidden_turns(animation: Animation) -> Array:
+    """(t - 1, b) who turns so fast from a frame to the next that its poses do not tell how."""
+    return np.asarray((animation.turn_rad > QUARTER_RAD) & animation.free)
+
+
+def unforced(animation: Animation, noise_m: float | None) -> Array:
+    """(t - 1, b) who turns by a hidden amount, and whose centre falls as if nobody touched it: at either end of the
+    interval the second difference of its places is gravity's to `STEADY` of it and to what noise hides.
+    """
+    fall_m_s = float(np.linalg.norm(animation.gravity_m_s2)) / animation.fps
+    least_m_s = STEADY * fall_m_s + (0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps))
+    off = (accelerations(animation) - animation.gravity_m_s2) / animation.fps
+    given = np.zeros(animation.position_m.shape[:2], bool)
+    given[1:-1] = np.linalg.norm(off, axis=2) > least_m_s
+    return np.asarray(hidden_turns(animation) & ~(given[:-1] | given[1:]))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files import check_sr
-from sonic_bullet.listener.animated import AnimatedBody
+from sonic_bullet.listener.animated import AnimatedBody, PoseStage
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, shown
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
@@ -26,7 +26,16 @@ from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, Rule, assembled
-from sonic_bullet.soundtrack.score.flight import FALL_RANGE, alone, driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
+from sonic_bullet.soundtrack.score.flight import (
+    FALL_RANGE,
+    alone,
+    driven_bodies,
+    fall_m_s2,
+    hidden_n_s,
+    hidden_turns,
+    pose_noise_m,
+    unforced,
+)
 from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
 ENDINGS = (".glb", ".gltf", ".json", ".npz")
@@ -105,10 +114,13 @@ def score_animation(
         try:
             hidden_m_s = 0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps)
             find_steps(animation, stage, steps, half, hidden_m_s=hidden_m_s)
+            steps = _forced(animation, stage, steps, unforced(animation, noise_m))
         except KeyboardInterrupt as error:  # those so far are played and kept
             stopped = error
         dt_s = 1 / animation.fps / substeps_of(animation.fps)
-        notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m) + _deep_notes(steps)
+        notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m)
+        hidden = hidden_turns(animation).any(axis=0)
+        notes += _turn_notes(animation, hidden) + _deep_notes(steps, stage, hidden)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
             listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=seed, microphone=microphones)
@@ -222,8 +234,44 @@ def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]
     )
 
 
-def _deep_notes(steps: Sequence[tuple[Array, Array]]) -> tuple[str, ...]:
-    deepest = -min((float(raw["gap_m"].min()) for _, raw in steps if len(raw)), default=0.0)
+def _forced(
+    animation: Animation, stage: PoseStage, steps: list[tuple[Array, Array]], alone: Array
+) -> list[tuple[Array, Array]]:
+    """The steps without what touches a body while it turns by nobody knows how much, and falls as if nobody did. alone
+    (t - 1, b).
+    """
+    each, made = substeps_of(animation.fps), []
+    for number, (motion, raw) in enumerate(steps):
+        mine, kept = alone[min(number // each, len(alone) - 1)], raw
+        if mine.any() and len(raw):
+            kept = raw[~(mine[stage.rows(raw["body_a"])] | mine[stage.rows(raw["body_b"])])]
+        made.append((motion, kept))
+    return made
+
+
+def _turn_notes(animation: Animation, hidden: Array) -> tuple[str, ...]:
+    """Whose turning the frame rate hides."""
+    said = []
+    for i in np.flatnonzero(hidden).tolist():
+        turn = animation.turn_rad[:, i]
+        k = int(turn.argmax())
+        slow, fast = turn[k] / (2 * np.pi) * animation.fps, (1 - turn[k] / (2 * np.pi)) * animation.fps
+        said.append(
+            f"{animation.fps:g} frames a second hide how {shown(animation.bodies[i].name)} turns: from frame {k} to "
+            f"{k + 1} it is {slow:.3g} turns a second one way, or {fast:.3g} the other, or more; of what touches it "
+            f"meanwhile only what changes the way of its centre is played. Bake at {4 * fast:.0f} frames a second or "
+            "more"
+        )
+    return tuple(said)
+
+
+def _deep_notes(steps: Sequence[tuple[Array, Array]], stage: PoseStage, hidden: Array) -> tuple[str, ...]:
+    """hidden (b,): whose turning is not known, and so not how deep it gets."""
+    deepest = 0.0
+    for _, raw in steps:
+        if len(raw):
+            known = ~(hidden[stage.rows(raw["body_a"])] | hidden[stage.rows(raw["body_b"])])
+            deepest = max(deepest, -float(raw["gap_m"][known].min(initial=0.0)))
     if deepest < DEEP_M:
         return ()
     return (f"bodies overlap by up to {deepest * 1e3:.0f} mm at frames: their meshes, or the scale, may be wrong",)

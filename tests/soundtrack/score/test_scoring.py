@@ -11,8 +11,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import assembled
 from sonic_bullet.soundtrack.score.scoring import score_animation
-from sonic_bullet.soundtrack.sound_events import IMPACT, EventWitness
-from sonic_bullet.soundtrack.stems import render_stems
+from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events
 from tests.made.animations import MASS_KG, ball_animation, bounce_m, dropped, export_of
 
 
@@ -62,9 +61,7 @@ def test_what_noise_hides_is_said() -> None:
 
 def impacts(log: ContactLog) -> list[tuple[float, float]]:
     """Time and impulse of each that is played."""
-    witness = EventWitness(log)
-    return [(x.start_s, x.impulse_n_s) for x in witness.events(render_stems(log, witness=witness), log.sr)
-            if x.kind == IMPACT and not x.reason]  # fmt: skip
+    return [(x.start_s, x.impulse_n_s) for x in find_sound_events(log) if x.kind == IMPACT and not x.reason]
 
 
 @pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])

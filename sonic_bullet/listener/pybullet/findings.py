@@ -1,0 +1,35 @@
+"""What is found of a world that would spoil its sound, and whose it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from sonic_bullet.listener.pybullet.body_facts import link_name
+from sonic_bullet.listener.pybullet.poses import read_roster
+
+Severity = Literal["error", "warning", "info"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """id: of the kind.
+
+    severity: "error" (no sound), "warning" (wrong sound), "info". what is so, and its remedy: one line each.
+    """
+
+    id: str
+    severity: Severity
+    what: str
+    remedy: str
+
+
+def all_links(client_id: int) -> list[tuple[int, int]]:
+    """Body and link of everything in a world, bases too."""
+    return [(body, link) for body, joints, _ in read_roster(client_id).bodies for link in range(-1, joints)]
+
+
+def name_links(client_id: int, links: list[tuple[int, int]]) -> str:
+    """The first of them in words, and how many more."""
+    first = f"body {links[0][0]} ({link_name(client_id, *links[0])})"
+    return first if len(links) == 1 else f"{first} and {len(links) - 1} more"
