@@ -36,7 +36,7 @@ from sonic_bullet.listener import (
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import render_kept, silence_notes
+from sonic_bullet.render import render_kept, render_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
 from sonic_bullet.session.scene_file import defines_build, scene_module, user_code, uses_sonic_bullet
@@ -239,7 +239,7 @@ class _Stage:
 
     def result(self, notes: tuple[str, ...]) -> RenderResult:
         listener = self.need_listener()
-        notes = (*notes, *listener.notes)
+        notes = (*notes, *listener.left_out)
         log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
         if (
             listener.sr == self.sr
@@ -249,11 +249,11 @@ class _Stage:
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
             sound = listener.kept_sound()
-            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
+            return RenderResult(sound, log, self.sr, (*notes, *render_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
         sound = render_kept(log)
         lifted = listener.lifted if log.supports else {}
-        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), lifted)
+        return RenderResult(sound, log, self.sr, (*notes, *render_notes(sound, log)), lifted)
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

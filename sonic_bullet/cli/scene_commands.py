@@ -224,7 +224,7 @@ def replayed(path: str, wish: Wish) -> _Replay:
     import numpy as np
 
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_kept, silence_notes
+    from sonic_bullet.render import render_kept, render_notes
 
     log = read_log(path)
     if wish.microphones:
@@ -248,7 +248,7 @@ def replayed(path: str, wish: Wish) -> _Replay:
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = _Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise
-    return _Replay(sound, log, rate, silence_notes(sound, log))
+    return _Replay(sound, log, rate, render_notes(sound, log))
 
 
 def _written(
