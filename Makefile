@@ -1,13 +1,21 @@
-# make demo    a virtual environment, then scenes/tabletop.py to out/: sound, contact log, picture
-# make test    a virtual environment with the tools, then style, types and tests
-# make bench   one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
-# make docs    the pages that are made of the code: API, commands, case.json and its schema, contact log
-# Python 3.11 is all that is needed: PyBullet has no wheel for a later one. PYTHON=/path/to/python3.11 names another.
+# make demo      a virtual environment, then scenes/tabletop.py to out/: sound, contact log, picture
+# make test      a virtual environment with the tools, then style, types and tests, ways of use first
+# make test-all  the same with the tests that take minutes (marked slow)
+# make bench     one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
+# make docs      the pages that are made of the code: API, commands, case.json and its schema, contact log
+# Python 3.11, 3.12 or 3.13 is all that is needed. PYTHON=python3.13 or a path names one.
 
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+LOOKED_FOR := python3.11 python3.12 python3.13 python3
+IS_SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+SAY_VERSION := import sys; print(f"{sys.version_info[0]}.{sys.version_info[1]}")
+# asked, not only looked up: a version manager's stand-in is on PATH and runs nothing
+PYTHON ?= $(shell for name in $(LOOKED_FOR); do "$$name" -c '$(IS_SUPPORTED)' 2>/dev/null && { echo $$name; break; }; done)
+ifneq ($(filter-out file default undefined,$(origin PYTHON)),)
+ASKED_FOR := $(PYTHON)
+endif
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip -qq --disable-pip-version-check --no-input install
 SCENE ?= scenes/tabletop.py
@@ -22,7 +30,7 @@ export NUMEXPR_NUM_THREADS := 1
 export PYTHONUNBUFFERED := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test check bench docs clean
+.PHONY: help demo test test-all check bench docs clean
 
 help:
 	@sed -n 's/^# \(make\)/\1/p' Makefile
@@ -32,6 +40,9 @@ demo: .venv/run.stamp
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
 
 test: check
+	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"
+
+test-all: check
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 check: .venv/dev.stamp
@@ -58,15 +69,17 @@ clean:
 	@$(PIP) --editable '.[dev]'
 	@touch $@ .venv/run.stamp
 
-# made anew where it is missing, broken, of another Python, or was made in another folder; else kept as it is
-SOUND := $(shell .venv/bin/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && \
+# made anew where it is missing, broken, of another Python than was asked for, or was made in another folder; else kept
+SOUND := $(shell [ -x .venv/bin/python ] && .venv/bin/python -c '$(IS_SUPPORTED)' 2>/dev/null && \
+	{ [ -z "$(ASKED_FOR)" ] || \
+	[ "$$(.venv/bin/python -c '$(SAY_VERSION)')" = "$$("$(ASKED_FOR)" -c '$(SAY_VERSION)' 2>/dev/null)" ]; } && \
 	{ [ ! -e .venv/python.stamp ] || [ "$$(cat .venv/python.stamp)" = "$(CURDIR)" ]; } && echo yes)
 ifneq ($(SOUND),yes)
 .PHONY: .venv/python.stamp
 endif
 .venv/python.stamp:
 ifneq ($(SOUND),yes)
-	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { echo "Python 3.11 not found (tried '$(PYTHON)'): install it, or make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
+	@"$(PYTHON)" -c '$(IS_SUPPORTED)' 2>/dev/null || { echo "no Python 3.11, 3.12 or 3.13 (looked for: $(or $(ASKED_FOR),$(LOOKED_FOR))): install one, or make PYTHON=/path/to/python3.13 ..." >&2; exit 1; }
 	@"$(PYTHON)" -m venv --clear .venv
 endif
 	@echo "$(CURDIR)" >$@

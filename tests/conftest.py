@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 REPO = Path(__file__).resolve().parents[1]
+JOURNEYS = REPO / "tests" / "journeys"
 
 
 def find_shared() -> Path | None:
@@ -37,6 +38,11 @@ def client() -> Iterator[Any]:
     made.setGravity(0, 0, -9.81)
     yield made
     disconnect(made)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the ways of use first: what a user meets is seen to be broken before anything else is."""
+    items.sort(key=lambda item: JOURNEYS not in item.path.parents)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -9,13 +9,12 @@ kind is kept, a warning and a note say so, and what was kept stays.
 from __future__ import annotations
 
 import warnings
-from functools import cache
-from importlib import metadata
 
 import numpy as np
 
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
 from sonic_bullet.files.rows.spool import SoundSpool
+from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
@@ -92,7 +91,6 @@ class KeptRun:
             warnings.warn(note, SceneWarning, stacklevel=4)
 
 
-@cache
 def package_versions() -> dict[str, str]:
     """Of the packages that a render's numbers hang on."""
-    return {name: metadata.version(name) for name in ("sonic_bullet", "numpy", "numba")}
+    return {name: find_version(name) for name in ("sonic_bullet", "numpy", "numba")}

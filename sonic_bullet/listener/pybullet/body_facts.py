@@ -16,8 +16,8 @@ from sonic_bullet.listener.memory import make_ready
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
-from sonic_bullet.listener.pybullet.questions import version
 from sonic_bullet.listener.world import World
+from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import LISTED, shown
@@ -280,4 +280,4 @@ class AskedLinks(World):
     @property
     def simulator(self) -> Simulator:
         """What PyBullet says of itself; without hooks, no more than it says when asked at the first step."""
-        return self.properties.simulator({"pybullet": version()})
+        return self.properties.simulator({"pybullet": find_version("pybullet")})

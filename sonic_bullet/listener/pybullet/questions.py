@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from importlib import metadata
 from typing import Any, NamedTuple
 
 import pybullet
@@ -45,12 +43,6 @@ def engine(client_id: int) -> Values:
     """All numbers that the engine says of itself, without gravity, which each step tells. Raises SceneError."""
     found = ask(client_id, pybullet.getPhysicsEngineParameters)
     return finite({name: x for name, x in found.items() if not name.startswith("gravity")})
-
-
-@cache
-def version() -> str:
-    """Of PyBullet."""
-    return metadata.version("pybullet")
 
 
 def contact_points(client_id: int) -> tuple[list[RawContact], Array]:
