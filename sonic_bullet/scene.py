@@ -40,7 +40,7 @@ from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import as_tail_db, render_kept, silence_notes
+from sonic_bullet.render import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
 from sonic_bullet.session.links_of_script import add_links
@@ -250,7 +250,7 @@ class _Stage:
 
     def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()
-        notes = (*notes, *listener.notes)
+        notes = (*notes, *listener.left_out)
         log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
         if (
             listener.sr == self.sr
@@ -260,11 +260,11 @@ class _Stage:
             and (self.residual or not any(b.material and b.material.residual for b in log.bodies))
         ):
             sound = listener.kept_sound(tail_db=tail_db)
-            return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), listener.lifted)
+            return RenderResult(sound, log, self.sr, (*notes, *render_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
         sound = render_kept(log, tail_db=tail_db)
         lifted = listener.lifted if log.supports else {}
-        return RenderResult(sound, log, self.sr, (*notes, *silence_notes(sound, log)), lifted)
+        return RenderResult(sound, log, self.sr, (*notes, *render_notes(sound, log)), lifted)
 
 
 def _stage(path: str | Path, **options: Any) -> _Stage:

@@ -242,7 +242,7 @@ def _kept() -> tuple[ModalModel, tuple[Any, Any], str, bytes]:
     import tempfile
 
     folder, model = Path(tempfile.mkdtemp()), box_model()
-    known = radiated.radiation_of.__wrapped__(model, Air(), folder)
+    known = radiated.radiation_and_note.__wrapped__(model, Air(), folder)[:2]
     entry = next(folder.iterdir())
     content = entry.read_bytes()
     shutil.rmtree(folder)
@@ -259,7 +259,7 @@ def _enter_cache(path: Path) -> None:
     model, known, name, _ = _kept()
     path.replace(path.with_name(name))
     try:
-        found = radiated.radiation_of.__wrapped__(model, Air(), path.parent)
+        found = radiated.radiation_and_note.__wrapped__(model, Air(), path.parent)[:2]
     finally:
         path.with_name(name).unlink(missing_ok=True)
     if any(one.tobytes() != other.tobytes() for one, other in zip(found, known, strict=True)):

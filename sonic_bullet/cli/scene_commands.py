@@ -242,7 +242,7 @@ def replayed(path: str, wish: Wish) -> Replay:
     import numpy as np
 
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_kept, silence_notes
+    from sonic_bullet.render import render_kept, render_notes
 
     log = read_log(path)
     if wish.microphones:
@@ -266,7 +266,7 @@ def replayed(path: str, wish: Wish) -> Replay:
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise
-    return Replay(sound, log, rate, silence_notes(sound, log))
+    return Replay(sound, log, rate, render_notes(sound, log))
 
 
 def _written(output: str, result: RenderResult | Replay, level: LevelWish, made: Soundtrack | None) -> AudioReport:

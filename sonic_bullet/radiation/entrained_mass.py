@@ -37,21 +37,35 @@ class Moved:
     vector: Array
 
 
-def moved_air(corner_m: Array) -> Moved:
+MOST_UNEVEN, MOST_NEGATIVE = 0.4, 0.01
+"""Of what is found: its antisymmetric part over the whole, and its least eigenvalue over its greatest. Good panels
+have 0.03 to 0.33, thin discs most, and -0.005 at least; those that cross, touch or lie twice 0.4 and more, or -0.04."""
+
+
+def moved_air(corner_m: Array) -> Moved | None:
     """Solve for triangles corner_m (f, 3, 3) of a closed surface, outward. Source: the module's equations.
 
-    Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity; discretised, nearly so.
+    Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity and positive, as the energy of
+    the air is; discretised, nearly so. Where it is not, triangles cross, touch or lie twice, and there is none.
     """
     twice = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     length = np.linalg.norm(twice, axis=1)
     normal = twice / length[:, None]
     area = length / 2
-    left, right = _matrices(
-        np.ascontiguousarray(corner_m, dtype=float), normal, float(np.sqrt(area.sum() / (4 * np.pi)))
-    )
     root = np.sqrt(area)
-    even = root[:, None] * np.linalg.solve(left, right) / root
-    value, vector = np.linalg.eigh((even + even.T) / 2)
+    try:
+        left, right = _matrices(
+            np.ascontiguousarray(corner_m, dtype=float), normal, float(np.sqrt(area.sum() / (4 * np.pi)))
+        )
+        found = root[:, None] * np.linalg.solve(left, right) / root
+        if not np.isfinite(found).all():
+            return None
+        value, vector = np.linalg.eigh((found + found.T) / 2)
+    except (ZeroDivisionError, np.linalg.LinAlgError):
+        return None
+    uneven = np.linalg.norm(found - found.T) > MOST_UNEVEN * np.linalg.norm(found)
+    if uneven or value[0] < -MOST_NEGATIVE * value[-1]:
+        return None
     return Moved(area, np.maximum(value, 1e-2 * root.min()), vector)
 
 

@@ -27,12 +27,14 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
 from sonic_bullet.radiation.entrained_mass import Moved, moved_air
 from sonic_bullet.records import Air, Array, ModalModel
 
-_MODES_AT_ONCE = 32
 MOST_PATCHES = 1800
-MOST_TRIANGLES = 700  # of the near field's mesh
+MOST_TRIANGLES = (700, 850, 1000, 1200, 1400)
+"""Of the near field's mesh, one after the other until one has a near field: both sides of a wall thinner than its
+triangles' chords stray would cross. The last takes 2 s of processor."""
 LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
 EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
 LOUDER = 16  # power of |p| by which directions count: half of a plate's modes are within 2° of the loudest one's phase
@@ -46,10 +48,15 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
     Pressure at distance r is Re(weight·z)/r, z the modal state of `bank`. Zero for a model without a surface. Source:
     the module's equations.
     """
+    return radiation_and_note(model, air)[:2]
+
+
+def radiation_and_note(model: ModalModel, air: Air) -> tuple[Array, Array, str]:
+    """As `radiation`, and `COMPACT` where no near field could be found and the compact law stands for it, else ""."""
     m = model.mode_count
-    corner, face = _sound_faces(model)
+    corner, face = sound_faces(model)
     if m == 0 or len(face) == 0:
-        return np.zeros(m, complex), np.zeros(m)
+        return np.zeros(m, complex), np.zeros(m), ""
     k = 2 * np.pi * model.freq_hz / air.sound_speed_m_s
     corner, turn = _principal(corner, (model.shape**2).sum(axis=(1, 2), dtype=float)[face].mean(axis=1))
     twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -57,11 +64,14 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
     normal = twice / (2 * area[:, None])
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
     patch, place = _patches(corner, area, normal, MOST_PATCHES)
-    coarse, nearest = _near_mesh(corner, area, normal)
-    moved = moved_air(coarse)
+    near = _near(corner, area, normal)
+    if near is None:
+        weight = compact_weight(model, face, area, normal @ turn, k, air)
+        return weight, _damping(weight, air), COMPACT
+    moved, nearest = near
     moment = np.zeros((m, 7, len(place)))
-    for lo in range(0, m, _MODES_AT_ONCE):
-        some = slice(lo, min(lo + _MODES_AT_ONCE, m))
+    for lo in range(0, m, MODES_AT_ONCE):
+        some = slice(lo, min(lo + MODES_AT_ONCE, m))
         speed = np.einsum("fi,fcim->fcm", normal @ turn, model.shape[:, :, some].astype(float)[face])
         level = _near_field(k[some], 1 / extent[1], moved, area[:, None] * speed.mean(axis=1), nearest)
         _moments(speed, level, corner, area, normal, patch, place, moment[some])
@@ -85,8 +95,11 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
         phase = _unit(np.sqrt((loud * left**2) @ every))
         sense = ((loud * left) @ (every * np.exp(both @ UNEVEN)) * phase.conj()).real
         weight[now] = np.sqrt(mean) * np.where(sense < 0, -phase, phase)
-    impedance = air.density_kg_m3 * air.sound_speed_m_s
-    return weight, 2 * np.pi * np.abs(weight) ** 2 / impedance
+    return weight, _damping(weight, air), ""
+
+
+def _damping(weight: Array, air: Air) -> Array:
+    return np.asarray(2 * np.pi * np.abs(weight) ** 2 / (air.density_kg_m3 * air.sound_speed_m_s))
 
 
 def _unit(number: Array) -> Array:
@@ -119,14 +132,6 @@ def spread_directions(count: int) -> tuple[Array, Array]:
     angle = np.pi * (np.sqrt(5) - 1) * np.arange(count)
     radius = np.sqrt(1 - height**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1), np.full(count, 0.5 / count)
-
-
-def _sound_faces(model: ModalModel) -> tuple[Array, Array]:
-    """Corners (f, 3, 3) and faces (f, 3) that have an area."""
-    corner = model.vertex_m[model.face]
-    twice = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=-1)
-    keep = twice > 1e-12 * twice.max(initial=0.0)
-    return corner[keep], model.face[keep]
 
 
 def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
@@ -172,11 +177,21 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
     return patch, np.stack([np.bincount(patch, area * centre[:, i]) / total for i in range(3)], axis=1)
 
 
-def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]:
-    """Triangles (c, 3, 3) for the near field, at most `MOST_TRIANGLES`, and of each face (f,) the one that stands for
-    it.
-    """
-    if len(corner) <= MOST_TRIANGLES:
+def _near(corner: Array, area: Array, normal: Array) -> tuple[Moved, Array] | None:
+    """Air moved by the body, and of each face (f,) the triangle of it that stands for it; None where none is found."""
+    tried = 0
+    for most in MOST_TRIANGLES:
+        coarse, nearest = _near_mesh(corner, area, normal, most)
+        moved = moved_air(coarse) if len(coarse) > tried else None
+        tried = max(tried, len(coarse))
+        if moved is not None:
+            return moved, nearest
+    return None
+
+
+def _near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
+    """Triangles (c, 3, 3) for the near field, at most ``most``, and of each face (f,) the one that stands for it."""
+    if len(corner) <= most:
         return corner, np.arange(len(corner))
     from scipy.spatial import cKDTree
 
@@ -186,7 +201,7 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
     outward = np.stack(
         [np.bincount(name.ravel(), np.repeat(area * normal[:, i], 3), len(point)) for i in range(3)], axis=1
     )
-    edge_m = np.sqrt(4 * area.sum() / MOST_TRIANGLES) / 1.5
+    edge_m = np.sqrt(4 * area.sum() / most) / 1.5
     while True:
         cell = _cells(point, outward, edge_m)
         size = np.bincount(cell)
@@ -208,7 +223,7 @@ def _near_mesh(corner: Array, area: Array, normal: Array) -> tuple[Array, Array]
         twice = np.cross(coarse[:, 1] - coarse[:, 0], coarse[:, 2] - coarse[:, 0])
         length = np.linalg.norm(twice, axis=1)
         kept = length > 1e-3 * edge_m**2
-        if kept.sum() <= MOST_TRIANGLES:
+        if kept.sum() <= most:
             break
         edge_m *= 1.1
     coarse, facing = coarse[kept], twice[kept] / length[kept, None]

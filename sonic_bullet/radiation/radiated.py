@@ -14,29 +14,35 @@ import numpy as np
 from sonic_bullet.files import cache as store
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.modal.keys import code_digest, key
+from sonic_bullet.radiation import compact
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
-from sonic_bullet.records.errors import ModalError
 
-SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass))
+SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass, compact))
 PACKAGES = ("numpy", "scipy", "numba")
-NO_SURFACE = (
-    "a body's surface crosses itself or has no extent: how it radiates cannot be said",
-    "build the model anew from a closed mesh",
-)
 LAYOUT = {name: store.Kept("f8", ("m",)) for name in ("real", "imag", "damping")}
 
 
-@WhileAlive
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
     """`radiation.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
 
     Bodies that share a model share it (models are compared by identity). cache: folder, "default" or None.
     """
+    return radiation_and_note(model, air, cache)[:2]
+
+
+def radiation_note(model: ModalModel, air: Air, cache: store.Place = "default") -> str:
+    """By which simpler law a model radiates, where it does, else ""."""
+    return radiation_and_note(model, air, cache)[2]
+
+
+@WhileAlive
+def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array, str]:
+    """`radiation.far_field.radiation_and_note` of a model, kept; as `radiation_of`."""
     m = model.mode_count
     if m == 0 or len(model.face) == 0:
-        return radiation.radiation(model, air)
+        return radiation.radiation_and_note(model, air)
     code = code_digest(SOURCES, PACKAGES)
     name = key(
         "radiation",
@@ -50,30 +56,16 @@ def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") ->
     )
     known = _recall(store.load(cache, name, LAYOUT), m)
     if known is None:
-        known = _solved(model, air)
-        store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, "")
+        known = radiation.radiation_and_note(model, air)
+        store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, known[2])
     return known
 
 
-def _solved(model: ModalModel, air: Air) -> tuple[Array, Array]:
-    """`radiation` of a surface that has one.
-
-    Raises ModalError where it has not: triangles that cross or meet themselves, or lie in one point.
-    """
-    try:
-        weight, damping = radiation.radiation(model, air)
-    except (ZeroDivisionError, np.linalg.LinAlgError) as error:
-        raise ModalError(*NO_SURFACE) from error
-    if not (np.isfinite(weight).all() and np.isfinite(damping).all()):
-        raise ModalError(*NO_SURFACE)
-    return weight, damping
-
-
-def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array] | None:
+def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array, str] | None:
     """What was kept, where it is of as many modes."""
     if found is None or len(found[0]["real"]) != m:
         return None
     a = found[0]
     weight = np.empty(m, complex)
     weight.real, weight.imag = a["real"], a["imag"]
-    return weight, np.array(a["damping"])
+    return weight, np.array(a["damping"]), found[1]

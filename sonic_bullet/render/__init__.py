@@ -23,7 +23,7 @@ from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import LogError, SonicBulletError
 from sonic_bullet.render.ringing_on import TAIL_DB, as_tail_db
-from sonic_bullet.render.silence import silence_notes, why_silent
+from sonic_bullet.render.silence import body_notes, render_notes, silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
 __all__ = [
@@ -31,11 +31,13 @@ __all__ = [
     "TAIL_DB",
     "Synthesizer",
     "as_tail_db",
+    "body_notes",
     "log_frames",
     "make_ready",
     "render_blocks",
     "render_kept",
     "render_log",
+    "render_notes",
     "silence_notes",
     "why_silent",
 ]

@@ -14,6 +14,8 @@ import numpy as np
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import as_sound
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.radiation.compact import COMPACT
+from sonic_bullet.radiation.radiated import radiation_note
 from sonic_bullet.records import Array, Body, Microphone, Vibrometer
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
@@ -26,7 +28,8 @@ SLIDES_M_S = 1e-3
 """Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
 (synth.strikes).
 """
-NAMED = 3
+NAMED, MANY = 3, 20
+UNTOUCHED = "touched by nobody, so silent"
 
 
 def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
@@ -52,6 +55,34 @@ def is_silent(samples: Array | KeptSound, log: ContactLog) -> bool:
     peaks = as_sound(samples).peaks()
     least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
     return not bool((peaks > least).any())
+
+
+def render_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
+    """What a user should read of a render: why it is silent, or which of its bodies are."""
+    return silence_notes(samples, log) or body_notes(log)
+
+
+def body_notes(log: ContactLog) -> tuple[str, ...]:
+    """What of the bodies that were added is not heard, or not as it might be, each kind in one note: who was touched by
+    nobody, who has no mode in the band, who radiates by a simpler law.
+    """
+    rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
+    touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
+    alone = [log.bodies[i] for i in added if i not in touched]
+    models = [(log.bodies[i], model) for i in added if (model := log.bodies[i].model) is not None and len(model.face)]
+    dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
+    notes = []
+    if alone and log.steps:
+        notes.append(f"{UNTOUCHED}: {_names(alone, MANY)}")
+    for still, said in ((False, "they click but do not ring"), (True, "they do not move either, so they are silent")):
+        mute = [body for body in dull if (body.mass_kg == 0) == still]
+        if mute:
+            notes.append(f"no mode below {min(20_000.0, log.sr / 2):g} Hz: {_names(mute, MANY)}; {said}")
+    if any(isinstance(sensor, Microphone) for sensor in log.sensors):
+        simple = [body for body, model in models if radiation_note(model, log.air)]
+        if simple:
+            notes.append(f"{COMPACT}: {_names(simple, MANY)}")
+    return tuple(notes)
 
 
 def why_silent(log: ContactLog) -> str | None:
@@ -162,8 +193,8 @@ def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     )
 
 
-def _names(bodies: Iterable[Body]) -> str:
+def _names(bodies: Iterable[Body], most: int = NAMED) -> str:
     names = [
         body.name if body.name == f"body {body.body_id}" else f"{body.name} (body {body.body_id})" for body in bodies
     ]
-    return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

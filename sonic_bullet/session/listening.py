@@ -27,17 +27,9 @@ from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.machine.terminal import status
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
-from sonic_bullet.records.coerce import (
-    as_call,
-    as_flag,
-    as_kind,
-    as_path,
-    as_whole,
-    check_options,
-    shown,
-)
+from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options, shown
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
-from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, make_ready
+from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
@@ -291,9 +283,12 @@ class Listener:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the world is left out of the sound, or of what is kept, and why; each was a `SceneWarning` when it
-        happened.
-        """
+        """`left_out`, and who was touched by nobody, has no mode in the band, or radiates by a simpler law."""
+        return (*self.left_out, *(body_notes(self.contacts) if self.world.logged else ()))
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What of the world is left out of the sound, or of what is kept, and why; each was a `SceneWarning`."""
         return (*self.world.notes, *self._kept.notes)
 
     @property

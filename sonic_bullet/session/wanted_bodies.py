@@ -136,7 +136,8 @@ def solved_bodies(
             for (name, _), model in zip(one.parts, mine, strict=True):
                 if air is not None and model.mode_count:
                     say(f"how {model.mode_count} modes of {name} radiate")
-                    radiation_of(model, air)
+                    with _naming(name, len(one.parts)):
+                        radiation_of(model, air)
             shared += mine
             models.append(mine)
     return models

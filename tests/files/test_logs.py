@@ -20,7 +20,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.models import as_json_text
 from sonic_bullet.records import Body, Material, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
-from sonic_bullet.records.errors import FileError, LogError, ModalError, SonicBulletError
+from sonic_bullet.records.errors import FileError, LogError, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.simulated import Change
@@ -99,21 +99,14 @@ def test_what_numpy_saves_is_read_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scale", "roll", "refused"),
-    [
-        ((1, 1, 1), 0, False),
-        ((1, 1, 1), -1, True),
-        ((0, 0, 0), 0, False),
-        ((1, 0, 0), 0, False),
-        ((1e-200,) * 3, 0, False),
-    ],
+    ("scale", "roll"),
+    [((1, 1, 1), 0), ((1, 1, 1), -1), ((0, 0, 0), 0), ((1, 0, 0), 0), ((1e-200,) * 3, 0)],
 )
-def test_degenerate_vertices_of_a_model_end_in_sound_or_in_our_own_error(
-    tmp_path: Path, scale: tuple[float, float, float], roll: int, refused: bool
+def test_degenerate_vertices_of_a_model_end_in_sound(
+    tmp_path: Path, scale: tuple[float, float, float], roll: int
 ) -> None:
-    """Triangles that meet themselves have no near field; a surface without area radiates nothing.
-
-    Once, the first ended in ZeroDivisionError.
+    """Triangles that meet themselves have no near field, and the compact law stands for it; a surface without area
+    radiates nothing.
     """
     from sonic_bullet.render import render_log
 
@@ -129,11 +122,7 @@ def test_degenerate_vertices_of_a_model_end_in_sound_or_in_our_own_error(
     step = Step(1 / 240, np.zeros((1, 3)), np.array([[0, 0, 0, 1.0]]), np.zeros(1, bool), Contacts.none())
     files.write_log(tmp_path / "a.npz", ContactLog((body,), (step,), (Microphone(np.array([0.0, -1, 0.5])),), 8000, 0))
     read = files.read_log(tmp_path / "a.npz")
-    if refused:
-        with pytest.raises(ModalError, match="surface crosses itself"):
-            render_log(read)
-    else:
-        assert np.isfinite(render_log(read)).all()
+    assert np.isfinite(render_log(read)).all()
 
 
 def test_a_log_of_the_second_format_reads_as_one_that_does_not_know() -> None:

@@ -54,7 +54,7 @@ def of_tensor(folder: Path) -> list[np.ndarray]:
 
 
 def of_radiation(folder: Path) -> list[np.ndarray]:
-    return list(radiated.radiation_of.__wrapped__(model(), Air(), folder))
+    return list(radiated.radiation_and_note.__wrapped__(model(), Air(), folder)[:2])
 
 
 def entries(path: Path) -> dict[str, bytes]:

@@ -19,7 +19,7 @@ MODEL = box_model((0.2, 0.1, 0.01), (740.0, 1230.0, 2950.0), STEEL)
 
 def again(cache: Path, model=MODEL, air: Air | None = None):  # type: ignore[no-untyped-def]
     """As a new process would ask."""
-    room.radiation_of.cache_clear()
+    room.radiation_and_note.cache_clear()
     return room.radiation_of(model, air or Air(), cache)
 
 

@@ -20,7 +20,7 @@ from sonic_bullet.listener.animated import AnimatedBody, PoseStage
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, shown
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import silence_notes
+from sonic_bullet.render import render_notes
 from sonic_bullet.scene import RenderResult, render_scene
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
@@ -175,7 +175,7 @@ def score_scene(
         if (body.body_id, body.link) in shapes
     }
     notes = (
-        *(note for note in result.notes if note not in silence_notes(result.sound, result.log)),
+        *(note for note in result.notes if note not in render_notes(result.sound, result.log)),
         *move_notes(result.log, moves),
     )
     log = result.log
@@ -189,12 +189,12 @@ def score_scene(
             kept = error.kept if hasattr(error, "kept") else render_kept(log)
             error.partial = RenderResult(kept, log, result.sr, notes)  # type: ignore[union-attr]
         raise
-    return RenderResult(sound, log, result.sr, (*notes, *silence_notes(sound, log)))
+    return RenderResult(sound, log, result.sr, (*notes, *render_notes(sound, log)))
 
 
 def _result(listener: Listener, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
     sound, log = listener.kept_sound(tail_db=tail_db), listener.contacts
-    return RenderResult(sound, log, listener.sr, (*notes, *listener.notes, *silence_notes(sound, log)))
+    return RenderResult(sound, log, listener.sr, (*notes, *listener.left_out, *render_notes(sound, log)))
 
 
 def _check_fall(animation: Animation, noise_m: float | None) -> tuple[str, ...]:

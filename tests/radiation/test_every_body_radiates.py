@@ -1,0 +1,98 @@
+"""What has modes radiates: no surface is refused, cavities do not sound, and what stands for a near field is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from sonic_bullet.modal import analyse
+from sonic_bullet.presets import load_material
+from sonic_bullet.radiation import compact, far_field, radiated
+from sonic_bullet.records import Air, ModalModel, Shape
+from tests.made.models import STEEL, box_model
+
+
+def tube(inner_m: float, outer_m: float, height_m: float, sides: int) -> Shape:
+    made = trimesh.creation.annulus(r_min=inner_m, r_max=outer_m, height=height_m, sections=sides)
+    return Shape("mesh", vertex_m=np.array(made.vertices), face=np.array(made.faces))
+
+
+TUBES = {
+    "as given": tube(0.025, 0.028, 0.12, 32),
+    "a millimetre thin": tube(0.025, 0.026, 0.12, 48),
+    "long": tube(0.01, 0.011, 0.3, 24),
+    "a ring of sheet": tube(0.058, 0.06, 0.02, 64),
+}
+
+
+@pytest.mark.parametrize("material", ["glass", "plastic", "wood", "steel"])
+@pytest.mark.parametrize("name", TUBES)
+def test_a_tube_radiates_in_every_material(name: str, material: str) -> None:
+    model = analyse((TUBES[name],), load_material(material), count=6)
+    weight, damping, note = far_field.radiation_and_note(model, Air())
+    assert np.isfinite(weight).all() and (np.abs(weight) > 0).all() and (damping > 0).all()
+    assert note in ("", compact.COMPACT)
+
+
+@pytest.mark.parametrize(("size", "degree"), [(0.05, 0), (0.05, 1), (0.2, 1)])
+def test_the_compact_law_is_the_spheres_own(size: float, degree: int) -> None:
+    """A breathing sphere and one that moves to and fro: what the law is made of, and so the near field's figures."""
+    ball = trimesh.creation.icosphere(3, size)
+    vertex, face = np.array(ball.vertices), np.array(ball.faces)
+    shape = (vertex / size if degree == 0 else np.tile([0.0, 0, 1], (len(vertex), 1)))[:, :, None]
+    freq = np.array([300.0])
+    model = ModalModel(freq, np.array([1.0]), shape, vertex, face, np.zeros(len(face)), 1e-3, 1.0)
+    found = far_field.radiation(model, Air())[0]
+    corner = vertex[face]
+    twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(twice, axis=1) / 2
+    k = 2 * np.pi * freq / Air().sound_speed_m_s
+    law = compact.compact_weight(model, face, area, twice / (2 * area[:, None]), k, Air())
+    assert np.abs(law) == pytest.approx(np.abs(found), rel=0.05)
+
+
+def nested(outer: trimesh.Trimesh, inner: trimesh.Trimesh, motion: np.ndarray) -> tuple[ModalModel, ModalModel]:
+    """A body with a cavity, and the same without it."""
+    made = []
+    for meshes in ((outer, inner), (outer,)):
+        vertex = np.concatenate([m.vertices for m in meshes])
+        face = np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)][: len(meshes)])
+        shape = (vertex @ motion)[:, :, None]
+        made.append(ModalModel(np.array([900.0]), np.array([1.0]), shape, vertex, face, np.zeros(len(face)), 1e-3, 1.0))
+    return made[0], made[1]
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner"),
+    [
+        (trimesh.creation.icosphere(2, 0.1), trimesh.creation.icosphere(2, 0.09)),
+        (trimesh.creation.box((0.2, 0.1, 0.05)).subdivide().subdivide(), trimesh.creation.box((0.18, 0.08, 0.03))),
+        (trimesh.creation.cylinder(0.05, 0.2), trimesh.creation.cylinder(0.045, 0.19)),
+    ],
+)
+def test_a_cavity_is_not_heard(outer: trimesh.Trimesh, inner: trimesh.Trimesh) -> None:
+    """Nested shells: the air inside is shut in, and its near field has no answer ("Singular matrix")."""
+    motion = np.diag([1.0, -1.0, 0.0])
+    both, alone = nested(outer, inner, motion)
+    for found, wanted in zip(far_field.radiation(both, Air()), far_field.radiation(alone, Air()), strict=True):
+        assert np.abs(found) == pytest.approx(np.abs(wanted), rel=1e-6)
+
+
+def test_faces_that_all_look_inward_sound_as_the_body_they_are() -> None:
+    model = box_model((0.2, 0.1, 0.01), (740.0, 1230.0, 2950.0), STEEL)
+    turned = replace(model, face=model.face[:, ::-1])
+    assert np.abs(far_field.radiation(turned, Air())[0]) == pytest.approx(np.abs(far_field.radiation(model, Air())[0]))
+
+
+def test_panels_that_lie_twice_fall_to_the_law_and_it_is_told(tmp_path: Path) -> None:
+    """A box all of whose faces lie twice: no near field, whatever its triangles."""
+    model = box_model((0.2, 0.1, 0.01), (740.0, 1230.0, 2950.0), STEEL)
+    twice = replace(model, face=np.concatenate([model.face, model.face]), curvature_per_m=np.zeros(2 * len(model.face)))
+    for _ in range(2):  # computed, and kept
+        radiated.radiation_and_note.cache_clear()
+        weight, damping, note = radiated.radiation_and_note(twice, Air(), tmp_path)
+        assert note == compact.COMPACT and np.isfinite(weight).all() and (damping > 0).all()
