@@ -22,9 +22,9 @@ from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files import replacing
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
 
