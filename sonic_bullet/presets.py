@@ -34,8 +34,8 @@ import numpy as np
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import MaterialError, RecordError

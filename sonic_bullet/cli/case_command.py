@@ -18,8 +18,8 @@ from sonic_bullet.cli.output import table, warn
 from sonic_bullet.files import read_audio, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.recordings import channel_of, channel_words
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.errors import FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})

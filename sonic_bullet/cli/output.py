@@ -117,7 +117,7 @@ def write_json(json_to: str | None, value: Any) -> None:
     """``value`` as strict JSON to a path, to stdout for "-", nowhere for None. Raises FileError."""
     if json_to is None:
         return
-    from sonic_bullet.files.json_text import json_bytes
+    from sonic_bullet.machine.json_text import json_bytes
 
     text = json_bytes(value, indent=2)
     if json_to == "-":

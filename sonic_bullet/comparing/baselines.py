@@ -30,9 +30,9 @@ from sonic_bullet.comparing.tolerance import (
     measure_sound,
 )
 from sonic_bullet.files import replacing
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
 

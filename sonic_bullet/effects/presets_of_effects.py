@@ -67,9 +67,14 @@ def check_effects(material: Material) -> None:
     """Raise MaterialError where a material has an effect that no scene plays, or what is none."""
     for number, effect in enumerate(material.effects):
         where = f"material '{material.name}': effects[{number}]"
-        if isinstance(effect, type) or not callable(getattr(effect, "apply", None)):
-            raise MaterialError(f"{where} is {shown(effect)}", "give effects of sonic_bullet.effects")
-        if getattr(effect, "stage", None) not in PLAYED:
+        remedy = "give effects of sonic_bullet.effects"
+        if isinstance(effect, type):  # the kind in place of one of them, which has a stage as well
+            raise MaterialError(f"{where} is {shown(effect)}", remedy)
+        try:
+            stage = effect.stage
+        except AttributeError:
+            raise MaterialError(f"{where} is {shown(effect)}", remedy) from None
+        if stage not in PLAYED:
             raise MaterialError(
                 f"{where}, {shown(effect)}, belongs to a strike or a recording, not to a body", "leave it out"
             )

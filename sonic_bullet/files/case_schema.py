@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from sonic_bullet.files.cases import FORMAT, _Raw
-from sonic_bullet.files.json_text import json_bytes
+from sonic_bullet.machine.json_text import json_bytes
 
 ABOUT: dict[str, tuple[str, dict[str, str]]] = {
     "Case": (

@@ -29,9 +29,9 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.atomic import replacing
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import read_at
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 

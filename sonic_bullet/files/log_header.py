@@ -12,8 +12,8 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.container import REMEDY, take
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.models import LoggedModel, as_json_text
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
 from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import LogError

@@ -24,8 +24,8 @@ import numpy as np
 from sonic_bullet.files import cache
 from sonic_bullet.files.atomic import cannot
 from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
-from sonic_bullet.files.json_text import json_bytes
 from sonic_bullet.files.reading import reading
+from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.kept_files import LIMIT, touch
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.coerce import nearest, shown
