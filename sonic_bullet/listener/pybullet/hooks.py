@@ -25,7 +25,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.properties import SetValues
-from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, remembering
+from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS, remembering
 from sonic_bullet.records.errors import SceneError
 
 POSE_SETTERS = (

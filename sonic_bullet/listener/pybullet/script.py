@@ -22,7 +22,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.pybullet.clients import disconnect as end
-from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, begin, remembering
+from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.errors import SceneError, SonicBulletError
 
