@@ -120,7 +120,7 @@ class OwnSound:
 
 def _spectrum(f_tau: Array, flat: int) -> Array:
     row = spectrum_table()[flat]
-    return np.interp(np.abs(f_tau), np.arange(len(row)) / SPECTRUM_CELLS_PER_F_TAU, row, right=0.0)
+    return np.asarray(np.interp(np.abs(f_tau), np.arange(len(row)) / SPECTRUM_CELLS_PER_F_TAU, row, right=0.0))
 
 
 def _free(pole: Array, amplitude: Array, frames: int) -> Array:

@@ -14,8 +14,8 @@ import pybullet
 from sonic_bullet.listener.frames import NO_NUMBER, Roster, decode, encode, link_words
 from sonic_bullet.listener.memory import make_ready
 from sonic_bullet.listener.properties import Properties
+from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces, described_pieces
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
-from sonic_bullet.listener.pybullet.pieces import collision_pieces, described_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.package_version import find_version

@@ -10,8 +10,8 @@ from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet import hooks
-from sonic_bullet.listener.pybullet.given_bodies import begin
-from sonic_bullet.listener.pybullet.pieces import collision_pieces
+from sonic_bullet.listener.pybullet.colliding.given_bodies import begin
+from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.quiet import quiet_stdout

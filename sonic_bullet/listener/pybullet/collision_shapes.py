@@ -19,11 +19,23 @@ import pybullet
 
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.listener.frames import link_words
-from sonic_bullet.listener.pybullet.filled_space import link_pose
-from sonic_bullet.listener.pybullet.given_bodies import SAME_M, SAME_SHARE, given_triangles, is_maximal, twin
-from sonic_bullet.listener.pybullet.pieces import UNKNOWN, Piece, collision_pieces, turn_matrix, visual_pieces
+from sonic_bullet.listener.pybullet.colliding.filled_space import link_pose
+from sonic_bullet.listener.pybullet.colliding.given_bodies import (
+    SAME_M,
+    SAME_SHARE,
+    given_triangles,
+    is_maximal,
+    reduced_body,
+)
+from sonic_bullet.listener.pybullet.colliding.pieces import (
+    UNKNOWN,
+    Piece,
+    collision_pieces,
+    hull_vertices,
+    turn_matrix,
+    visual_pieces,
+)
 from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, hull, joined, read_surfaces
-from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -36,7 +48,7 @@ def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
     The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself.
     """
     if is_maximal(client_id, body):
-        with twin(client_id, body) as other:
+        with reduced_body(client_id, body) as other:
             if other is not None:
                 return shapes_of(*other, -1)
     pieces = collision_pieces(client_id, body, link)
@@ -128,16 +140,6 @@ def _from_file(client_id: int, body: int, link: int, index: int, piece: Piece) -
     return outward((vertex * piece.size) @ turn_matrix(piece.quaternion).T + piece.position, face)
 
 
-def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
-    """Vertices (v, 3) of a convex collision piece in the body frame; none of a triangle mesh."""
-    with quiet_stdout():
-        try:
-            _, vertices = pybullet.getMeshData(body, link, index, physicsClientId=client_id)
-        except pybullet.error:
-            vertices = ()
-    return np.array(vertices, float).reshape(-1, 3)
-
-
 def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
     """Meshes whose file PyBullet forgot: cylinders by their vertices, else the visual mesh of the same extent, else
     hulls.
@@ -149,9 +151,9 @@ def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Arra
     found = tuple(cylinder for cylinder in cylinders if cylinder is not None)
     if not rest:
         return found
-    told = given_triangles(client_id, body) if link < 0 and not found and len(rest) == 1 and not len(rest[0]) else None
-    if told is not None and _takes_its_box(client_id, body, told[0]):
-        return (outward(*told),)
+    given = given_triangles(client_id, body) if link < 0 and not found and len(rest) == 1 and not len(rest[0]) else None
+    if given is not None and _takes_its_box(client_id, body, given[0]):
+        return (outward(*given),)
     visual = visual_surface(client_id, body, link)
     known = np.concatenate(rest)
     if visual is not None and len(known) and _same_space(visual[0], known):

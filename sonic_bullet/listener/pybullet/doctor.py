@@ -21,8 +21,8 @@ from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.listener.pybullet import collision_shapes
 from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
 from sonic_bullet.listener.pybullet.clients import client_id_of
+from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
-from sonic_bullet.listener.pybullet.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import read_motion, read_roster
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.restitution import endless_bounces, lost_restitution

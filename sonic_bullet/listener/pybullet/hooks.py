@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -25,7 +25,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener.properties import SetValues
-from sonic_bullet.listener.pybullet.given_bodies import ENDERS, MAKERS, remembering
+from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS, remembering
 from sonic_bullet.machine.worker import mark_step
 from sonic_bullet.records.errors import SceneError
 
@@ -276,5 +276,8 @@ def seen_settings() -> Iterator[dict[int, SetValues]]:
     def forward_setting(self: Any, name: str) -> Any:
         return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)
 
-    with patch.multiple(pybullet, **ours), patch.object(BulletClient, "__getattr__", forward_setting):
+    with ExitStack() as patches:
+        for name, function in ours.items():
+            patches.enter_context(patch.object(pybullet, name, function))
+        patches.enter_context(patch.object(BulletClient, "__getattr__", forward_setting))
         yield seen

@@ -119,7 +119,7 @@ def score_animation(
             stopped = error
         dt_s = 1 / animation.fps / substeps_of(animation.fps)
         notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m)
-        hidden = hidden_turns(animation).any(axis=0)
+        hidden = np.asarray(hidden_turns(animation).any(axis=0))
         notes += _turn_notes(animation, hidden) + _deep_notes(steps, stage, hidden)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)

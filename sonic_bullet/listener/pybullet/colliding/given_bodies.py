@@ -1,10 +1,10 @@
 """What bodies were made of, as the calls that made them said: PyBullet forgets it of bodies in maximal coordinates, of
 triangle meshes that were given by their vertices, and of where it looks for files.
 
-    createCollisionShape -> its arguments -> createMultiBody, loadURDF -> GivenBody -> a twin in reduced coordinates
+    createCollisionShape -> its arguments -> createMultiBody, loadURDF -> GivenBody -> made anew in reduced ones
 
-A twin is made by the same call in a world of its own, where PyBullet can be asked. Whoever uses what is remembered here
-holds it against the space that the body takes (`fills`): an id may have been given anew unseen.
+It is made anew by the same call in a world of its own, where PyBullet can be asked. Whoever uses what is remembered
+holds it against the box that the body takes: an id may have been given anew unseen.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MAKERS = {
 """Calls that say what a body is made of, and their arguments as far as they are given by place."""
 ENDERS = {"removeBody": ("bodyUniqueId",), "resetSimulation": ("flags",)}
 """Calls after which ids may be given anew."""
-OF_TWIN = {
+OF_SHAPE = {
     "createMultiBody": ("baseInertialFramePosition", "baseInertialFrameOrientation"),
     "loadURDF": ("fileName", "useFixedBase", "flags", "globalScaling"),
 }
@@ -126,19 +126,19 @@ def is_maximal(client_id: int, body: int) -> bool:
 
 
 @contextmanager
-def twin(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
+def reduced_body(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
     """Client and id of the same base in reduced coordinates, alone in a world.
 
     None where the call is not known, or what it makes does not take the box that the body takes.
     """
     given = given_body(client_id, body)
-    if given is None or given.call not in OF_TWIN or (given.call == "createMultiBody" and given.shape is None):
+    if given is None or given.call not in OF_SHAPE or (given.call == "createMultiBody" and given.shape is None):
         yield None
         return
     with quiet_stdout():
         alone = connect(DIRECT)
     try:
-        how = {name: given.arguments[name] for name in OF_TWIN[given.call] if name in given.arguments}
+        how = {name: given.arguments[name] for name in OF_SHAPE[given.call] if name in given.arguments}
         try:
             if given.call == "createMultiBody":
                 assert given.shape is not None

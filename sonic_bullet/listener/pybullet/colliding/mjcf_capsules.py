@@ -22,12 +22,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.pybullet.filled_space import fills
-from sonic_bullet.listener.pybullet.given_bodies import given_body, search_folders
+from sonic_bullet.listener.pybullet.colliding.filled_space import fills
+from sonic_bullet.listener.pybullet.colliding.given_bodies import given_body, search_folders
 from sonic_bullet.listener.quiet import quiet_stdout
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.pybullet.pieces import Piece
+    from sonic_bullet.listener.pybullet.colliding.pieces import Piece
 
 MARGIN_M = 0.04
 FINE = 0.2

@@ -1,7 +1,7 @@
 """The pieces a link's collision geometry is made of, as PyBullet describes them, placed in the body frame.
 
 getCollisionShapeData ends the process on capsules that an MJCF file gives by their ends: they are read from the file
-(mjcf_capsules). It has no answer for bodies in maximal coordinates: a twin of what was asked for is asked instead
+(mjcf_capsules). It has no answer for bodies in maximal coordinates: the same body in reduced ones is asked instead
 (given_bodies), else what is drawn stands in, where it fills the same space. Height fields are left out.
 """
 
@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.pybullet.filled_space import fills
-from sonic_bullet.listener.pybullet.given_bodies import is_maximal, twin
-from sonic_bullet.listener.pybullet.mjcf_capsules import must_not_be_asked, read_capsules
+from sonic_bullet.listener.pybullet.colliding.filled_space import fills
+from sonic_bullet.listener.pybullet.colliding.given_bodies import is_maximal, reduced_body
+from sonic_bullet.listener.pybullet.colliding.mjcf_capsules import must_not_be_asked, read_capsules
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array
 
@@ -74,14 +74,26 @@ def described_pieces(client_id: int, body: int, link: int) -> tuple[tuple[Piece,
 
 
 def _maximal_pieces(client_id: int, body: int) -> tuple[tuple[Piece, ...], bool]:
-    """Pieces of a body in maximal coordinates: its twin's, or those drawn where they fill the space that it takes."""
-    with twin(client_id, body) as other:
+    """Pieces of a body in maximal coordinates: of the same body in reduced ones, else drawn ones that fill its box."""
+    with reduced_body(client_id, body) as other:
         if other is not None:
             return collision_pieces(*other, -1), False
     drawn = tuple(piece for piece in visual_pieces(client_id, body, -1) if piece.kind in KINDS)
     if fills(client_id, body, -1, drawn):
         return drawn, True
+    if len(drawn) == 1 and drawn[0].kind == pybullet.GEOM_MESH and len(hull_vertices(client_id, body, -1, 0)):
+        return (drawn[0]._replace(file=""),), False  # getMeshData tells the hull that collides, whatever is drawn
     return NOBODY_KNOWS, False
+
+
+def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
+    """Vertices (v, 3) of a convex collision piece in the body frame; none of a triangle mesh."""
+    with quiet_stdout():
+        try:
+            _, vertices = pybullet.getMeshData(body, link, index, physicsClientId=client_id)
+        except pybullet.error:
+            vertices = ()
+    return np.array(vertices, float).reshape(-1, 3)
 
 
 def visual_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.pybullet.given_bodies import SAME_M, SAME_SHARE
+from sonic_bullet.listener.pybullet.colliding.given_bodies import SAME_M, SAME_SHARE
 from sonic_bullet.listener.pybullet.urdf_meshes import joined, read_surfaces
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 
 if TYPE_CHECKING:
-    from sonic_bullet.listener.pybullet.pieces import Piece
+    from sonic_bullet.listener.pybullet.colliding.pieces import Piece
 
 
 def link_pose(client_id: int, body: int, link: int) -> tuple[Array, Array]:
