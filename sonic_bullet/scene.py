@@ -285,21 +285,16 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     watch_settings(client)  # build sets friction and the like
     cast = user_code(stage.path, module.build, client)
     if not isinstance(cast, dict):
-        raise SceneError(
-            f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}",
-            "return a dictionary from bodies to materials",
-        )
+        what = f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}"
+        raise SceneError(what, "return a dictionary from bodies to materials")
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
     stage.listener = listener = stage.attached(client, places)
     stage.microphones = None
     user_code(stage.path, partial(listener.add_all, cast, progress=say))
     act = getattr(module, "act", None)
     stage.ready()
-    total = (
-        seconds
-        if seconds is not None
-        else as_seconds(getattr(module, "SECONDS", DEFAULT_SECONDS), f"SECONDS of scene '{stage.path.name}'")
-    )
+    own = getattr(module, "SECONDS", DEFAULT_SECONDS)
+    total = seconds if seconds is not None else as_seconds(own, f"SECONDS of scene '{stage.path.name}'")
     while listener.time_s < total - 1e-9:
         if act is not None:
             user_code(stage.path, act, client, listener.time_s)
@@ -311,7 +306,6 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
 
 def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     total = seconds if seconds is not None else DEFAULT_SECONDS
-    notes: tuple[str, ...] = ()
     if uses_sonic_bullet(stage.path):
         names: dict[str, Any] = {}
 
@@ -327,11 +321,9 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
         finally:  # where it breaks, what was heard so far is kept too
             stage.listener = _listener_in(names)
         if stage.listener is None:
-            raise SceneError(
-                f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name",
-                "write listener = sonic_bullet.attach(...)",
-            )
-        return notes
+            what = f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name"
+            raise SceneError(what, "write listener = sonic_bullet.attach(...)")
+        return ()
     material = stage.material or as_material(DEFAULT_MATERIAL)
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
     stage.microphones = None

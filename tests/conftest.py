@@ -29,6 +29,12 @@ def shared_path() -> Path:
     return place
 
 
+@pytest.fixture(autouse=True)
+def commands_run_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands called in a test's own process run there, where stubs are seen; processes that tests start supervise."""
+    monkeypatch.setattr("sonic_bullet.machine.supervisor.ASK_WHERE", None)
+
+
 @pytest.fixture
 def client() -> Iterator[Any]:
     """A PyBullet world of its own with gravity."""

@@ -253,13 +253,13 @@ def _summary(found: Any) -> str:
         table(("", "value", "spread"), rows),
         f"{paired} modes paired with {lines} observed lines",
     ]
-    told = [
+    cells = [
         (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
         for row in line_rows(found)
         if row["mode_hz"] is not None
     ]
-    if told:
-        text.append(table(("line Hz", "mode Hz", "decay 1/s", "T60 s", "loss factor", "Q"), told))
+    if cells:
+        text.append(table(("line Hz", "mode Hz", "decay 1/s", "T60 s", "loss factor", "Q"), cells))
     if len(correction):
         text.append(
             f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest "

@@ -37,7 +37,11 @@ def finite(value: float) -> float | None:
 
 def decay_cells(row: Row) -> tuple[str, str, str]:
     """T60, η and Q as a table shows them."""
-    return tuple("?" if row[name] is None else f"{row[name]:.3g}" for name in ("t60_s", "loss_factor", "q"))  # type: ignore[return-value]
+
+    def shown(name: str) -> str:
+        return "?" if row[name] is None else f"{row[name]:.3g}"
+
+    return shown("t60_s"), shown("loss_factor"), shown("q")
 
 
 def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> None:

@@ -70,7 +70,7 @@ def run_render(
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
     extras = SoundtrackWish(**others).checked(output)
     to, contacts, picture, json_to, events_to = _check_places(
-        output, contacts, picture, json_to, extras.events, level.beside(output)
+        output, contacts, picture, json_to, extras.events, level.json_path(output)
     )
     made: Soundtrack | None = None
     with clean_stdout(json_to) as say:
@@ -113,13 +113,13 @@ def run_render(
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name, seen)
         notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *level_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
-        told = level.say(to, report.gain_per_pa, report.peak_pa, result.log) if report.channels else {}
+        scale = level.say(to, report.gain_per_pa, report.peak_pa, result.log) if report.channels else {}
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     lifted = None if isinstance(result, Replay) else result.lifted
     write_json(
         json_to,
-        described_render(result.log, report, notes, lifted) | {"scale": told} | (made.described if made else {}),
+        described_render(result.log, report, notes, lifted) | {"scale": scale} | (made.described if made else {}),
     )
 
 

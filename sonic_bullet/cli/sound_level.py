@@ -74,7 +74,7 @@ class LevelWish:
         check_levels(self.peak_dbfs, self.lufs)
         as_tail_db(self.tail_db)
 
-    def beside(self, output: str) -> str | None:
+    def json_path(self, output: str) -> str | None:
         """Where the JSON goes, if it is asked for."""
         return f"{output}.json" if self.scale_json else None
 
@@ -103,9 +103,9 @@ class LevelWish:
         spl = 20 * math.log10(peak / REFERENCE_PRESSURE_PA) if unit == "Pa" and peak > 0 else None
         words = f"peak {spl:.0f} dB SPL" if spl is not None else f"peak {peak:.3g} {unit}"
         print(f"sonic-bullet: 0 dBFS = {1 / gain_per_pa:.3g} {unit} ({words})", file=sys.stderr)
-        told = {"full_scale": 1 / gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
-        write_json(self.beside(path), told)
-        return told
+        scale = {"full_scale": 1 / gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
+        write_json(self.json_path(path), scale)
+        return scale
 
 
 def level_warnings(report: AudioReport) -> tuple[str, ...]:

@@ -69,6 +69,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
     """What ``check`` gives, called where a scene may end its process."""
+    from sonic_bullet.machine.json_text import json_bytes
     from sonic_bullet.machine.supervisor import supervised
     from sonic_bullet.machine.worker import temporary_folder
     from sonic_bullet.records.errors import SonicBulletError
@@ -83,7 +84,7 @@ def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
                 found = str(error), ""
             except Exception as error:
                 found = f"{type(error).__name__}: {error}", ""
-            answer.write_text(json.dumps(found), encoding="utf-8")
+            answer.write_bytes(json_bytes(found))
             return 0
 
         ending = supervised(run, alone=False)

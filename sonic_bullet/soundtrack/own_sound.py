@@ -41,7 +41,7 @@ class OwnSound:
 
     def __init__(self, microphone: Microphone, sound_speed_m_s: float) -> None:
         self._place_m, self._speed_m_s = np.asarray(microphone.position_m, float), sound_speed_m_s
-        self._rubbing: dict[tuple[int, int], tuple[int, Array]] = {}  # step, and state, of a pair's side
+        self._friction: dict[tuple[int, int], tuple[int, Array]] = {}  # step, and state, of a pair's side
 
     def strike_pa(self, state: State, number: int, at: int, frames: int) -> Array:
         """(frames,) pressure from when pulse ``at`` of a step is first heard on, of both bodies. number: of the step
@@ -80,13 +80,13 @@ class OwnSound:
                 direction = 0.5 * (scratch.direction0[d] + scratch.direction1[d])
                 gain = np.append(gain, (1 - 2 * side) * float(direction @ voice.toward)) * voice.onset
                 key = (int(state.pairs.pair["key"][scratch.slot[d]]), int(state.body[b]))
-                last, z = self._rubbing.get(key, (number, np.zeros(0)))
+                last, z = self._friction.get(key, (number, np.zeros(0)))
                 if len(z) != len(gain) or number - last > SPAN:
                     z = np.zeros(len(gain), complex)
                 powers = voice.pole[:, None] ** np.arange(frames)
                 answer = (voice.weight * gain) @ powers
                 total += np.convolve(answer.real, force)[:frames] + ((voice.weight * voice.pole * z) @ powers).real
-                self._rubbing[key] = (
+                self._friction[key] = (
                     number,
                     voice.pole**frames * z + gain * (powers[:, ::-1] @ force),
                 )

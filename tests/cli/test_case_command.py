@@ -186,7 +186,7 @@ def test_a_failed_write_leaves_nothing(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(json, "dumps", full)
+    monkeypatch.setattr("sonic_bullet.cli.case_command.json_bytes", full)
     assert run("case", "new", "mine", "a.wav") == 2
     assert not (place / "mine").exists()
     assert "disk full" in capfd.readouterr().err

@@ -26,6 +26,7 @@ KEYS = {
     "verdict",
     "metric",
     "log_spectral_db",
+    "takes",
     "modes",
     "lines",
 }

@@ -85,7 +85,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         options["shadows"],
     )
     check_film_output(output, rate or DEFAULT_SR, max(len(options["microphones"]), 1), options["codec"])
-    to, json_to, _ = places(output, json_to, level.beside(output))
+    to, json_to, _ = places(output, json_to, level.json_path(output))
     standing: list[Standing] = []
 
     def at_end(listener: Listener) -> None:
@@ -131,11 +131,11 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 progress=progress,
             )
         say(_summary(output, report))
-        told = level.say(str(to), report.gain_per_pa, float(result.sound.peaks().max()), result.log)
+        scale = level.say(str(to), report.gain_per_pa, float(result.sound.peaks().max()), result.log)
         notes = (*result.notes, *report.notes, *_clipped(report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, _described(output, report, notes) | {"scale": told})
+    write_json(json_to, _described(output, report, notes) | {"scale": scale})
 
 
 def _summary(output: str, report: FilmReport) -> str:

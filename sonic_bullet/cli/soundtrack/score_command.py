@@ -63,7 +63,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
             f"{animation} is a scene, which says its materials, step and lengths itself",
             "leave out --materials, --fps and --scale",
         )
-    to, contacts_to, json_to, _ = places(output, contacts, json_to, level.beside(output))
+    to, contacts_to, json_to, _ = places(output, contacts, json_to, level.json_path(output))
     with clean_stdout(json_to) as say:
         with quiet_stderr():
             from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
@@ -89,7 +89,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
         scale = level.options(result.sound, result.log, str(to))
         report = replace(write_audio(str(to), result.sound, sr, **scale), path=output)
         say(summary(report, result.log))
-        told = level.say(str(to), report.gain_per_pa, report.peak_pa, result.log)
+        scale = level.say(str(to), report.gain_per_pa, report.peak_pa, result.log)
         for note in result.notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, described_render(result.log, report, result.notes) | {"scale": told})
+    write_json(json_to, described_render(result.log, report, result.notes) | {"scale": scale})
