@@ -208,13 +208,14 @@ for _ in range(240):
 
 
 @pytest.mark.parametrize("scene", [BUILT, PLAIN])
-def test_the_doctor_names_what_keeps_a_bar_from_resting(
-    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from sonic_bullet.cli import main
+def test_the_doctor_names_what_keeps_a_bar_from_resting(scene: str, tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    from sonic_bullet.cli import cli
 
     (tmp_path / "still.py").write_text(scene)
-    assert main(["doctor", str(tmp_path / "still.py"), "--seconds", "0.2"]) == 0
-    said = capsys.readouterr().out
+    done = CliRunner().invoke(cli, ["doctor", str(tmp_path / "still.py"), "--seconds", "0.2"])
+    assert done.exit_code == 0, done.output
+    said = done.output
     assert "restitution-threshold" in said
     assert "restitution-lost" not in said

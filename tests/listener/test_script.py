@@ -136,7 +136,10 @@ def test_errors_of_hooks_pass_and_exits_are_ends(script: Any) -> None:
 
     with pytest.raises(SceneError, match=r"^broken; mend$"):
         script(RAW, after=fail)
-    assert script("import sys\nx = 1\nsys.exit(0)\n")["x"] == 1
+    stepped = "import sys\nimport pybullet as p\np.connect(p.DIRECT)\np.stepSimulation()\nx = 1\nsys.exit(0)\n"
+    assert script(stepped)["x"] == 1
+    with pytest.raises(SceneError, match="line 2: SystemExit"):  # it has made no sound, and would not be missed
+        script("import sys\nsys.exit(0)\n")
 
 
 def test_missing_files_are_named() -> None:
