@@ -136,7 +136,8 @@ def test_errors_of_hooks_pass_and_exits_are_ends(script: Any) -> None:
 
     with pytest.raises(SceneError, match=r"^broken; mend$"):
         script(RAW, after=fail)
-    stepped = "import sys\nimport pybullet as p\np.connect(p.DIRECT)\np.stepSimulation()\nx = 1\nsys.exit(0)\n"
+    step = "c = p.connect(p.DIRECT)\np.stepSimulation(physicsClientId=c)\n"
+    stepped = f"import sys\nimport pybullet as p\n{step}x = 1\nsys.exit(0)\n"
     assert script(stepped)["x"] == 1
     with pytest.raises(SceneError, match="line 2: SystemExit"):  # it has made no sound, and would not be missed
         script("import sys\nsys.exit(0)\n")
