@@ -29,21 +29,6 @@ def test_shared_lines_to_their_spreads() -> None:
     assert 0.7 < np.concatenate(z).std() < 1.35
 
 
-@pytest.mark.parametrize(
-    ("beyond_hz", "band_hz"), [(10_050.0, (20, 10_000)), (10_012.0, (20, 10_000)), (480, (500, 9000))]
-)
-def test_what_rings_beyond_the_band_is_no_line_at_its_edge(beyond_hz: float, band_hz: tuple[float, float]) -> None:
-    """A pole driven to the edge is a bound; of a real bowl two such outranked all modes."""
-    rng, freq, decay = np.random.default_rng(6), np.array([1000.0, 3000.0, beyond_hz]), np.array([5.0, 20.0, 12.0])
-    amplitude = np.array([[0.1, 0.05, 1.0]]) + 0j
-    signals = np.array([damped_sum(freq, decay, a, 22_050, 22_050) for a in amplitude])
-    found = joint_lines(signals + 1e-4 * rng.standard_normal(signals.shape), 22_050, band_hz=band_hz)
-    for f in freq[:2]:
-        assert np.abs(found.freq_hz - f).min() < 0.01
-    gap = np.abs(found.freq_hz[:, None] - np.array(band_hz))
-    assert gap.min() > 1e-3
-
-
 def test_rayleigh_pair_is_exact_on_two_lines_and_unsaid_on_one() -> None:
     lam = np.array([1e7, 4e8])
     decay = (3.0 + 2e-7 * lam) / 2

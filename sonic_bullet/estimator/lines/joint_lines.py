@@ -27,7 +27,6 @@ __all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 
 SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_LINES = 160
-AT_EDGE = 1e-6  # of a frequency: what a step that was cut short leaves
 SECONDS_MAX = 8.0
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = (0.03, 0.1)
@@ -120,10 +119,7 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
         before = len(pole)
         pole = _polished(signals, noise, apart(pole) if turn else pole, sr, low, high)
         _, _, energy, _ = amplitudes_at(signals, noise, pole, sr)
-        freq = pole.imag / (2 * np.pi)
-        # one driven to the band's edge rings beyond it, or nowhere: a bound, no value
-        inside = (freq > low * (1 + AT_EDGE)) & (freq < high * (1 - AT_EDGE))
-        pole = pole[inside & (energy / colour(freq) > SIGNIFICANT)]
+        pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
         if (len(pole) == before and (turn or before < MOST_LINES)) or not len(pole):
             break
     return pole
