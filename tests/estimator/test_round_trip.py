@@ -86,7 +86,8 @@ def test_a_diagnosis_counts_radiation_once(tmp_path: Path) -> None:
 
     def kept(found: Any, *effects: Any) -> bool:
         after = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, 1.0, effects)
-        return total_damping(kept_preset(SimpleNamespace(found=found, closed=SimpleNamespace(after=after))))  # type: ignore[arg-type]
+        made = SimpleNamespace(found=found, closed=SimpleNamespace(after=after), verdict="explained")
+        return total_damping(kept_preset(made))  # type: ignore[arg-type]
 
     own = fitted_lines(tmp_path, sensor={"type": "microphone"})
     case = read_case(tmp_path)
