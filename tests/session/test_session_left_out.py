@@ -48,7 +48,7 @@ def test_the_others_sound_as_if_it_had_been_taken_away(tmp_path: Path) -> None:
         assert all(np.isfinite(getattr(one.contacts, name)).all() for one in log.steps for name in ROW_FIELDS)
         log.save(tmp_path / "log.npz")
         np.testing.assert_array_equal(sb.render_log(sb.read_log(str(tmp_path / "log.npz"))), observed[-1])
-        assert len(listener.notes) == (0 if taken_away else 1)
+        assert len(listener.left_out) == (0 if taken_away else 1)
         disconnect(client)
     assert np.abs(observed[0]).max() > 1e-3
     assert observed[0].shape == (2, 70 * 200)
@@ -120,4 +120,4 @@ def test_what_falls_on_cloth_overflows_nowhere(client: Any) -> None:
     assert touched > 10
     assert np.isfinite(sound).all()
     np.testing.assert_array_equal(sb.render_log(listener.contacts), sound)
-    assert len(listener.notes) == 1
+    assert len(listener.left_out) == 1

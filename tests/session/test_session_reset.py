@@ -152,7 +152,7 @@ def test_a_body_left_out_is_listened_to_again_where_its_numbers_came_back(client
     client.resetBaseVelocity(bars[0], [0, 0, 0], [0, 0, 0])
     listener.reset()
     steps(client, 2)
-    assert listener.notes == ()
+    assert listener.left_out == ()
     log = listener.contacts  # Bullet itself lets it collide no more
     assert [body.until_step for body in log.bodies if body.body_id == bars[0]] == [-1]
     assert 0 in log.steps[-1].body
