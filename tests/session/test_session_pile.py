@@ -181,8 +181,8 @@ def test_a_settled_pile_rings_out_with_nothing_but_decay(pile: Pile) -> None:
 
 
 def test_every_impact_is_a_pulse(pile: Pile) -> None:
-    """Each impact of the log is a pulse of the same pair within two steps, itself above 1 mN·s, but for bounces that the
-    step's length makes of who comes to rest: under 1 % of all impulse.
+    """Each impact of the log is a pulse of the same pair within two steps, itself above 1 mN·s, but for bounces that
+    the step's length makes of who comes to rest: under 1 % of all impulse.
     """
     wanted = impacts(pile.log)
     assert len(wanted) > 40
