@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -30,9 +31,15 @@ def shared_path() -> Path:
 
 
 @pytest.fixture(autouse=True)
-def commands_run_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Commands called in a test's own process run there, where stubs are seen; processes that tests start supervise."""
+def commands_run_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Commands called in a test's own process run there, where stubs are seen, and leave its signals as they were;
+    processes that tests start supervise.
+    """
     monkeypatch.setattr("sonic_bullet.machine.supervisor.ASK_WHERE", None)
+    before = {word: signal.getsignal(word) for word in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for word, handler in before.items():
+        signal.signal(word, handler)
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from sonic_bullet.diagnosis.diagnose import _finite
 from sonic_bullet.diagnosis.evidence.baseline import _soft, takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.recording_chain import LINKS, unchained
@@ -37,13 +36,6 @@ from tests.made.body import plate, recorded, struck
 from tests.made.problems import posed
 
 WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
-
-
-def test_what_is_no_number_is_null_in_json() -> None:
-    assert _finite({"a": [1.0, np.nan, {"b": np.float64(np.inf)}], "c": ("x", 2, None)}) == {
-        "a": [1.0, None, {"b": None}],
-        "c": ["x", 2, None],
-    }
 
 
 @dataclass(frozen=True)
