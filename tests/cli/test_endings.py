@@ -91,7 +91,7 @@ def test_a_script_that_ends_itself_after_its_steps_has_ended(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        (f"{HEAD}while True:\n    p.getKeyboardEvents()\n    time.sleep(0.01)\n", (5, 6)),
+        (f"{HEAD}while True:\n    p.getKeyboardEvents()\n    time.sleep(0.01)\n", (4, 6)),
         (f"{HEAD}{STEPS}while p.isConnected():\n    pass\n", (7, 8)),
         (f"{HEAD}while True:\n    try:\n        time.sleep(1)\n    except BaseException:\n        pass\n", (4, 8)),
         (f"{HEAD}threading.Event().wait()\n", (4, 4)),
