@@ -5,6 +5,7 @@ Exit 0: fitted; 1: a result that says no, as what is fitted is farther from the 
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -162,17 +163,7 @@ def described(found: Any) -> dict[str, Any]:
         "verdict": fit.verdict,
         "metric": fit.metric if fit.metric >= 0 else None,
         "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
-        "takes": [
-            {
-                "file": t.file,
-                "split": t.split,
-                "predicted_db": finite(t.predicted_db),
-                "silence_db": finite(t.silence_db),
-                "other_take_db": finite(t.other_take_db),
-                "free_gain": t.free_gain,
-            }
-            for t in found.takes
-        ],
+        "takes": [asdict(take) for take in found.takes],
         "modes": [
             {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
             for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)

@@ -41,14 +41,15 @@ def run_modes(
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
     with clean_stdout(json_to) as say:
+        from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.modal import read_mesh
-        from sonic_bullet.session.body_models import analyse_body, sounding_material
+        from sonic_bullet.session.body_models import analyse_body
 
         with status(mesh) as progress:
             shape = read_mesh(mesh, scale)
             model = analyse_body(
                 (shape,),
-                sounding_material(made),
+                with_material(made),
                 count=count,
                 fixed=fixed,
                 thickness_m=thickness_m,

@@ -28,6 +28,7 @@ from sonic_bullet.comparing.tolerance import (
     closeness,
     compared_words,
     measure_sound,
+    passes,
 )
 from sonic_bullet.files import replacing
 from sonic_bullet.files.reading import reading
@@ -83,15 +84,12 @@ class Checked:
     @property
     def passed(self) -> bool:
         """Whether it counts as the same."""
-        if self.same or (self.closeness is not None and self.closeness.within):
-            return True
-        return self.audible is not None and not self.audible.beyond_chance
+        return passes(self.same, self.closeness, self.audible)
 
     @property
     def compared(self) -> str:
         """What was looked at, in one line: bodies, events, seconds, tolerance."""
-        exact = self.same or self.closeness is None
-        return compared_words(self.side, None if exact or self.closeness is None else self.closeness.tolerance_db)
+        return compared_words(self.side, self.same, self.closeness)
 
 
 def baseline_place(scene: str | Path) -> Path:

@@ -71,17 +71,16 @@ class Comparison:
     @property
     def passed(self) -> bool:
         """Whether the two count as the same: samples equal, or within the tolerance or chance that was asked for."""
-        if self.same or (self.closeness is not None and self.closeness.within):
-            return True
-        return self.audible is not None and not self.audible.beyond_chance
+        from sonic_bullet.comparing.tolerance import passes
+
+        return passes(self.same, self.closeness, self.audible)
 
     @property
     def compared(self) -> str:
         """What was looked at, in one line: bodies, events, seconds, tolerance."""
         from sonic_bullet.comparing.tolerance import compared_words
 
-        exact = self.same or self.closeness is None
-        return compared_words(self.b, None if exact or self.closeness is None else self.closeness.tolerance_db)
+        return compared_words(self.b, self.same, self.closeness)
 
     @property
     def verdict(self) -> str:

@@ -18,6 +18,7 @@ from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import CompareError
 
 if TYPE_CHECKING:
+    from sonic_bullet.comparing.ensemble import Audibility
     from sonic_bullet.comparing.sides import Side
 
 RANGE_DB = 60.0
@@ -83,8 +84,14 @@ def found_closeness(a: Side, b: Side, tolerance_db: float) -> Closeness:
     return closeness(measure_sound(one, sr), measure_sound(other, sr), as_tolerance(tolerance_db))
 
 
-def compared_words(side: Side, tolerance_db: float | None) -> str:
-    """What a comparison that passes has looked at."""
+def passes(same: bool, within: Closeness | None, audible: Audibility | None) -> bool:
+    """Whether two sounds count as the same: equal samples, or within the tolerance or the chance that was asked for."""
+    return same or (within is not None and within.within) or (audible is not None and not audible.beyond_chance)
+
+
+def compared_words(side: Side, same: bool, within: Closeness | None) -> str:
+    """What was looked at, in one line: bodies, events, seconds, tolerance."""
+    tolerance_db = None if same or within is None else within.tolerance_db
     x = side.sound.samples()
     names: Sequence[str] = [] if side.log is None else [one.name for one in side.log.bodies if one.material is not None]
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""

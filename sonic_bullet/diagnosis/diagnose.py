@@ -117,7 +117,7 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
     said = [f"{len(one)} of split '{split}' could not be compared: {listing(one)}" for split, one in out.items()]
     if isinstance(end, NothingCompared):
         return said
-    if not any(r.position_m is not None for take in end.judged for r in take.body.recordings):
+    if all(t.body.family is None and all(r.position_m is None for r in t.body.recordings) for t in end.judged):
         said.append("no strike is placed: modes are the recorded lines, as loud as on average; give strike.position")
     if len(end.judged) == 1:
         said.append("one strike alone: nothing can be left out, so no effect can be named; record more strikes")

@@ -31,9 +31,8 @@ def preset_of(d: Diagnosis) -> Preset:
         method=f"{base.provenance.method}; effects by cross-validation on strikes left out",
         verdict=d.verdict,
     )
-    made = msgspec.structs.replace(
-        base, damping=damping, provenance=provenance, effects=tuple(stored(e) for e in after.effects if kept(e))
-    )
+    effects = (*(stored(e) for e in after.effects if kept(e)), *base.effects)  # recorded lines, in place of all modes
+    made = msgspec.structs.replace(base, damping=damping, provenance=provenance, effects=effects)
     for effect in after.effects:
         if effect.stage is Stage.MATERIAL:
             stiffness = effect.apply(material_of(base)).stiffness_pa

@@ -1,6 +1,7 @@
 """A material and shapes become a body's modes, with all that the material's effects say: the one way there is.
 
-Material -> sounding_material -> analyse_body: modes of the elasticity -> effects on modes -> effects as they ring
+Material -> with_material (effects on stiffness)
+    -> analyse_body: modes of the elasticity -> effects on modes -> effects as they ring
 """
 
 from __future__ import annotations
@@ -9,20 +10,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from sonic_bullet.effects.presets_of_effects import with_material, with_modes
+from sonic_bullet.effects.presets_of_effects import with_modes
 from sonic_bullet.records import Material, ModalModel, Shape
 from sonic_bullet.records.mode_shapes import rounded
 
 
-def sounding_material(material: Material) -> Material:
-    """Return the material with its effects on stiffness and density in it; those on modes come with `analyse_body`."""
-    return with_material(material)
-
-
 def analyse_body(shapes: Sequence[Shape], material: Material, **options: Any) -> ModalModel:
-    """Compute the modes of shapes of a `sounding_material`, and how they ring. options: of `modal.analyse`.
+    """Compute the modes of shapes, and how they ring.
 
-    Raises MeshError and ModalError, as `modal.analyse` does.
+    material: as `with_material` gives it. options: of `modal.analyse`. Raises MeshError and ModalError as that does.
     """
     from sonic_bullet import modal
 

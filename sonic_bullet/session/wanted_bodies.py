@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
@@ -31,7 +32,7 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
-from sonic_bullet.session.body_models import analyse_body, sounding_material
+from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import direction
 
 Say = Callable[[str], None]
@@ -73,7 +74,7 @@ def wanted_body(
     if roughness_m is not None:
         remedy = "give an rms height in m, zero or above"
         made = replace(made, roughness_m=as_number(roughness_m, "roughness_m", remedy, least=0))
-    made = sounding_material(made)
+    made = with_material(made)
     asked = ModalOptions(**options)
     if model is not None:
         as_kind(model, ModalModel, "model", "give a ModalModel, or leave it out", error=ModalError)

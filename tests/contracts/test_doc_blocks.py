@@ -61,7 +61,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def place(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("scenes", "assets"):
-        (tmp_path / name).symlink_to(REPO / name)
+        shutil.copytree(REPO / name, tmp_path / name)  # commands write beside scenes
     shutil.copytree(made, tmp_path / "my_case")
     for name, source in (("tap.wav", "s0.wav"), ("tap2.wav", "s1.wav"), ("bar.obj", "box.obj")):
         shutil.copy(made / source, tmp_path / name)

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 import soundfile
 from click.testing import CliRunner
 
 from sonic_bullet.cli import cli
+from sonic_bullet.diagnosis.selection import stepwise
+from sonic_bullet.estimator.fit.fitted_preset import recorded_lines
 from sonic_bullet.estimator.fit.held_out_takes import typical_strike
 from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.files.cases import read_case
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Material
+from tests.made.case import make
 
 SR = 24_000
 HZ = np.array([410.0, 1130.0, 2270.0, 3890.0])
@@ -83,19 +89,52 @@ def test_fit_says_how_near_each_take_is_and_its_preset_holds_the_lines(tmp_path:
         assert abs(lines["decay_per_s"][nearest] - decay) < 0.05 * decay
 
 
-def test_what_is_farther_than_silence_is_said_and_ends_with_one(tmp_path: Path) -> None:
-    """The held-out take is of another object: its lines stand where the fitted ones are not."""
-    folder = case_of(tmp_path, 0)
-    t = np.arange(SR) / SR
-    other = sum(np.exp(-4 * t) * np.cos(2 * np.pi * hz * t) for hz in (700.0, 1900.0))
-    rng = np.random.default_rng(5)
-    soundfile.write(folder / "other.wav", 1e-4 * (other + rng.standard_normal(SR)), SR, subtype="FLOAT")
+def test_what_is_over_in_a_few_cycles_is_no_line_of_a_preset(tmp_path: Path) -> None:
+    """Lines of an attack cancel each other with their phases, which a preset does not play."""
+    found = fit_case(read_case(case_of(tmp_path, 0)))
+    (e,) = found.evidence
+    size = np.full((3, 4), 50.0)
+    attack = lines_of(size)
+    attack = replace(attack, decay_per_s=np.array([9.0, 800.0, 900.0, 1000.0]))
+    kept = recorded_lines(replace(found, evidence=(replace(e, lines=attack),)))
+    assert kept is not None and kept.freq_hz == (HZ[0],)
+
+
+@pytest.fixture(scope="module")
+def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A case of a bar whose strikes have places and impulses."""
+    brass = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
+    folder = tmp_path_factory.mktemp("bar")
+    return make(folder, brass, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3).folder
+
+
+@pytest.mark.parametrize(("factor", "worse"), [(1.0, False), (3e3, True), (3e4, True)])
+def test_what_is_farther_than_silence_is_said_and_ends_with_one(
+    placed: Path, tmp_path: Path, factor: float, worse: bool
+) -> None:
+    """The impulse of the take held out is stated so many times too large: it is predicted as much too loud."""
+    folder = shutil.copytree(placed, tmp_path / "case")
     case = json.loads((folder / "case.json").read_text())
-    case["recordings"].append({"file": "other.wav", "split": "holdout"})
+    for entry in case["recordings"]:
+        if entry["split"] != "fit":
+            entry["strike"]["impulse"] *= factor
     (folder / "case.json").write_text(json.dumps(case))
     out = tmp_path / "p.json"
     done = CliRunner().invoke(cli, ["fit", str(folder), "-o", str(out)])
-    preset = json.loads(out.read_text())
-    near = "worse-than-silence" in preset["provenance"]["verdict"]
-    assert done.exit_code == (1 if near else 0), done.output
-    assert near == ("worse-than-silence" in done.output)
+    assert done.exit_code == (1 if worse else 0), done.output
+    verdict = json.loads(out.read_text())["provenance"]["verdict"]
+    assert verdict.startswith("worse-than-silence: ") == worse
+    assert ("worse-than-silence" in done.output) == worse
+
+
+def test_no_effect_is_sought_from_farther_than_silence(
+    placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A baseline that is 80 dB too loud, whatever fitted it."""
+    real = stepwise.refitted
+    monkeypatch.setattr(stepwise, "refitted", lambda base, bodies: replace(h := real(base, bodies), gain=1e4 * h.gain))
+    out = tmp_path / "d.json"
+    done = CliRunner().invoke(cli, ["diagnose", str(placed), "-o", str(out)])
+    assert done.exit_code == 1, done.output
+    assert "worse-than-silence" in done.output and "no effect was sought" in done.output
+    assert json.loads(out.read_text())["provenance"]["verdict"] == "worse-than-silence"

@@ -142,7 +142,7 @@ def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Call
     found = fit_evidence(case, recorded, total=True, progress=progress)
     bodies = (
         struck_bodies(found, cache=cache, progress=progress)
-        if found.objects and any(r.position_m is not None for g in recorded for r in g.recordings)
+        if found.objects and not all(_unplaced(one) for one in recorded)
         else tuple(shapeless(found, g) for g in recorded)
     )
     bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)
@@ -150,6 +150,11 @@ def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Call
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
     bodies = settled(refitted(base, bodies), bodies)
     return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
+
+
+def _unplaced(one: Recorded) -> bool:
+    """Whether an object was recorded, and nobody says where it was struck: its modes' levels are then unknown."""
+    return one.signals is not None and all(r.position_m is None for r in one.recordings)
 
 
 def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:

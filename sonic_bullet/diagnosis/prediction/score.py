@@ -191,7 +191,8 @@ class Take:
 
     def least(self, p: Prediction) -> float:
         """D of two noisy takes of what is predicted."""
-        return _stated(noise_floor_db(self.played(p), self.floor))
+        made = self.played(p)
+        return _stated(noise_floor_db(self._gain(made) * made, self.floor))
 
 
 def _stated(db: float) -> float:

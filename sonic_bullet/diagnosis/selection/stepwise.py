@@ -22,7 +22,16 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
-from sonic_bullet.diagnosis.prediction.score import Comparable, Incomparable, Judged, LeftOut, Score, Take, comparable
+from sonic_bullet.diagnosis.prediction.score import (
+    Comparable,
+    Incomparable,
+    Judged,
+    LeftOut,
+    Score,
+    Take,
+    comparable,
+    mean_db,
+)
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
@@ -106,7 +115,7 @@ def closed(
         return NothingCompared(start, found.left_out)
     recorded = [take for take in found.takes if isinstance(take, Take)]
     if recorded:
-        before = float(np.mean([take.distance(made[take.body]) for take in recorded]))
+        before = mean_db(Comparable(tuple(recorded)), made)
         silence = float(np.mean([take.apart_db(np.zeros(len(take.sample))) for take in recorded]))
         if before >= silence:
             return WorseThanSilence(start, found.left_out, before, silence)

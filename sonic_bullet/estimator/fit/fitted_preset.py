@@ -31,6 +31,12 @@ def spreads(found: CaseFit) -> dict[str, float | None]:
     return {name: float(s * v) if np.isfinite(s) else None for name, s, v in zip(NAMES, sd, value, strict=True)}
 
 
+FEWEST_CYCLES = 5.0
+"""Of a line in the time in which it falls to 1/e: what is over sooner is the attack, lines that cancel each other, and
+no mode. Without them takes held out of eight measured objects are predicted 0.1 dB worse at most; with 3, 0.2, with 10,
+1.5."""
+
+
 def recorded_lines(found: CaseFit) -> RecordedLines | None:
     """The lines of an object as they were struck on average, where no line is known to be a mode of a shape; None
     where the modes of a mesh say more, or where there is no line.
@@ -42,7 +48,8 @@ def recorded_lines(found: CaseFit) -> RecordedLines | None:
         return None
     typical = typical_strike(lines)
     size = np.abs(typical.amplitude)
-    keep = np.flatnonzero((np.nan_to_num(lines.decay_per_s) > 0) & (size > 0))
+    decay = np.nan_to_num(lines.decay_per_s)
+    keep = np.flatnonzero((decay > 0) & (lines.freq_hz >= FEWEST_CYCLES * decay) & (size > 0))
     keep = keep[np.argsort(-(size[keep] ** 2 / lines.decay_per_s[keep]), kind="stable")[:MOST_LINES]]
     keep = keep[np.argsort(lines.freq_hz[keep], kind="stable")]
     if not len(keep):
@@ -76,7 +83,6 @@ def preset_of(found: CaseFit) -> Preset:
     lines = recorded_lines(found)
     if lines is not None:
         assumed = (*assumed, "level (that of the body that plays the lines: the recordings' gain is not known)")
-        total = True
     source = f"fitted: {found.case.name}"
     taken = f"taken from '{base.name}'"
     used = {o.evidence.thing.name: o for o in found.objects}
