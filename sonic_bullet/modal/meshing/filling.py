@@ -9,6 +9,7 @@ one that is not closed, or that Netgen still refuses: it passes through itself  
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -19,10 +20,13 @@ from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, curved_sizes, dof_budg
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
 from sonic_bullet.modal.meshing.surfaces import Skin
-from sonic_bullet.modal.meshing.tetrahedra import EndlessError, tetrahedra
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError, TooLargeError, tetrahedra
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
+Way = Literal["any", "netgen", "simple", "lattice"]
+"""How what no rule fits is filled: by Netgen or what stands for it, by Netgen or not at all, its detail left out, by
+the lattice."""
 LATTICE = "lattice"  # how the note of a solid filled by one begins
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
@@ -54,9 +58,9 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, lattice: bool = False) -> Solid:
-    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. lattice: Netgen has refused it
-    before. Raises MeshError.
+def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, way: Way = "any") -> Solid:
+    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. way: the lattice where Netgen has
+    refused the surface before. Raises MeshError.
     """
     made = by_rule(skin, edge_m)
     if made is not None:
@@ -65,20 +69,25 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, latt
     volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
     tets = dof_budget(thickness, diagonal) / DOF_PER_TET
     edge = edge_m or edge_within_m(volume, thickness, tets)
-    if lattice or not geometry.is_closed(skin.face):
-        return _of_lattice(skin, edge_m, volume, tets, say, "as before" if lattice else "its surface is open")
+    if way == "lattice" or not geometry.is_closed(skin.face):
+        why = "as before" if way == "lattice" else "its surface is open"
+        return _of_lattice(skin, edge_m, volume, tets, say, why)
     whole, simple = skin, simplified(skin, SIMPLER * edge)
-    attempts = [(whole, edge)] if not _slivers(whole, edge) else []
+    attempts = [] if way == "simple" or _slivers(whole, edge) else [(whole, edge)]
     refused: MeshError | None = None
     for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
         try:
             return _by_netgen(skin, tried, size, say)
-        except EndlessError as error:
+        except EndlessError:
+            raise
+        except TooLargeError as error:
             refused = error
             break
         except MeshError as error:
             refused = error
     assert refused is not None
+    if way != "any":
+        raise refused
     return _of_lattice(skin, edge_m, volume, tets, say, refused.what)
 
 

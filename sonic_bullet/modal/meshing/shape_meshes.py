@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.meshing.filling import filled
+from sonic_bullet.modal.meshing.filling import Way, filled
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
@@ -52,9 +52,9 @@ def fill(
     thickness_m: float | None,
     say: Callable[[str], None],
     *,
-    lattice: bool = False,
+    way: Way = "any",
 ) -> Filled:
-    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. lattice: as `filled`.
+    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. way: as `filled`.
 
     Raises MeshError.
     """
@@ -68,7 +68,7 @@ def fill(
     else:
         skin_given = prepared(*soup(shapes), thickness_m)
         vertex, face = skin_given.vertex_m, skin_given.face
-        made = filled(_united(skin_given), edge_m, say, lattice=lattice)
+        made = filled(_united(skin_given), edge_m, say, way=way)
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
