@@ -6,6 +6,7 @@ mesh, wall, shortest wave, count of modes -> edge -> filled -> larger, less deta
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
