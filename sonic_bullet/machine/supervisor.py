@@ -1,7 +1,7 @@
 """Somebody who waits for a command and outlives it: a process that does nothing else.
 
     supervisor ── fork ─► worker: runs the command, its scene, PyBullet, Netgen, compilers
-        ◄── lines: scene, left, closing, done (`worker`) ; Python lines of a crash (faulthandler)
+        ◄── lines: scene, left, closing, done (`worker`), stage (`progress`) ; Python lines of a crash (faulthandler)
         ──► SIGINT, SIGTERM passed on; SIGKILL to what does not end
 
 A scene may end its process without a word, crash in C, or never step; a long call of C hears no signal. The worker says
@@ -30,7 +30,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from sonic_bullet.machine import worker
+from sonic_bullet.machine import progress, worker
 from sonic_bullet.machine.worker import ASK_WHERE, END_IDLE, STOPS, catch_stops, connect, escaped, scene_line, tell
 from sonic_bullet.records.errors import SceneError
 
@@ -78,6 +78,7 @@ class _Worker:
     trace: str = ""
     unread: bytes = b""
     status: int | None = None
+    lines: progress.ProgressLines | None = None
 
     def listen(self, wait_s: float) -> None:
         """Read what it says, for at most that long."""
@@ -91,7 +92,11 @@ class _Worker:
                 self._take(*line.decode("utf-8", "surrogateescape").partition(" ")[::2])
 
     def _take(self, kind: str, text: str) -> None:
-        if kind == "scene":
+        if kind == "stage" and self.lines is not None:
+            self.lines.take(text)
+        elif kind == "stage":
+            progress.forward(text)
+        elif kind == "scene":
             self.scene = text
         elif kind == "left":
             self.left = [*(one for one in self.left if os.path.lexists(one)), text]
@@ -144,6 +149,9 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
         _work(run, (said[1], traces[1]), clock, alone, here)
     _close(said[1], traces[1])
     child = _Worker(process, said[0], traces[0], clock)
+    if alone and progress.is_shown() and not progress.on_terminal():
+        command = " ".join(sys.argv[1:2])
+        child.lines = progress.ProgressLines(command, time.monotonic(), progress.COMMAND_QUIET_S)
     stops: list[int] = []
     if alone:
         for word in STOPS:
@@ -154,6 +162,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
         return _wait(child, stops)
     finally:
         child.kill()
+        progress.clear_stage(child.process)
         _clean_up(child, tied, before)
         _close(child.said, child.traces)
         if not alone:
@@ -205,6 +214,8 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
     while child.code is None and not child.has_ended():
         child.listen(POLL_S)
         now = time.monotonic()
+        if child.lines is not None and not stops and child.code is None and (line := child.lines.due(now)):
+            progress.write_line(line)
         if len(stops) > sent:
             if sent and now - stopped_at > 0.2:  # asked twice
                 break

@@ -4,7 +4,7 @@ A message is one line of a pipe, written at once, so that lines of several proce
 
     scene PATH     whose code is run from here on          left PATH    to be removed where this process is killed
     exit  STACK    somebody calls os._exit                 closing      what was made so far is being written
-    done  CODE     the command has come to its end
+    done  CODE     the command has come to its end           stage …     what is being done (`progress`)
 
 The time of the last physics step stands in memory that both processes have.
 """
@@ -23,6 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
+
+from sonic_bullet.machine.progress import open_sink
 
 LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
 ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)
@@ -53,6 +55,7 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
 
     _LINE.fd, _LINE.clock, _LINE.process = fd, clock, os.getpid()
     catch_stops()
+    open_sink(fd)
     faulthandler.enable(traces, all_threads=False)
     faulthandler.register(ASK_WHERE, traces, all_threads=False)  # type: ignore[arg-type]
     signal.signal(END_IDLE, at_idle)  # type: ignore[arg-type]

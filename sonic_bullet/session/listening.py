@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -25,7 +24,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
-from sonic_bullet.machine.terminal import status
+from sonic_bullet.machine.progress import given_or_status
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options, shown
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
@@ -172,7 +171,7 @@ class Listener:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
         wanted = checked(self.world, wanted)
-        with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
+        with given_or_status(progress, "sonic_bullet") as say:
             models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
         for one in wanted:  # all of them first: a number is given to who has no name of its own
