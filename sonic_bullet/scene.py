@@ -36,6 +36,7 @@ from sonic_bullet.listener import (
     seen_settings,
     watch_settings,
 )  # fmt: skip
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
@@ -70,6 +71,7 @@ class RenderResult:
         return self.sound.samples()
 
 
+@says_so(text="say", fraction="progress")
 def render_scene(
     path: str | Path,
     *,

@@ -16,7 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.machine.progress import is_shown, on_terminal, shown_by, status
+from sonic_bullet.machine.progress import is_shown, on_terminal, percent, shown_by, status
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable
     """
     if not (is_shown() and on_terminal()):
         with status(label) as say:
-            yield _percent(say), say
+            yield percent(say), say
         return
     from rich.console import Console
     from rich.markup import escape
@@ -164,19 +164,6 @@ def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable
         task = progress.add_task(label, total=1.0)
         with shown_by(lambda text: progress.update(task, description=escape(f"{label}: {text}"))) as say:
             yield (lambda share: progress.update(task, description=label, completed=share)), say
-
-
-def _percent(say: Callable[[str], None]) -> Callable[[float], None]:
-    """Says a share where it is another percent than before: it is told every physics step."""
-    before = -1
-
-    def progress(share: float) -> None:
-        nonlocal before
-        if int(100 * share) != before:
-            before = int(100 * share)
-            say(f"{before} %")
-
-    return progress
 
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

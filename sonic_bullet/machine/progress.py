@@ -19,8 +19,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import wraps
+from typing import ParamSpec, TypeVar
 
 Say = Callable[[str], None]
+P = ParamSpec("P")
+Made = TypeVar("Made")
 
 EVERY_S = 4.0
 """Between lines of one stage: below the 5 s after which a user takes a program for dead, with room for a busy machine.
@@ -30,6 +34,7 @@ LEAST_S = 1.0
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 """A command, a call from Python that takes less says nothing."""
 LONGEST = 300  # characters of a line
+NO_PRINT = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 DETAIL = re.compile(r": |\d+ ?%")
 """Where what a stage is ends and how far it is begins."""
 
@@ -82,7 +87,7 @@ class ProgressLines:
     def due(self, now_s: float) -> str:
         """The line to be written now; "": none."""
         stages = tuple(DETAIL.split(text)[0] for _, text in self._said.values())
-        pause_s = EVERY_S if stages == self._stages else LEAST_S
+        pause_s = LEAST_S if stages and stages != self._stages else EVERY_S
         if now_s - self.begin_s < self.quiet_s or now_s - self._last_s < pause_s:
             return ""
         self._last_s, self._stages = now_s, stages
@@ -130,22 +135,52 @@ def status(label: str) -> Iterator[Say]:
                 clear_stage()
 
 
-@contextmanager
-def given_or_status(given: Say | None, label: str) -> Iterator[Say]:
-    """The function that a caller gave, or `status`."""
-    if given is not None:
-        yield given
-    else:
-        with status(label) as say:
-            yield say
+def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made]], Callable[P, Made]]:
+    """Give a function, where its caller gives neither, arguments of these names that `status` shows: a function of
+    what is being done and one of the fraction done.
+    """
+
+    def decorated(function: Callable[P, Made]) -> Callable[P, Made]:
+        @wraps(function)
+        def called(*args: P.args, **options: P.kwargs) -> Made:
+            names = [name for name in (text, fraction) if name]
+            if any(options.get(name) is not None for name in names):
+                return function(*args, **options)
+            with status("sonic_bullet") as say:
+                options.update({name: say if name == text else percent(say) for name in names})
+                return function(*args, **options)
+
+        return called
+
+    return decorated
+
+
+def percent(say: Say) -> Callable[[float], None]:
+    """A function of the fraction done; it says another percent than before: it is called every physics step."""
+    before = -1
+
+    def progress(fraction: float) -> None:
+        nonlocal before
+        if int(100 * fraction) != before:
+            before = int(100 * fraction)
+            say(f"{before} %")
+
+    return progress
 
 
 @contextmanager
 def show_stage(text: str) -> Iterator[None]:
-    """Say what is done while this lasts, wherever `status` writes."""
+    """Say what is done while this lasts, beside what is being done already; a terminal's line stays as it is."""
     with status("sonic_bullet") as say:
-        say(text)
-        yield
+        before = _SINK.last[1]
+        if not isinstance(say, PipeSay) or text in before:
+            yield
+            return
+        say(f"{before}: {text}" if before else text)
+        try:
+            yield
+        finally:
+            say(before)
 
 
 def is_shown() -> bool:
@@ -198,7 +233,7 @@ def write_line(line: str) -> None:
 
 
 def _send(process: int, label: str, text: str) -> None:
-    label, text = (" ".join(part.split())[:LONGEST] for part in (label, text))
+    label, text = (NO_PRINT.sub("?", " ".join(part.split()))[:LONGEST] for part in (label, text))
     _write(f"stage {process}\t{label}\t{text}\n")
 
 
