@@ -65,7 +65,8 @@ class PipeSay:
 
 @dataclass(slots=True)
 class ProgressLines:
-    """Which of what is said becomes a line, and when. command: stands before all."""
+    """Which of what is said becomes a line, and when. command: heads them; "": there are none
+    before a stage is said."""
 
     command: str
     begin_s: float
@@ -88,6 +89,8 @@ class ProgressLines:
         """The line to be written now; "": none."""
         stages = tuple(DETAIL.split(text)[0] for _, text in self._said.values())
         pause_s = LEAST_S if stages and stages != self._stages else EVERY_S
+        if not (self.command or self._said):
+            return ""
         if now_s - self.begin_s < self.quiet_s or now_s - self._last_s < pause_s:
             return ""
         self._last_s, self._stages = now_s, stages

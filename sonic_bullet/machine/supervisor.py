@@ -128,11 +128,11 @@ class _Worker:
         return self.trace
 
 
-def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
+def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "") -> Ending:
     """Call ``run`` in a process of its own and wait for its end, which is an exit code.
 
     alone: this process is the command's: interrupts are passed on, and the worker ends as an interpreter does; else the
-    caller goes on, and what interrupts it ends the worker.
+    caller goes on, and what interrupts it ends the worker. command: heads lines of progress; "": nothing is said before a stage is.
     """
     if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
         if alone:
@@ -150,7 +150,6 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
     _close(said[1], traces[1])
     child = _Worker(process, said[0], traces[0], clock)
     if alone and progress.is_shown() and not progress.on_terminal():
-        command = " ".join(sys.argv[1:2])
         child.lines = progress.ProgressLines(command, time.monotonic(), progress.COMMAND_QUIET_S)
     stops: list[int] = []
     if alone:

@@ -143,7 +143,7 @@ class Listener:
         relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
         progress: called now and then with which link's modes or radiation are computed and how far that is; without
-        one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        one, stderr shows it where it lasts over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
         SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {

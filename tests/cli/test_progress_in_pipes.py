@@ -189,7 +189,7 @@ def test_nobody_stays_behind_a_script_that_is_ended(tmp_path: Path, word: signal
 def test_what_is_quick_says_nothing(tmp_path: Path, words: list[str]) -> None:
     late_s = start_s()
     run = heard(tmp_path, [*COMMAND, *words])
-    assert not run.progress or late_s > 0, run.text
+    assert not run.progress or (late_s > 0 and words[0] == "features"), run.text
 
 
 # ---- when a line is due, by a clock of its own
