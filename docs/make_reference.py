@@ -198,10 +198,8 @@ def commands_page() -> str:
         "130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes "
         "JSON to stdout.",
         "",
-        "What is being done stands on stderr: on a terminal as one line, elsewhere as lines such as "
-        "`[12 s] render drop.py: modes of bowl: …`,",
-        "the first after a second, then one where another stage begins and every 4 s at least. "
-        "`SONIC_BULLET_PROGRESS=0` silences it.",
+        "What is being done stands on stderr. A terminal shows one line of it. Elsewhere there is a line a stage, and",
+        "every 4 s at least, such as `[12 s] render drop.py: modes of bowl: …`. `SONIC_BULLET_PROGRESS=0` silences it.",
     ]
     for path, command in walked("sonic-bullet", cli):
         context = click.Context(command, info_name=path, terminal_width=WIDTH, max_content_width=WIDTH)

@@ -132,7 +132,8 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
     """Call ``run`` in a process of its own and wait for its end, which is an exit code.
 
     alone: this process is the command's: interrupts are passed on, and the worker ends as an interpreter does; else the
-    caller goes on, and what interrupts it ends the worker. command: heads lines of progress; "": nothing is said before a stage is.
+    caller goes on, and what interrupts it ends the worker.
+    command: heads lines of progress; "": there are none before a stage is said.
     """
     if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
         if alone:

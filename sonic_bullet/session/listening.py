@@ -142,8 +142,8 @@ class Listener:
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
         relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
-        progress: called now and then with which link's modes or radiation are computed and how far that is; without
-        one, stderr shows it where it lasts over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        progress: called with which link's modes or radiation are computed and how far that is; without one, stderr
+        shows what takes over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
         SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
