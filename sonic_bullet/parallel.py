@@ -24,6 +24,7 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any, TypeVar
 
 from sonic_bullet.machine.progress import PipeSay, clear_stage, waiting_for
+from sonic_bullet.machine.worker import end_with
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -143,6 +144,7 @@ def _sent(ours: Connection, what: Any) -> bool:
 def _make_asked(make: Callable[[int], Any], room: Any, ours: Connection, theirs: Connection, parent: int) -> None:
     """The other process of `arrays_in_order`: makes what it is asked for; what it cannot make ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with(parent)
     ours.close()
     with suppress(Exception):
         while os.getppid() == parent:
@@ -236,6 +238,7 @@ def _help(
 ) -> None:
     """The other process: results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
+    end_with(parent)
     ours.close()
     _OUT.set(theirs)
     with suppress(OSError):  # nobody listens any more

@@ -31,7 +31,18 @@ from types import FrameType
 from typing import Any
 
 from sonic_bullet.machine import progress, worker
-from sonic_bullet.machine.worker import ASK_WHERE, END_IDLE, STOPS, catch_stops, connect, escaped, scene_line, tell
+from sonic_bullet.machine.worker import (
+    ASK_WHERE,
+    END_IDLE,
+    STOPS,
+    catch_stops,
+    connect,
+    end_with,
+    escaped,
+    process_control,
+    scene_line,
+    tell,
+)
 from sonic_bullet.records.errors import SceneError
 
 IDLE_S = 10.0
@@ -51,7 +62,7 @@ STAND_INS = f"{PACKAGE}/listener/pybullet/"
 LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
 _FORKS_EARLY_ONLY = sys.platform != "linux"
 """Where libraries forbid a fork once they are there (macOS)."""
-SUBREAPER, DEATH_SIGNAL = 36, 1  # prctl(2)
+SUBREAPER = 36  # prctl(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +153,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
     said, traces, clock = os.pipe(), os.pipe(), mmap.mmap(-1, 8)
     sys.stdout.flush(), sys.stderr.flush()
     signal.pthread_sigmask(signal.SIG_BLOCK, STOPS)  # neither process misses one between fork and handler
-    tied, before = _prctl(SUBREAPER, 1), set() if alone else set(_children())
+    tied, before = process_control(SUBREAPER, 1), set() if alone else set(_children())
     here = os.getpid()
     process = os.fork()
     if not process:
@@ -166,15 +177,13 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
         _clean_up(child, tied, before)
         _close(child.said, child.traces)
         if not alone:
-            _prctl(SUBREAPER, 0)
+            process_control(SUBREAPER, 0)
 
 
 def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool, parent: int) -> None:
     """The worker, which does not return."""
     leave = os._exit
-    _prctl(DEATH_SIGNAL, signal.SIGKILL)
-    if os.getppid() != parent:
-        leave(1)
+    end_with(parent)
     connect(*fds, clock, _end_idle)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
     code = 2
@@ -337,12 +346,3 @@ def _children() -> list[int]:
             parent = place.read_text(errors="replace").rpartition(")")[2].split()[1]
             found += [int(place.parent.name)] * (int(parent) == os.getpid())
     return found
-
-
-def _prctl(option: int, value: int) -> bool:
-    """Linux: whether it was done."""
-    if sys.platform != "linux":
-        return False
-    import ctypes
-
-    return bool(ctypes.CDLL(None).prctl(option, value, 0, 0, 0) == 0)

@@ -29,6 +29,7 @@ from sonic_bullet.machine.progress import open_sink
 LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
 ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)
 STOPS = {signal.SIGINT: "stopped", signal.SIGTERM: "terminated"}
+DEATH_SIGNAL = 1  # prctl(2)
 Handler = Callable[[int, FrameType | None], Any]
 
 
@@ -152,3 +153,19 @@ def temporary_folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder:
         note_leftover(folder)
         yield Path(folder)
+
+
+def end_with(parent: int) -> None:
+    """Have this process, a fork, end with the one that it was forked from (Linux), or now where that one is gone."""
+    process_control(DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def process_control(option: int, value: int) -> bool:
+    """Linux: whether it was done."""
+    if sys.platform != "linux":
+        return False
+    import ctypes
+
+    return bool(ctypes.CDLL(None).prctl(option, value, 0, 0, 0) == 0)
