@@ -231,13 +231,13 @@ class AnimatedStage:
         at most a step earlier, `after` (b,) in place; whether there was such an impact. fresh (b, b): whose to look at.
         """
         early_s = np.zeros(len(self.ids))
-        gravity = float(np.linalg.norm(self.gravity_m_s2)) * dt_s
+        falls = 2 * float(np.linalg.norm(self.gravity_m_s2)) * dt_s
         for one in points if fresh.any() else ():
             a, b = self.row_of[one[1]], self.row_of[one[2]]
             if not (fresh[a, b] and one[9] > 0 and one[8] < 0):
                 continue
             speed = -_point_speed(before[a], one[5]) @ one[7] + _point_speed(before[b], one[6]) @ one[7]
-            if speed > gravity:  # what rests is no impact
+            if speed > falls:  # what rests falls for a step at each pose
                 early_s[[a, b]] = np.maximum(early_s[[a, b]], min(-one[8] / speed, dt_s))
         for row in np.flatnonzero((early_s > 0) & ~self.held).tolist():
             out = after[row]
