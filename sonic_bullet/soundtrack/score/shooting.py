@@ -85,7 +85,7 @@ class Shooting:
                 owed = np.where(np.any(before.touching, axis=1, keepdims=True), 0.0, missing)
             before = shot = self._shot(k, best.speed, best.restitution, polled=True).shot
             last = shot.motion[-1]
-            self._start = self._followed(last, self._motion[k + 1], shot.touching.any(axis=1))
+            self._start = self._followed(last, self._motion[k + 1], np.asarray(shot.touching.any(axis=1)))
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
             self._trust_m_s = self._speed_m_s
             if progress is not None:

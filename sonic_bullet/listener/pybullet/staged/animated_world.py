@@ -6,8 +6,7 @@ and at 240 Hz Bullet's own correction (0.2 of the depth a step) would throw them
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,7 @@ from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.questions import Settings, contact_points
-from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
-from sonic_bullet.machine.worker import temporary_folder
+from sonic_bullet.listener.pybullet.staged.collision_shapes import collision_options, compound
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
@@ -70,12 +68,12 @@ class AnimatedStage:
 
     def _made(self, body: AnimatedBody) -> int:
         ask, cid = pybullet, self.client_id
-        made_of = [options for shape in body.shapes for options in _collision(shape, body)]
+        made_of = [options for shape in body.shapes for options in collision_options(shape, body)]
         if len(made_of) > 1 and any("indices" in options for options in made_of):
             raise AnimationError(
                 f"body '{body.name}': one of its meshes has too many faces", "make it a body of its own"
             )
-        shape = _compound(made_of, cid)
+        shape = compound(made_of, cid)
         if shape < 0:
             raise AnimationError(f"body '{body.name}': PyBullet makes no collision shape of it", "simplify its mesh")
         made = int(ask.createMultiBody(body.mass_kg, shape, physicsClientId=cid))
@@ -278,60 +276,6 @@ def _point_speed(motion: Array, point_m: Any) -> Array:
     return np.asarray(motion["velocity_m_s"] + np.cross(motion["spin_rad_s"], point_m - motion["position_m"]))
 
 
-def _compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
-    """A collision shape of one or several; several meshes go through files, of which PyBullet makes hulls."""
-    if len(shapes) == 1:
-        return int(pybullet.createCollisionShape(**shapes[0], physicsClientId=client_id))
-    with temporary_folder() as folder:
-        names = [str(Path(folder, f"{number}.obj")) for number in range(len(shapes))]
-        for name, shape in zip(names, shapes, strict=True):
-            if "vertices" in shape:
-                Path(name).write_text(_wavefront(np.array(shape["vertices"])), "ascii")
-        made = pybullet.createCollisionShapeArray(
-            shapeTypes=[one["shapeType"] for one in shapes],
-            radii=[one.get("radius", 0.0) for one in shapes],
-            halfExtents=[one.get("halfExtents", [0, 0, 0]) for one in shapes],
-            lengths=[one.get("height", 0.0) for one in shapes],
-            fileNames=[name if "vertices" in one else "" for name, one in zip(names, shapes, strict=True)],
-            meshScales=[[1, 1, 1]] * len(shapes),
-            collisionFramePositions=[one["collisionFramePosition"] for one in shapes],
-            collisionFrameOrientations=[one["collisionFrameOrientation"] for one in shapes],
-            physicsClientId=client_id,
-        )
-    return int(made)
-
-
-def _wavefront(vertex: Array) -> str:
-    """A hull's corners as a mesh file; which faces they have does not matter to who takes their hull."""
-    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertex.tolist()]
-    return "\n".join([*corners, *(f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertex) - 1))]) + "\n"
-
-
-def _collision(shape: Shape, body: AnimatedBody) -> Iterator[dict[str, Any]]:
-    """What createCollisionShapeArray wants of a shape; of a mesh its convex pieces."""
-    placed = {
-        "collisionFramePosition": shape.position_m.tolist(),
-        "collisionFrameOrientation": shape.quaternion_xyzw.tolist(),
-    }
-    size = shape.size_m.tolist()
-    if shape.kind == "sphere":
-        yield {"shapeType": pybullet.GEOM_SPHERE, "radius": size[0], **placed}
-    elif shape.kind == "box":
-        yield {"shapeType": pybullet.GEOM_BOX, "halfExtents": [x / 2 for x in size], **placed}
-    elif shape.kind in ("capsule", "cylinder"):
-        kind = pybullet.GEOM_CAPSULE if shape.kind == "capsule" else pybullet.GEOM_CYLINDER
-        yield {"shapeType": kind, "radius": size[0], "height": size[1], **placed}
-    elif shape.kind == "plane":
-        yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
-    else:
-        found = pieces(shape, body.name, body.mass_kg > 0)
-        for corner in found:
-            yield {"shapeType": pybullet.GEOM_MESH, "vertices": corner.tolist(), **placed}
-        if not found:
-            bare = {"vertices": shape.vertex_m.tolist(), "indices": shape.face.ravel().tolist()}
-            yield {"shapeType": pybullet.GEOM_MESH, **bare, **placed}
-
-
 def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) -> Array:
     row = np.zeros(1, RAW)
     row["body_a"], row["body_b"], row["link_a"], row["link_b"] = a, b, -1, -1
@@ -389,6 +333,7 @@ class AnimatedWorld(PyBulletWorld):
         self._at += 1
         now = Motion(self._past.roster, rows)
         self._memory.poll(raw, stepped=True)
+        self._memory.touches = None  # nobody sleeps: what rests to the bit carries its weight
         step = self._usual(now, True) or self._unusual(now, True, None)
         self._past = now
         self.step_count += 1
