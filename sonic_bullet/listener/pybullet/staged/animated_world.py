@@ -18,7 +18,7 @@ from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.questions import Settings, contact_points
-from sonic_bullet.listener.pybullet.staged.collision_shapes import collision_options, compound
+from sonic_bullet.listener.pybullet.staged.body_shapes import collision_options, compound
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
@@ -262,10 +262,10 @@ class AnimatedStage:
         late = raw[fresh[rows] & (raw["force_n"] > 0)].copy()
         for one in late:  # in the step's own terms: its length, and the pose at its start
             a, b = self.row_of[int(one["body_a"])], self.row_of[int(one["body_b"])]
-            way = [dt_s * _point_speed(before[i], one[p]) for i, p in ((a, "point_a_m"), (b, "point_b_m"))]
-            one["point_a_m"] -= way[0]
-            one["point_b_m"] -= way[1]
-            one["gap_m"] -= (way[0] - way[1]) @ one["normal"]
+            travel_m = [dt_s * _point_speed(before[i], one[p]) for i, p in ((a, "point_a_m"), (b, "point_b_m"))]
+            one["point_a_m"] -= travel_m[0]
+            one["point_b_m"] -= travel_m[1]
+            one["gap_m"] -= (travel_m[0] - travel_m[1]) @ one["normal"]
             for force in ("force_n", "friction_1_n", "friction_2_n"):
                 one[force] *= MOMENT_S / dt_s
         return late, fresh
