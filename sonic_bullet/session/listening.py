@@ -13,6 +13,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from itertools import chain, islice
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -33,6 +34,7 @@ from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, body_not
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
+from sonic_bullet.session.material_choice import choose_materials, current_choice
 from sonic_bullet.session.wanted_bodies import WantedBody, checked, oversize_notes, solved_bodies, wanted_body
 
 
@@ -71,6 +73,7 @@ class Listener:
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = client if isinstance(client, World) else _opened(client)
+        self.world.silence(current_choice().silent)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
         how: dict[str, Any] = {"sr": self.sr, "sensors": self.sensors, "seed": self.seed, "air": self.air}
@@ -171,7 +174,8 @@ class Listener:
     ) -> list[tuple[ModalModel, ...]]:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
-        wanted = checked(self.world, wanted)
+        asked = checked(self.world, wanted)
+        wanted = choose_materials(self.world, asked)
         with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
             models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
@@ -185,7 +189,8 @@ class Listener:
                 self.world.add(one.body, link, model=model, shapes=shapes, **how)
         for said in oversize_notes(wanted, models):
             warnings.warn(said, SizeWarning, stacklevel=3)
-        return [tuple(mine) for mine in models]
+        each = chain.from_iterable(models)
+        return [tuple(islice(each, len(one.links))) for one in asked]
 
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`.

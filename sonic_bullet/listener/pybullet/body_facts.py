@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -262,6 +262,22 @@ class AskedLinks(World):
         own = link_name(self.client_id, body, link)
         name = self.properties.names.called(int(encode(body, link)), own)
         return name if name == f"body {body}" else f"{name} (body {body})"
+
+    def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
+        """What the records of links (body, link, name to be given) are or would be called, if all were added now."""
+        return self.properties.names.expected(
+            [(int(encode(body, link)), link_name(self.client_id, body, link), given) for body, link, given in links]
+        )
+
+    def all_links(self) -> tuple[tuple[int, int], ...]:
+        """(body, link) of every link in the world that has a collision shape; none where the connection is lost."""
+        from sonic_bullet.listener.pybullet.clients import is_connected, links_with_shapes
+
+        return links_with_shapes(self.client_id) if is_connected(self.client_id) else ()
+
+    def silence(self, names: Collection[str]) -> None:
+        """Records of links, or of all links of bodies, called so are `silent` from now on."""
+        self.properties.names.silent = frozenset(names)
 
     def link_name(self, body: int, link: int) -> str:
         """The link's own name, without its body's."""
