@@ -96,9 +96,9 @@ def render_scene(
     no sensor hears, though they touch and vibrate. residual: whether what materials sound beside their modes is
     sounded. supports: whether what a body stands on takes of its modes, as `attach` has it. progress is given the share
     done, say what is being computed before the first step (modes: seconds a body). at_end: is shown the listener while
-    its world is still there. tail_db: what rings is followed after the last step until it is that far below the peak, -60 say, at
-    most 10 s; None, 0: not. Raises SonicBulletError; where the scene broke or was interrupted under way, the exception
-    carries what was rendered so far as ``partial``.
+    its world is still there. tail_db: what rings is followed after the last step until it is that far below the peak,
+    -60 say, at most 10 s; None, 0: not. Raises SonicBulletError; where the scene broke or was interrupted under way,
+    the exception carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -121,6 +121,7 @@ def render_scene(
             with suppress(SonicBulletError):  # a script's own listener may keep nothing
                 error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
+        stage.check_names()
         return stage.result(notes, tail_db)
 
 
@@ -151,6 +152,7 @@ def run_scene(
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():
         notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"), progress, say)
+        stage.check_names()
         return (*notes, *stage.need_listener().notes)
 
 
@@ -210,10 +212,7 @@ class _Stage:
             warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
             run = _run_built if defines_build(self.path) else _run_plain
             with running_scene(self.path), choosing(self.choice):
-                notes = run(self, seconds, progress, say)
-        if self.choice:
-            self.choice.check_names(self.names(), f"scene '{self.path.name}'")
-        return notes
+                return run(self, seconds, progress, say)
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """A listener that keeps its run, unless somebody hears it at once."""
@@ -232,11 +231,12 @@ class _Stage:
             raise SceneError(f"scene '{self.path.name}' made no physics step", "call stepSimulation in it")
         return self.listener
 
-    def names(self) -> list[str]:
-        """What all bodies are called that were or are in the world."""
-        world = self.need_listener().world
-        here = world.record_names([(*who, None) for who in world.all_links()])
-        return [*here, *(body.name for body in world.bodies)]
+    def check_names(self) -> None:
+        """Raise SceneError where a name that was given a material, or silenced, is nobody's who is or was there."""
+        if self.choice:
+            world = self.need_listener().world
+            here = world.record_names([(*who, None) for who in world.all_links()])
+            self.choice.check_names([*here, *(body.name for body in world.bodies)], f"scene '{self.path.name}'")
 
     def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()
@@ -283,7 +283,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     user_code(stage.path, partial(listener.add_all, cast, progress=say))
     said: tuple[str, ...] = ()
     if stage.choice:
-        stage.choice.check_names(stage.names(), f"scene '{stage.path.name}'")
+        stage.check_names()
         static = partial(is_static, client._client)
         said = add_links(listener, named_links(listener.world, stage.choice), static, say)
     act = getattr(module, "act", None)

@@ -72,8 +72,8 @@ def scene_options(command: Any) -> Any:
                 "--material",
                 metavar="[NAME=]M",
                 multiple=True,
-                help="Material (a name or a preset file) of the body NAME, or of all that sounds, whatever scene or log "
-                "say; repeatable. Of a log, motion and mass stay.",
+                help="Material (a name or a preset file) of the body NAME, or of all that sounds, whatever the scene "
+                "or log says; repeatable. Motion and mass stay.",
             ),
             click.option(
                 "--silent",

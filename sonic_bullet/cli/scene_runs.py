@@ -1,4 +1,4 @@
-"""What a command asks of a scene or a contact log, and the run or replay of it: `render`, `film` and `play` share it."""
+"""What a command asks of a scene or a contact log, and the run or replay of it, for `render`, `film` and `play`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class WantedMaterials:
 
         everyone, named = None, {}
         for given in material:
-            name, equals, of = ("", "", given) if Path(given).is_file() else given.rpartition("=")
+            name, equals, of = ("", "", given) if "=" not in given or Path(given).is_file() else given.partition("=")
             if equals and not (name.strip() and of.strip()):
                 raise MaterialError(f"--material {given} is neither M nor NAME=M", "give --material bowl=steel")
             load_material(of)

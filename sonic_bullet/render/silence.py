@@ -97,6 +97,9 @@ def why_silent(log: ContactLog) -> str | None:
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):
         return _untouched(log, rows, added)
+    silenced = np.array([body.silent for body in log.bodies], bool)
+    if not (added & ~silenced)[np.concatenate([rows.a[mine], rows.b[mine]])].any():
+        return f"all that was touched is silent as asked: {_names(body for body in log.bodies if body.silent)}"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
     return _mute(log, resonators) or _at_rest(log, rows, mine) or _arrives_late(log, mine)

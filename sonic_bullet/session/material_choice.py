@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.listener.names import matched
 from sonic_bullet.records import Material
-from sonic_bullet.records.coerce import as_items, as_kind, shown
+from sonic_bullet.records.coerce import as_items, shown
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.arguments import as_material, as_name
 
@@ -72,7 +72,9 @@ def as_choice(
 ) -> MaterialChoice:
     """What a user gives, read. Raises MaterialError and FileError (a preset), SceneError (what is no name)."""
     remedy = "give a dict from bodies' names to materials"
-    named = {} if materials is None else as_kind(materials, Mapping, "materials", remedy, error=SceneError)
+    named = {} if materials is None else materials
+    if not isinstance(named, Mapping):
+        raise SceneError(f"materials is {shown(materials)}", remedy)
     names = as_items(silent, "silent", "give a list of bodies' names", error=SceneError)
     return MaterialChoice(
         None if material is None else as_material(material),

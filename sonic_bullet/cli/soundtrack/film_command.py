@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 EPILOG = """\b
 Examples:
   sonic-bullet film scenes/tabletop.py -o tabletop.mp4 --fps 60
-  sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow link0
+  sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow ball
   sonic-bullet film drop.npz -o drop.mkv --camera 0.5,-1,0.8 --look-at 0,0,0.1 --size 1920x1080
 Frame rates are fractions: 24, 25, 30000/1001. Needs PyAV: pip install 'sonic_bullet[film]'"""
 
