@@ -60,8 +60,8 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @json_option
 def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
-    from sonic_bullet.cli.scene_commands import check_request, with_partial
-    from sonic_bullet.cli.scene_runs import DEFAULT_SR, WantedMaterials, Wish, is_log, replayed, simulated
+    from sonic_bullet.cli.scenes.scene_commands import check_request, with_partial
+    from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, Wish, is_log, replayed, simulated
     from sonic_bullet.files import check_sr
     from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
     from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size

@@ -14,7 +14,7 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import json_option, scene_options
-from sonic_bullet.cli.scene_runs import WantedMaterials, check_scene_file, is_log
+from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, check_scene_file, is_log
 from sonic_bullet.records.errors import AudioError, SceneError
 
 if TYPE_CHECKING:

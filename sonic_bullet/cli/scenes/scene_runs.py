@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import quiet_stderr
-from sonic_bullet.files import read_log
 from sonic_bullet.records.errors import AudioError, FileError, MaterialError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -128,6 +127,7 @@ def replayed(path: str, wish: Wish) -> Replay:
     """A log's sound: bit for bit the render it came from, where no option changes it."""
     import numpy as np
 
+    from sonic_bullet.files import read_log
     from sonic_bullet.records import Microphone
     from sonic_bullet.render import render_kept, render_notes
     from sonic_bullet.session.chosen_in_log import with_choice

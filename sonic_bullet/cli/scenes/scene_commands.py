@@ -18,7 +18,7 @@ from sonic_bullet.cli.output import (
     status,
     write_json,
 )
-from sonic_bullet.cli.scene_runs import (
+from sonic_bullet.cli.scenes.scene_runs import (
     Replay,
     WantedMaterials,
     Wish,
