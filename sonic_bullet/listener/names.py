@@ -86,6 +86,6 @@ class Names:
     def _unused(self, default: str) -> str:
         while True:
             self._count[default] = count = self._count.get(default, 0) + 1
-            name = default if count == 1 else f"{default} {count}"
+            name = default if count == 1 else f"{default} {'#' if default[-1:].isdigit() else ''}{count}"
             if name not in self._given and name not in self._bearer:
                 return name

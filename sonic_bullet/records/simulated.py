@@ -126,6 +126,11 @@ class Change:
         store(self, values=ReadOnlyDict(dict(sorted((dict(known) | lost).items()))))
 
 
+def with_body_id(name: str, body: int) -> str:
+    """A body's or link's name in a message, with the body's id: "cube (body 3)"; "body 3" is plain enough."""
+    return name if name.split("/", maxsplit=1)[0] == f"body {body}" else f"{name} (body {body})"
+
+
 @dataclass(frozen=True, slots=True)
 class Simulator:
     """What a simulator says of itself. engine: its settings at the first step; versions: of it, by name; changes: what

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sonic_bullet.listener import Finding
+from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.session.listening import Listener
 
 
@@ -26,7 +27,7 @@ def find_mute_bodies(listener: Listener) -> tuple[Finding, ...]:
         Finding(
             "no-audible-mode",
             "info",
-            f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring",
+            f"{with_body_id(body.name, body.body_id)} has no mode below 20 kHz: it clicks but does not ring",
             "nothing to mend; a larger or thinner body rings",
         )
         for body in listener.world.bodies

@@ -148,9 +148,9 @@ def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[Modal
     """A line for each link larger than anything that is struck to sound."""
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     for one, mine in zip(wanted, models, strict=True):
-        for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
+        for (name, _), model in zip(one.parts, mine, strict=True):
             if large := oversize(model.vertex_m, model.mass_kg):
-                yield f"body {one.body} link {link} ({name}) {large}; {remedy}"
+                yield f"{name} {large}; {remedy}"
 
 
 def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:

@@ -192,8 +192,8 @@ def test_all_silent_is_said(capfd: pytest.CaptureFixture[str]) -> None:
 
 def test_what_the_scene_adds_to_nobody_is_made_to_sound_by_name() -> None:
     assert set(made_of("log.npz")) == {"bar", "ball"}  # nothing touched the floor beneath
-    heard("scene.py", "--material", "link0=wood")
-    assert made_of()["link0"] == "wood"
+    heard("scene.py", "--material", "body 0=wood")
+    assert made_of()["body 0"] == "wood"
 
 
 @pytest.mark.parametrize("who", ['{(arm, "all"): {"material": "wood", "name": "arm"}}', '{(arm, "all"): "wood"}'])

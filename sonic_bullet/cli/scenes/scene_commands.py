@@ -228,12 +228,11 @@ def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:
     from sonic_bullet.geometry import oversize
+    from sonic_bullet.records.simulated import with_body_id
 
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-    return tuple(
-        f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words
-    )
+    return tuple(f"{with_body_id(body.name, body.body_id)} {words}; {remedy}" for body, words in large if words)
 
 
 def summary(report: AudioReport, log: ContactLog) -> str:

@@ -19,7 +19,7 @@ from sonic_bullet.listener.frames import NO_NUMBER
 from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.listener.pybullet import collision_shapes
-from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
+from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, describe_link
 from sonic_bullet.listener.pybullet.clients import client_id_of
 from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
@@ -142,7 +142,7 @@ def _lids(client_id: int) -> list[Finding]:
                 Finding(
                     "hull-lid",
                     "warning",
-                    f"body {body} ({link_name(client_id, body, link)}) is hollow, but moving meshes collide "
+                    f"{describe_link(client_id, body, link)} is hollow, but moving meshes collide "
                     "as their convex hull: hits land on an invisible lid",
                     "decompose it with pybullet.vhacd, build it of several shapes, or fix it with mass 0 and "
                     "GEOM_FORCE_CONCAVE_TRIMESH",
@@ -190,7 +190,7 @@ def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
                 Finding(
                     "scale",
                     "warning",
-                    f"body {body} ({link_name(client_id, body, link)}) is {size:.3g} m long",
+                    f"{describe_link(client_id, body, link)} is {size:.3g} m long",
                     "PyBullet thinks in metres: load a mesh made in millimetres with scale 0.001",
                 )
             )
