@@ -121,9 +121,9 @@ def _places(name: str, a: Any, b: Any) -> str:
     return f"{name.rstrip('s')} {', '.join(moved)}"
 
 
-def _distance(way_m: Any) -> str:
+def _distance(vector_m: Any) -> str:
     """A length of a vector (3,) in m, in mm below 1 cm and in cm below 1 m."""
-    length_m = float(np.linalg.norm(way_m))
+    length_m = float(np.linalg.norm(vector_m))
     factor, unit = (1000, "mm") if length_m < 0.01 else (100, "cm") if length_m < 1 else (1, "m")
     return f"{length_m * factor:.3g} {unit}"
 

@@ -227,13 +227,13 @@ def _left(left: Array, level: float, sr: int) -> Consequence:
     share = spectrum[max(0, k - 3) : k + 4].sum() / spectrum.sum()
     if share > 0.5:
         freq = k * sr / left.shape[1]
-        return Consequence("tone", f"a tone at {freq:.1f} Hz is added, {_beside(level)}", None, {"freq_hz": freq})
+        return Consequence("tone", f"a tone at {freq:.1f} Hz is added, {_added_level(level)}", None, {"freq_hz": freq})
     spread = float(np.exp(np.log(spectrum + 1e-300).mean()) / spectrum.mean())
     what = "noise is added" if spread > 0.2 else "something else sounds besides"
-    return Consequence("noise", f"{what}, {_beside(level)}", None, {"left_db": level})
+    return Consequence("noise", f"{what}, {_added_level(level)}", None, {"left_db": level})
 
 
-def _beside(level_db: float) -> str:
+def _added_level(level_db: float) -> str:
     """How strong something is that is added."""
     return f"{abs(level_db):.1f} dB {'above' if level_db > 0 else 'below'} A as a whole"
 

@@ -28,6 +28,7 @@ from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.restitution import endless_bounces, lost_restitution
 from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m, read_surfaces
 from sonic_bullet.records.errors import MeshError, SceneError
+from sonic_bullet.records.simulated import with_body_id
 
 LONGEST_STEP_S = 1 / 120
 SMALLEST_M = 1e-3
@@ -250,7 +251,7 @@ def _oversized(world: PyBulletWorld) -> list[Finding]:
         Finding(
             "scale",
             "warning",
-            f"body {body.body_id} ({body.name}) {words}",
+            f"{with_body_id(body.name, body.body_id)} {words}",
             "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres; "
             "leave it out of the sound if it is the ground",
         )
@@ -274,7 +275,7 @@ def _densities(world: PyBulletWorld) -> list[Finding]:
                 Finding(
                     "density",
                     "warning",
-                    f"body {body.body_id} ({body.name}) weighs {body.mass_kg:.3g} kg, but a solid of "
+                    f"{with_body_id(body.name, body.body_id)} weighs {body.mass_kg:.3g} kg, but a solid of "
                     f"{body.material.name} of that size {expected:.3g} kg",
                     "set its mass with changeDynamics, or check the mesh's scale",
                 )
