@@ -120,7 +120,8 @@ def _naming(link: str, of: int) -> Iterator[None]:
         rest = "; or give another shape with mesh=" + (
             ", or add the other links one by one, by their names" if of > 1 else ""
         )
-        raise type(error)(f"{link}: {error.what}", error.remedy + rest) from error
+        what = error.what if error.what.startswith(f"{link} ") else f"{link}: {error.what}"
+        raise type(error)(what, error.remedy + rest) from error
 
 
 def solved_bodies(
