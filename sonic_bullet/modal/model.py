@@ -227,7 +227,9 @@ def _solve(
     if np.isfinite(found.error):
         note += f"; error at {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
         if found.error > asked.accuracy:
-            note += f", not the {100 * asked.accuracy:g} % asked for: that would cost too much, unless edge_m says so"
+            note += (
+                f", more than the {100 * asked.accuracy:g} % asked for: finer elements need more unknowns than allowed"
+            )
     return _Unit(
         found.value,
         np.ascontiguousarray(shown.shape[:, :, found.order]),

@@ -330,7 +330,7 @@ def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
         (["scene.py"], "--output"),
         ([], "Missing argument"),
         (["cut.npz", "-o", "a.wav"], "cut.npz is cut"),
-        (["good.npz", "-o", "a.wav", "--material", "wood"], "--material"),
+        (["good.npz", "-o", "a.wav", "--material", "nobody=wood"], "called 'nobody'"),
         (["good.npz", "-o", "a.wav", "--seconds", "5"], "lasts 1.000 s"),
     ],
 )
