@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
 FALL = (0.85, 1.1)  # of the lower edge, of the upper: where the filter is silent
-PERIODS = 8.0  # of the lower edge that a recording is continued by at its ends, where it is longer
+PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
 def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
@@ -34,10 +35,11 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     from scipy.fft import irfft, next_fast_len, rfft
 
     low, high = band_hz
-    reach = max(0, min(len(signal) - 1, round(PERIODS / max(low, 1.0) * sr)))
-    # turned about its ends, as filtfilt does: a hum that is cut off there would else begin with a click
-    ends = 2 * signal[:1] - signal[reach:0:-1], 2 * signal[-1:] - signal[-2 : -reach - 2 : -1]
-    whole = np.concatenate([ends[0], signal, ends[1]])
+    reach = min(len(signal), round(PERIODS / max(low, 1.0) * sr))
+    # a hum or a tone goes on, and fades: one that is cut off would begin and end with a click, which is in every band
+    fade = _raised(np.arange(reach), reach, 0)
+    ends = [predicted_on(part, ORDER, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
+    whole = np.concatenate([ends[0][::-1], signal, ends[1]])
     size = next_fast_len(2 * len(whole))
     freq = np.arange(size // 2 + 1) * sr / size
     gain = _raised(freq, FALL[0] * low, low)
@@ -53,4 +55,4 @@ def restored(limited: Array, model: Array, sr: int, band_hz: tuple[float, float]
 
 def _raised(freq: Array, start: float, stop: float) -> Array:
     """Raised cosine (n,) from 0 at start to 1 at stop."""
-    return 0.5 - 0.5 * np.cos(np.pi * np.clip((freq - start) / max(stop - start, 1e-9), 0, 1))
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip((freq - start) / (stop - start), 0, 1))
