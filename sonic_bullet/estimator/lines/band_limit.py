@@ -1,7 +1,6 @@
 """A recording in the band that was asked for, so that onset, hits, noise and lines are all of it.
 
-The filter is a real, even factor on the spectrum: it delays nothing, and passes the band as it is. What it takes of a
-mode's beginning the modes give back once they are found: x_band + (m − m_band), see `restored`.
+The filter is a real, even factor on the spectrum: it delays nothing, and passes the band as it is.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import numpy as np
 from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
-FALL = (0.85, 1.1)  # of the lower edge, of the upper: where the filter is silent
+FALL = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
 PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
@@ -46,11 +45,6 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     if high * FALL[1] < sr / 2:
         gain *= 1 - _raised(freq, high, FALL[1] * high)
     return np.asarray(irfft(rfft(whole, size) * gain, size)[reach : reach + len(signal)])
-
-
-def restored(limited: Array, model: Array, sr: int, band_hz: tuple[float, float]) -> Array:
-    """A limited recording (n,) with what the limit took of a model (n,) of it."""
-    return limited + model - limit_band(model, sr, band_hz)
 
 
 def _raised(freq: Array, start: float, stop: float) -> Array:

@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
-from sonic_bullet.estimator.lines.band_limit import limit_band, restored
+from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
@@ -37,7 +37,6 @@ EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's fil
 ROUNDS = 6
 ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
 FEW, MANY = 3, 40
-RESTORED = 2  # times that modes give back what the band's limit took of them
 MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
@@ -75,9 +74,13 @@ def extract(
     if not 0 < low < high:
         raise AudioError(f"band is {low:g} to {high:g} Hz", f"give a band inside 0 to {sr / 2:g} Hz")
     clipped = onset.clipped_samples(signal)
+    limited = signal
     if band_hz is not None:
-        signal = limit_band(signal, sr, (low, high))
-    part = onset.span(signal, sr) if onset_s is None else onset.Span(round(onset_s * sr), len(signal), 1)
+        signal, limited = limit_band(signal, sr, (low, np.inf)), limit_band(signal, sr, (low, high))
+    part = onset.span(limited, sr) if onset_s is None else onset.Span(round(onset_s * sr), len(signal), 1)
+    quiet = limited[: part.start]
+    if len(quiet) and _rms(signal[: part.start] - quiet) > _rms(quiet):
+        signal = limited  # what is above was there before; else it belongs to the impact, which a limit would smear
     x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
@@ -88,18 +91,12 @@ def extract(
         else _modes(x, sr, (low, high))
     )
     start = part.start
-    for _ in range(RESTORED if band_hz is not None and len(modes.pole) else 0):
-        model = np.zeros(len(signal))
-        model[start : start + len(x)] = x - likelihood.residual(x, modes, sr)
-        whole = restored(signal, model, sr, (low, high))
-        x = whole[start : start + len(x)]
-        modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), THOROUGH), noise, _least(x))
-        noise = measured(likelihood.residual(x, modes, sr), sr, FLOOR * _rms(x), len(modes.pole), (low, high))
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
-    return _features(x, modes, noise, (low, high), start, notes)
+    heard = limited[start : start + len(x)]
+    return _features(x, heard, modes, noise, (low, high), start, notes)
 
 
 def _doubts(x: Array, hits: int, clipped: int, sr: int) -> tuple[list[str], bool]:
@@ -261,11 +258,12 @@ def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float
 
 
 def _features(
-    x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]
+    x: Array, heard: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]
 ) -> Features:
+    """Features of the modes of a signal (n,); heard (n,): what the band alone holds of it."""
     k, sr = len(modes.pole), noise.sr
-    left = likelihood.residual(x, modes, sr)
-    explained = 1 - float(left @ left) / float(x @ x)
+    left = heard - (x - likelihood.residual(x, modes, sr))
+    explained = 1 - float(left @ left) / float(heard @ heard)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
     tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
@@ -273,9 +271,9 @@ def _features(
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
-    front = x[: int(FRONT * len(x))]
+    front = heard[: int(FRONT * len(x))]
     # a rattle starts with its most; speech, noise, music do not
-    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(x @ x)
+    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(heard @ heard)
     if explained < EXPLAINED:
         given = "" if modal else "; no feature is given"
         notes.append(
