@@ -77,14 +77,16 @@ def extract(
     limited = signal
     if band_hz is not None:
         signal, limited = limit_band(signal, sr, (low, np.inf)), limit_band(signal, sr, (low, high))
-    part = onset.span(limited, sr) if onset_s is None else onset.Span(round(onset_s * sr), len(signal), 1)
+    part = (
+        onset.span(limited, sr) if onset_s is None else onset.until_next_hit(limited, sr, max(0, round(onset_s * sr)))
+    )
     quiet = limited[: part.start]
     if len(quiet) and _rms(signal[: part.start] - quiet) > _rms(quiet):
         signal = limited  # what is above was there before; else it belongs to the impact, which a limit would smear
     x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
-    notes, hopeless = _doubts(x, part.hits, clipped, sr)
+    notes, hopeless = _doubts(x, part.describe_hits(sr), clipped, sr)
     modes, noise = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
@@ -96,14 +98,14 @@ def extract(
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
     heard = limited[start : start + len(x)]
-    return _features(x, heard, modes, noise, (low, high), start, notes)
+    return _features(x, heard, modes, noise, (low, high), start, notes, whole=band_hz is None)
 
 
-def _doubts(x: Array, hits: int, clipped: int, sr: int) -> tuple[list[str], bool]:
+def _doubts(x: Array, hits: str, clipped: int, sr: int) -> tuple[list[str], bool]:
     """What can be said against a recording before any mode is looked for, and whether that is enough not to look."""
     notes, hopeless = [], False
-    if hits > 1:
-        notes.append(f"{hits} hits: only what comes before the second, {len(x) / sr:.3g} s, is used")
+    if hits:
+        notes.append(f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used")
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
     if len(x) < SHORT_S * sr:
@@ -258,16 +260,26 @@ def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float
 
 
 def _features(
-    x: Array, heard: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]
+    x: Array,
+    heard: Array,
+    modes: Sinusoids,
+    noise: Noise,
+    band_hz: tuple[float, float],
+    start: int,
+    notes: list[str],
+    *,
+    whole: bool,
 ) -> Features:
-    """Features of the modes of a signal (n,); heard (n,): what the band alone holds of it."""
+    """Features of the modes of a signal (n,); heard (n,): what the band alone holds of it. whole: no band was asked
+    for, whose edge makes lines at the onset that are none.
+    """
     k, sr = len(modes.pole), noise.sr
     left = heard - (x - likelihood.residual(x, modes, sr))
     explained = 1 - float(left @ left) / float(heard @ heard)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
     tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
-    for which, said in ((tone, "do not decay"), (vague & ~tone, "have no decay that can be told")):
+    for which, said in ((tone, "do not decay"), (vague & ~tone & whole, "have no decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
