@@ -37,6 +37,7 @@ EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's fil
 ROUNDS = 6
 ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
 FEW, MANY = 3, 40
+RESTORED = 3  # times that modes get back what a limit above took of them
 MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
@@ -81,7 +82,8 @@ def extract(
         onset.span(limited, sr) if onset_s is None else onset.until_next_hit(limited, sr, max(0, round(onset_s * sr)))
     )
     quiet = limited[: part.start]
-    if len(quiet) and _rms(signal[: part.start] - quiet) > _rms(quiet):
+    steady_above = len(quiet) > 0 and _rms(signal[: part.start] - quiet) > _rms(quiet)
+    if steady_above:
         signal = limited  # what is above was there before; else it belongs to the impact, which a limit would smear
     x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
     if len(x) < LEAST_SAMPLES:
@@ -93,6 +95,14 @@ def extract(
         else _modes(x, sr, (low, high))
     )
     start = part.start
+    for _ in range(RESTORED if steady_above and len(modes.pole) else 0):
+        # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
+        model = np.zeros(len(limited))
+        model[start : start + len(x)] = -likelihood.residual(np.zeros(len(x)), modes, sr)
+        signal = limited + limit_band(model, sr, (low, np.inf)) - limit_band(model, sr, (low, high))
+        x = signal[start : start + len(x)]
+        modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), THOROUGH), noise, _least(x))
+        noise = measured(likelihood.residual(x, modes, sr), sr, FLOOR * _rms(x), len(modes.pole), (low, high))
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
