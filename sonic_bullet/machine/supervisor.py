@@ -221,9 +221,9 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
         if now - max(own_since, asked_at) > ASK_S or (now - own_since > IDLE_S and now - asked_at > ASK_S):
             asked_at = now
             found = _judgement(child.where(), child.scene)
-            if found == "ours":
+            if found != "own":  # a call into C that lasts does not answer
                 own_since = now
-            elif found == "own" and now - own_since > IDLE_S and not os.environ.get("SONIC_BULLET_DEBUG"):
+            elif now - own_since > IDLE_S and not os.environ.get("SONIC_BULLET_DEBUG"):
                 if ended_idle is not None:
                     break
                 ended_idle = _idle_words(Path(child.scene).name, _line_in(child.trace, child.scene))

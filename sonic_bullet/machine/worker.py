@@ -54,7 +54,8 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
     _LINE.fd, _LINE.clock, _LINE.process = fd, clock, os.getpid()
     catch_stops()
     faulthandler.enable(traces, all_threads=False)
-    faulthandler.register(ASK_WHERE, traces, all_threads=False)  # type: ignore[arg-type]
+    # between two bytecodes: faulthandler, at any moment, ends a Python 3.12 or 3.13 now and then
+    signal.signal(ASK_WHERE, lambda _, frame: _say_where(traces, frame))  # type: ignore[arg-type]
     signal.signal(END_IDLE, at_idle)  # type: ignore[arg-type]
     leave = os._exit
 
@@ -78,6 +79,11 @@ def _lines_of(frame: FrameType | None) -> Iterator[str]:
     while frame is not None:
         yield f'File "{escaped(frame.f_code.co_filename)}", line {frame.f_lineno}'
         frame = frame.f_back
+
+
+def _say_where(traces: int, frame: FrameType | None) -> None:
+    with suppress(OSError):
+        os.write(traces, "".join(f"{line}\n" for line in _lines_of(frame)).encode())
 
 
 def escaped(path: str) -> str:
