@@ -55,13 +55,13 @@ def white(rms: float, sr: int) -> Noise:
     return Noise(np.full(2, rms), np.ones(1), sr)
 
 
-def measured(
-    left: Array, sr: int, floor: float, modes: int = 0, band_hz: tuple[float, float] = (0.0, np.inf)
-) -> Noise:
+def measured(left: Array, sr: int, floor: float, modes: int = 0, band_hz: tuple[float, float] = (0.0, np.inf)) -> Noise:
     """Noise of what is left (n,) of a recording without its modes, four numbers each, by what the band holds;
     floor: least density.
     """
-    density = np.maximum(_lower_half(left, sr, band_hz) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor)
+    density = np.maximum(
+        _lower_half(left, sr, band_hz) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor
+    )
     count = len(left) // FRAME
     frames = left[: count * FRAME].reshape(count, FRAME) * np.hanning(FRAME + 2)[1:-1]
     power = np.abs(np.fft.rfft(frames, axis=1))[:, 2:-2] ** 2 / (3 / 8 * FRAME)

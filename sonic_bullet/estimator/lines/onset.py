@@ -69,7 +69,12 @@ def span(signal: Array, sr: int) -> Span:
     found = until_next_hit(signal, sr, start)
     first, half = found.stop, (found.stop - start) // 2
     before, after = signal[start:first], signal[first : first + round(GAP_S * sr)]
-    if found.later and np.abs(after).max() > np.abs(before).max() and _power(before) < HUM * _power(after) and _power(before[:half]) < STEADY * _power(before[half:]):
+    if (
+        found.later
+        and np.abs(after).max() > np.abs(before).max()
+        and _power(before) < HUM * _power(after)
+        and _power(before[:half]) < STEADY * _power(before[half:])
+    ):
         begin = first - block  # what neither strikes nor decays before a strike is hum or noise, and no hit
         over = np.flatnonzero(np.abs(signal[begin:]) > np.abs(before).max())
         return Span(begin + int(over[0]), (*found.later[1:], len(signal))[0], found.later[1:])
