@@ -1,5 +1,6 @@
-"""`python -m sonic_bullet`: the `sonic-bullet` command."""
+"""``python -m sonic_bullet``: the command line."""
 
 from sonic_bullet.cli import main
 
-main()
+if __name__ == "__main__":
+    main()

@@ -36,6 +36,7 @@ from sonic_bullet.listener import (
     seen_settings,
     watch_settings,
 )  # fmt: skip
+from sonic_bullet.machine.progress import Say, says_so
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
@@ -49,7 +50,6 @@ from sonic_bullet.session.scene_file import defines_build, scene_module, user_co
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
 Progress = Callable[[float], None]
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +70,7 @@ class RenderResult:
         return self.sound.samples()
 
 
+@says_so(text="say", fraction="progress")
 def render_scene(
     path: str | Path,
     *,
@@ -90,10 +91,9 @@ def render_scene(
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the
     bodies of a plain script. residual: whether what materials sound beside their modes is sounded. supports: whether
     what a body stands on takes of its modes, as `attach` has it. progress is given the share done, say what is being
-    computed before the first step (modes: seconds a body). at_end: is shown the listener while its world is
-    still there. tail_db: what rings is followed after the last step until it is that far below the peak, -60 say, at
-    most 10 s; None, 0: not. Raises SonicBulletError; where the scene broke or was interrupted under way, the exception
-    carries what was rendered so far as ``partial``.
+    computed. at_end: is shown the listener while its world is still there. tail_db: how far below the peak what rings
+    after the last step ends, -60 say, at most 10 s; None, 0: not. Raises SonicBulletError; where the scene broke or was
+    interrupted under way, the exception carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),

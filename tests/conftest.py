@@ -12,6 +12,7 @@ import pytest
 
 REPO = Path(__file__).resolve().parents[1]
 JOURNEYS = REPO / "tests" / "journeys"
+os.environ.setdefault("SONIC_BULLET_PROGRESS", "0")  # lines that hang on how fast a machine is; see test_progress_*
 
 
 def find_shared() -> Path | None:

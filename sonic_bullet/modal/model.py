@@ -17,6 +17,7 @@ import numpy as np
 
 from sonic_bullet.files import cache as store
 from sonic_bullet.geometry import oversize
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.sectors import MOST_MODES, Wanted
@@ -52,6 +53,7 @@ class _Unit:
     note: str
 
 
+@says_so(text="progress")
 @one_thread()
 def analyse(
     shapes: tuple[Shape, ...],

@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -25,7 +24,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
-from sonic_bullet.machine.terminal import status
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options, shown
 from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
@@ -143,8 +142,8 @@ class Listener:
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
         relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
-        progress: called now and then with which link's modes or radiation are computed and how far that is; without
-        one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        progress: called with which link's modes or radiation are computed and how far that is; without one, stderr
+        shows what takes over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
         SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
@@ -172,8 +171,7 @@ class Listener:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
         wanted = checked(self.world, wanted)
-        with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
-            models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
+        models = self._solved(wanted, progress=progress)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
         for one in wanted:  # all of them first: a number is given to who has no name of its own
             for link, name in zip(one.links, one.names, strict=bool(one.names)):
@@ -186,6 +184,13 @@ class Listener:
         for said in oversize_notes(wanted, models):
             warnings.warn(said, SizeWarning, stacklevel=3)
         return [tuple(mine) for mine in models]
+
+    @says_so(text="progress")
+    def _solved(
+        self, wanted: Sequence[WantedBody], *, progress: Callable[[str], None] | None = None
+    ) -> list[list[ModalModel]]:
+        assert progress is not None
+        return solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, progress)
 
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`.

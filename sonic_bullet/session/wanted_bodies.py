@@ -208,7 +208,7 @@ def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: S
             radiation_of(model, air)
 
     def make(which: str, ready: Callable[[], None]) -> None:
-        say(f"machine code of {which}")
+        say(f"machine code of {which}, kept for later runs")
         ready()
 
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]

@@ -457,6 +457,7 @@ def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(
     scene: Path, monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO]
 ) -> None:
     told = stream()
+    monkeypatch.delenv("SONIC_BULLET_PROGRESS", raising=False)
 
     def render_scene(path: object, **options: Any) -> RenderResult:
         options["say"]("modes of cup (body 3): assembling")

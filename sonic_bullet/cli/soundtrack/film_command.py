@@ -112,7 +112,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         events = None
         with quiet_stderr():
             import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
-        with progress_bar("film") as (progress, tell):
+        with progress_bar("pictures") as (progress, tell):
             if options["overlay"]:
                 from sonic_bullet.soundtrack.sound_events import find_sound_events
 
