@@ -232,7 +232,8 @@ def _sounds(
         if one.later:
             used = ": only what comes before the second is used" if known is None else ", all of which is used"
             remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
-            sounds[-1] = sounds[-1][: one.stop if known is None else len(sounds[-1])]
+            if known is None:
+                sounds[-1], limited[-1] = sounds[-1][: one.stop], limited[-1][: one.stop]
     remarks += [
         f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}"
         for words, names in several.items()
