@@ -107,8 +107,8 @@ def extract(
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
-    heard = limited[start : start + len(x)]
-    return _features(x, heard, modes, noise, (low, high), start, notes, whole=band_hz is None)
+    banded = limited[start : start + len(x)]
+    return _features(x, banded, modes, noise, (low, high), start, notes, whole=band_hz is None)
 
 
 def _doubts(x: Array, hits: str, clipped: int, sr: int) -> tuple[list[str], bool]:
@@ -271,7 +271,7 @@ def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float
 
 def _features(
     x: Array,
-    heard: Array,
+    banded: Array,
     modes: Sinusoids,
     noise: Noise,
     band_hz: tuple[float, float],
@@ -280,12 +280,12 @@ def _features(
     *,
     whole: bool,
 ) -> Features:
-    """Features of the modes of a signal (n,); heard (n,): what the band alone holds of it. whole: no band was asked
+    """Features of the modes of a signal (n,); banded (n,): what the band alone holds of it. whole: no band was asked
     for, whose edge makes lines at the onset that are none.
     """
     k, sr = len(modes.pole), noise.sr
-    left = heard - (x - likelihood.residual(x, modes, sr))
-    explained = 1 - float(left @ left) / float(heard @ heard)
+    left = banded - (x - likelihood.residual(x, modes, sr))
+    explained = 1 - float(left @ left) / float(banded @ banded)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
     tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
@@ -293,9 +293,9 @@ def _features(
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
-    front = heard[: int(FRONT * len(x))]
+    front = banded[: int(FRONT * len(x))]
     # a rattle starts with its most; speech, noise, music do not
-    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(heard @ heard)
+    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(banded @ banded)
     if explained < EXPLAINED:
         given = "" if modal else "; no feature is given"
         notes.append(

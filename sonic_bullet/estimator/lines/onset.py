@@ -3,7 +3,7 @@ signal.
 
 energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block ->
 about the onset the modes observed after it, run backwards, against silence: the sample where the sound takes over from
-silence -> the onset a later strike (strikes.py): another hit; what follows it is left out
+silence -> the onset a later strike (strike_times.py): another hit; what follows it is left out
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
-from sonic_bullet.estimator.lines.strikes import GAP_S, find_strikes
+from sonic_bullet.estimator.lines.strike_times import GAP_S, find_strikes
 from sonic_bullet.records import Array
 
 BLOCK_S = 1e-3
