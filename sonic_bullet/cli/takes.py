@@ -66,6 +66,8 @@ def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
     from sonic_bullet.estimator.lines.strike_times import find_strikes
 
     strikes = np.round(find_strikes(signal, sr) * sr).astype(int)
+    if not len(strikes):
+        return []
     lead = round(LEAD_S * sr)
     starts = np.maximum(strikes - lead, 0)
     # the end of a strike whose next one comes within the lead is that strike

@@ -253,7 +253,8 @@ def test_a_long_recording_is_cut_into_takes(place: Path, capfd: pytest.CaptureFi
     assert [r["split"] for r in case["recordings"]] == ["fit", "fit", "holdout", "fit", "fit"]
     for name, start in zip(files, at, strict=True):
         take, _ = soundfile.read(place / "mine" / name)
-        assert take.shape[1] == 2 and f"{start / sr:.2f}" in said
+        row = next(line for line in said.splitlines() if line.startswith(name))
+        assert take.shape[1] == 2 and abs(float(row.split()[1]) - start / sr) < 0.002
         begin = int(np.argmax(np.abs(take[:, 0]) > 1e-3)) / sr
         assert abs(begin - 0.05) < 0.003, "the strike stands where it was cut for"
     read_case(place / "mine")
