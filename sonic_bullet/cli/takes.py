@@ -1,6 +1,6 @@
 """A recording of several strikes cut into takes of one each.
 
-recording (channels, n) -> strikes of its loudest channel (strike_times.py) -> from LEAD_S before each to LEAD_S before
+recording (channels, n) -> strikes of its loudest channel (onset.py) -> from LEAD_S before each to LEAD_S before
 the next -> a file each
 """
 
@@ -40,7 +40,7 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
     Raises
     ------
     AudioError
-        A recording in which no strike is found.
+        A recording that is silent.
     """
     made: list[Path] = []
     rows: list[tuple[str, ...]] = []
@@ -49,7 +49,7 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
         loudest = sound[int(np.argmax((sound**2).sum(axis=1)))]
         bounds = take_bounds(loudest, sr)
         if not bounds:
-            raise AudioError(f"{path} holds no strike", "leave it out, or cut it by hand")
+            raise AudioError(f"{path} is silent", "leave it out")
         for k, (strike, start, stop) in enumerate(bounds, 1):
             piece = path if len(bounds) == 1 else to / f"{path.stem}-{k:02d}.wav"
             if piece is not path:
@@ -63,11 +63,12 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
 
 def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
     """Samples of each strike of a recording (n,), and of the start and the end of its take."""
-    from sonic_bullet.estimator.lines.strike_times import find_strikes
+    from sonic_bullet.estimator.lines.onset import span
 
-    strikes = np.round(find_strikes(signal, sr) * sr).astype(int)
-    if not len(strikes):
+    if not np.any(signal):
         return []
+    found = span(signal, sr)
+    strikes = np.array([found.start, *found.later])
     lead = round(LEAD_S * sr)
     starts = np.maximum(strikes - lead, 0)
     # the end of a strike whose next one comes within the lead is that strike
