@@ -1,6 +1,7 @@
 """`case`: a folder of recordings to a case.json that `fit` and `diagnose` read; and whether one can be read.
 
-new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it
+new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it; recordings
+        of several strikes are cut into takes where that is asked for
 check   FOLDER -> what the case holds, and what of it is not read; or one line that says what is wrong
 schema  JSON Schema of case.json
 """
@@ -9,12 +10,14 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from sonic_bullet.cli.output import table, warn
+from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_audio, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
@@ -31,6 +34,8 @@ def run_case_new(
     folder: str,
     recordings: Sequence[str],
     *,
+    split: bool,
+    hold_out: int | None,
     mesh: str | None,
     units: str,
     material: str | None,
@@ -44,6 +49,8 @@ def run_case_new(
 
     Raises SonicBulletError.
     """
+    if hold_out is not None and hold_out < 2:
+        raise FileError(f"--hold-out is {hold_out}", "give 2 or more: some takes are to be fitted")
     place = Path(folder)
     if place.exists() and not place.is_dir():
         raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
@@ -61,8 +68,31 @@ def run_case_new(
             f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
             "give --sensor velocity, or leave it out",
         )
-    for sound in sounds:
-        read_audio(sound)
+    with tempfile.TemporaryDirectory() as folder_of_takes:
+        if split:
+            sounds, rows = cut_takes(sounds, Path(folder_of_takes))
+            print(table(TAKE_COLUMNS, rows))
+        for sound in sounds:
+            read_audio(sound)
+        written = _new_case(
+            place, sounds, mesh, units, material, sensor, (sensor_at, sensor_direction), medium, hold_out
+        )
+    print(written)
+    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
+
+
+def _new_case(
+    place: Path,
+    sounds: Sequence[Path],
+    mesh: str | None,
+    units: str,
+    material: str | None,
+    sensor: str,
+    sensor_is: tuple[Point | None, Point | None],
+    medium: str | None,
+    hold_out: int | None,
+) -> str:
+    """Write the case; what it holds, in a line. Raises SonicBulletError."""
     if mesh is not None:
         from sonic_bullet.modal import read_mesh
 
@@ -75,10 +105,9 @@ def run_case_new(
     _written(
         place,
         name_of,
-        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium),
+        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_is, medium, hold_out),
     )
-    print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}"))
-    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
+    return f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}")
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
@@ -121,23 +150,27 @@ def _described(
     sounds: Sequence[str],
     thing: dict[str, Any],
     response: str,
-    sensor_at: Point | None,
-    sensor_direction: Point | None,
+    sensor_is: tuple[Point | None, Point | None],
     medium: str | None,
+    hold_out: int | None,
 ) -> dict[str, Any]:
     """What case.json holds: every field one may want to fill, null where it is not known."""
     strike = {"position": None, "direction": None, "impulse": None}
     of = {"object": "object"} if thing else {}
+    held = [hold_out is not None and k % hold_out == 0 for k in range(1, len(sounds) + 1)]
     return {
         "format": FORMAT,
         "case": Path(os.path.realpath(place)).name,
         "objects": {"object": thing} if thing else {},
         "support": {"fixed": []},
-        "sensor": {"response": response, "position": sensor_at, "direction": sensor_direction},
+        "sensor": {"response": response, "position": sensor_is[0], "direction": sensor_is[1]},
         "medium": medium,
         "band_hz": [20, 20_000],
         "onset": None,
-        "recordings": [{"file": name, **of, "split": "fit", "channel": None, "strike": strike} for name in sounds],
+        "recordings": [
+            {"file": name, **of, "split": "holdout" if out else "fit", "channel": None, "strike": strike}
+            for name, out in zip(sounds, held, strict=True)
+        ],
     }
 
 
