@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -23,6 +22,7 @@ from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
 from sonic_bullet.files.recordings import channel_of, channel_words
 from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.errors import FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})
@@ -68,46 +68,29 @@ def run_case_new(
             f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
             "give --sensor velocity, or leave it out",
         )
-    with tempfile.TemporaryDirectory() as folder_of_takes:
-        if split:
-            sounds, rows = cut_takes(sounds, Path(folder_of_takes))
-            print(table(TAKE_COLUMNS, rows))
-        for sound in sounds:
-            read_audio(sound)
-        written = _new_case(
-            place, sounds, mesh, units, material, sensor, (sensor_at, sensor_direction), medium, hold_out
-        )
-    print(written)
-    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
-
-
-def _new_case(
-    place: Path,
-    sounds: Sequence[Path],
-    mesh: str | None,
-    units: str,
-    material: str | None,
-    sensor: str,
-    sensor_is: tuple[Point | None, Point | None],
-    medium: str | None,
-    hold_out: int | None,
-) -> str:
-    """Write the case; what it holds, in a line. Raises SonicBulletError."""
     if mesh is not None:
         from sonic_bullet.modal import read_mesh
 
         read_mesh(mesh, UNITS[units])
     thing = _object(mesh, units, material)
-    listed = [*sounds, *([Path(mesh)] if mesh is not None else [])]
-    name_of = _names(place, listed)
-    if mesh is not None:
-        thing["mesh"] = name_of[Path(mesh)]
-    _written(
-        place,
-        name_of,
-        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_is, medium, hold_out),
-    )
-    return f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}")
+    with temporary_folder() as takes:
+        if split:
+            sounds, rows = cut_takes(sounds, takes)
+            print(table(TAKE_COLUMNS, rows))
+        else:
+            for sound in sounds:
+                read_audio(sound)
+        name_of = _names(place, [*sounds, *([Path(mesh)] if mesh is not None else [])])
+        if mesh is not None:
+            thing["mesh"] = name_of[Path(mesh)]
+        case = _described(
+            place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium
+        )
+        for recording in case["recordings"][hold_out - 1 :: hold_out] if hold_out is not None else []:
+            recording["split"] = "holdout"
+        _written(place, name_of, case)
+    print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {thing['mesh']}"))
+    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
@@ -150,27 +133,23 @@ def _described(
     sounds: Sequence[str],
     thing: dict[str, Any],
     response: str,
-    sensor_is: tuple[Point | None, Point | None],
+    sensor_at: Point | None,
+    sensor_direction: Point | None,
     medium: str | None,
-    hold_out: int | None,
 ) -> dict[str, Any]:
     """What case.json holds: every field one may want to fill, null where it is not known."""
     strike = {"position": None, "direction": None, "impulse": None}
     of = {"object": "object"} if thing else {}
-    held = [hold_out is not None and k % hold_out == 0 for k in range(1, len(sounds) + 1)]
     return {
         "format": FORMAT,
         "case": Path(os.path.realpath(place)).name,
         "objects": {"object": thing} if thing else {},
         "support": {"fixed": []},
-        "sensor": {"response": response, "position": sensor_is[0], "direction": sensor_is[1]},
+        "sensor": {"response": response, "position": sensor_at, "direction": sensor_direction},
         "medium": medium,
         "band_hz": [20, 20_000],
         "onset": None,
-        "recordings": [
-            {"file": name, **of, "split": "holdout" if out else "fit", "channel": None, "strike": strike}
-            for name, out in zip(sounds, held, strict=True)
-        ],
+        "recordings": [{"file": name, **of, "split": "fit", "channel": None, "strike": strike} for name in sounds],
     }
 
 
