@@ -114,7 +114,7 @@ def steps() -> None:
             times.append(time.process_time() - start)
 
         begun = time.process_time()
-        density = np.maximum(noise_density.noise_density(x, tail=True), 1e-12)
+        density = np.maximum(noise_density.noise_density(x, SR, (20, 21_600), tail=True), 1e-12)
         pole = subspace.poles(x, SR, density, (20, 21_600), BAND_HZ, FASTEST_PER_S)
         timed("poles by bands", pole, begun)
         if len(freq) == 100:

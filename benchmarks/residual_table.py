@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
-from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
+from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, strike_modes
 from sonic_bullet.estimator.fit.recorded import onset_sample
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.estimator.lines.log_spectral import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
-from sonic_bullet.estimator.residual.recorded_strikes import Strikes, case_strikes, strike_modes, strikes_of
+from sonic_bullet.estimator.residual.recorded_strikes import Strikes, case_strikes, strikes_of
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Array

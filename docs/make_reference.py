@@ -196,7 +196,10 @@ def commands_page() -> str:
     ]
     parts += [
         "130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes "
-        "JSON to stdout."
+        "JSON to stdout.",
+        "",
+        "What is being done stands on stderr. A terminal shows one line of it. Elsewhere there is a line a stage, and",
+        "every 4 s at least, such as `[12 s] render drop.py: modes of bowl: …`. `SONIC_BULLET_PROGRESS=0` silences it.",
     ]
     for path, command in walked("sonic-bullet", cli):
         context = click.Context(command, info_name=path, terminal_width=WIDTH, max_content_width=WIDTH)

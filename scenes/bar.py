@@ -22,4 +22,4 @@ def build(client):
         client.changeDynamics(body, -1, restitution=0.9, linearDamping=0, angularDamping=0)
     client.resetBaseVelocity(ball, [0, 0, -1.0])
     sb.keep_restitution(client)
-    return {bar: "steel", ball: "steel"}
+    return {bar: {"material": "steel", "name": "bar"}, ball: {"material": "steel", "name": "ball"}}

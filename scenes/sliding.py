@@ -24,4 +24,7 @@ def build(client):
     client.changeDynamics(box, -1, lateralFriction=0.5)
     client.resetBaseVelocity(box, [1.5, 0, 0])
     sb.keep_restitution(client)
-    return {board: {"material": "wood", "roughness_m": 3e-6}, box: {"material": "wood", "roughness_m": 3e-6}}
+    return {
+        board: {"material": "wood", "name": "board", "roughness_m": 3e-6},
+        box: {"material": "wood", "name": "box", "roughness_m": 3e-6},
+    }

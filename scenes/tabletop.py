@@ -23,15 +23,15 @@ def build(client):
     table = client.createMultiBody(
         0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.45, 0.3, 0.012]), basePosition=[0, 0, -0.012]
     )
-    cast = {table: {"material": "spruce", "count": 120}}
+    cast = {table: {"material": "spruce", "name": "table", "count": 120}}
 
-    def place(material, volume, shape, position, euler=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
+    def place(name, material, volume, shape, position, euler=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
         mass = DENSITY_KG_M3[material] * volume
         body = client.createMultiBody(
             mass, shape, basePosition=position, baseOrientation=client.getQuaternionFromEuler(euler)
         )
         client.resetBaseVelocity(body, velocity, spin)
-        cast[body] = material
+        cast[body] = {"material": material, "name": name}
         return body
 
     def mesh(name):
@@ -39,13 +39,20 @@ def build(client):
 
     ball, marble, block, rod = 0.014, 0.009, [0.04, 0.025, 0.02], (0.006, 0.16)
     sphere = client.createCollisionShape(client.GEOM_SPHERE, radius=ball)
-    place("porcelain", VOLUME_M3["plate"], mesh("plate"), [-0.18, 0.08, 0.16], (0.25, 0.1, 0))
-    place("steel", VOLUME_M3["bowl"], mesh("bowl"), [0.2, 0.1, 0.22], (0.5, 0.2, 0))
-    place("glass", VOLUME_M3["tumbler"], mesh("tumbler"), [0.02, 0.05, 0.052])
+    place("plate", "porcelain", VOLUME_M3["plate"], mesh("plate"), [-0.18, 0.08, 0.16], (0.25, 0.1, 0))
+    place("bowl", "steel", VOLUME_M3["bowl"], mesh("bowl"), [0.2, 0.1, 0.22], (0.5, 0.2, 0))
+    place("tumbler", "glass", VOLUME_M3["tumbler"], mesh("tumbler"), [0.02, 0.05, 0.052])
     place(
-        "steel", 4 / 3 * math.pi * ball**3, sphere, [-0.4, -0.12, ball], velocity=(0.5, 0, 0), spin=(0, 0.5 / ball, 0)
+        "ball",
+        "steel",
+        4 / 3 * math.pi * ball**3,
+        sphere,
+        [-0.4, -0.12, ball],
+        velocity=(0.5, 0, 0),
+        spin=(0, 0.5 / ball, 0),
     )
     place(
+        "block",
         "wood",
         8 * math.prod(block),
         client.createCollisionShape(client.GEOM_BOX, halfExtents=block),
@@ -53,6 +60,7 @@ def build(client):
         velocity=(-1.6, 0, 0),
     )
     place(
+        "rod",
         "steel",
         math.pi * rod[0] ** 2 * rod[1],
         client.createCollisionShape(client.GEOM_CYLINDER, radius=rod[0], height=rod[1]),
@@ -62,6 +70,7 @@ def build(client):
     for i in range(3):
         shape = client.createCollisionShape(client.GEOM_SPHERE, radius=marble)
         place(
+            f"marble {i + 1}",
             "glass",
             4 / 3 * math.pi * marble**3,
             shape,
@@ -74,7 +83,7 @@ def build(client):
         client.getQuaternionFromEuler((0.4, 0.2, 0)),
     )
     client.changeDynamics(toy, -1, mass=700 * 86.9e-6, localInertiaDiagonal=[6e-5, 4e-5, 8e-5])  # the file says 1 kg·m²
-    cast[toy] = "wood"
+    cast[toy] = {"material": "wood", "name": "toy"}
     for body in cast:
         client.changeDynamics(
             body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5

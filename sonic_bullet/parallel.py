@@ -23,6 +23,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.reduction import ForkingPickler
 from typing import Any, TypeVar
 
+from sonic_bullet.machine.progress import PipeSay, clear_stage, waiting_for
+from sonic_bullet.machine.worker import end_with
+
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
@@ -51,6 +54,8 @@ def said_here(say: Callable[[str], None]) -> Callable[[str], None]:
     """``say`` for what runs in a `parallel_map`: what the other process says is said by this one, when it next listens.
     A caller's function is then called where the caller is.
     """
+    if isinstance(say, PipeSay):  # its pipe is every process's
+        return say
 
     def tell(text: str) -> None:
         out = _OUT.get()
@@ -139,6 +144,7 @@ def _sent(ours: Connection, what: Any) -> bool:
 def _make_asked(make: Callable[[int], Any], room: Any, ours: Connection, theirs: Connection, parent: int) -> None:
     """The other process of `arrays_in_order`: makes what it is asked for; what it cannot make ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with(parent)
     ours.close()
     with suppress(Exception):
         while os.getppid() == parent:
@@ -157,12 +163,13 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
     try:
         while (i := _next(taken)) < len(listed):
             made[i] = do(listed[i])
-        while (found := _received(ours)) is not None:
-            number, what = found
-            if number is None:
-                say(what)
-            else:
-                made[number] = what
+        with waiting_for(other.pid):
+            while (found := _received(ours)) is not None:
+                number, what = found
+                if number is None:
+                    say(what)
+                else:
+                    made[number] = what
         return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
     finally:
         _INSIDE.reset(before)
@@ -231,6 +238,7 @@ def _help(
 ) -> None:
     """The other process: results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
+    end_with(parent)
     ours.close()
     _OUT.set(theirs)
     with suppress(OSError):  # nobody listens any more
@@ -240,4 +248,5 @@ def _help(
             except Exception:  # done again where it can be told, or sent nowhere
                 continue
             theirs.send_bytes(message)
+        clear_stage()
         theirs.send(None)

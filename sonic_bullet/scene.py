@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -36,6 +36,7 @@ from sonic_bullet.listener import (
     seen_settings,
     watch_settings,
 )  # fmt: skip
+from sonic_bullet.machine.progress import Say, says_so
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
@@ -43,13 +44,14 @@ from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletErr
 from sonic_bullet.render import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
-from sonic_bullet.session.links_of_script import add_links
+from sonic_bullet.session.links_of_script import add_links, named_links
+from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choosing
 from sonic_bullet.session.scene_file import defines_build, scene_module, user_code, uses_sonic_bullet
+from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_added
 
 DEFAULT_SECONDS = 4.0
 DEFAULT_MATERIAL = "plastic"
 Progress = Callable[[float], None]
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +72,7 @@ class RenderResult:
         return self.sound.samples()
 
 
+@says_so(text="say", fraction="progress")
 def render_scene(
     path: str | Path,
     *,
@@ -78,6 +81,8 @@ def render_scene(
     seed: int = 0,
     microphones: MicrophoneLike | None = None,
     material: str | Path | Material | None = None,
+    materials: Mapping[str, str | Path | Material] | None = None,
+    silent: Iterable[str] = (),
     residual: bool = True,
     supports: bool = True,
     progress: Progress | None = None,
@@ -87,19 +92,19 @@ def render_scene(
 ) -> RenderResult:
     """Run a scene for ``seconds`` of physics time and return its sound.
 
-    seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of the
-    bodies of a plain script. residual: whether what materials sound beside their modes is sounded. supports: whether
-    what a body stands on takes of its modes, as `attach` has it. progress is given the share done, say what is being
-    computed before the first step (modes: seconds a body). at_end: is shown the listener while its world is
-    still there. tail_db: what rings is followed after the last step until it is that far below the peak, -60 say, at
-    most 10 s; None, 0: not. Raises SonicBulletError; where the scene broke or was interrupted under way, the exception
-    carries what was rendered so far as ``partial``.
+    seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of all
+    that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those whom
+    no sensor hears, though they touch and vibrate. residual: whether what materials sound beside their modes is
+    sounded. supports: whether what a body stands on takes of its modes, as `attach` has it. progress is given the share
+    done, say what is being computed. at_end: is shown the listener while its world is still there. tail_db: how far
+    below the peak what rings after the last step ends, -60 say, at most 10 s; None, 0: not. Raises SonicBulletError;
+    where the scene broke or was interrupted under way, the exception carries what was rendered so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "material": None if material is None else as_material(material),
+        "choice": as_choice(material, materials, silent),
         "residual": as_flag(residual, "residual"),
         "supports": as_flag(supports, "supports"),
     }
@@ -116,6 +121,7 @@ def render_scene(
             with suppress(SonicBulletError):  # a script's own listener may keep nothing
                 error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
+        stage.check_names()
         return stage.result(notes, tail_db)
 
 
@@ -128,6 +134,8 @@ def run_scene(
     seed: int = 0,
     microphones: MicrophoneLike | None = None,
     material: str | Path | Material | None = None,
+    materials: Mapping[str, str | Path | Material] | None = None,
+    silent: Iterable[str] = (),
     progress: Progress | None = None,
     say: Say | None = None,
 ) -> tuple[str, ...]:
@@ -140,10 +148,11 @@ def run_scene(
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "material": None if material is None else as_material(material),
+        "choice": as_choice(material, materials, silent),
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():
         notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"), progress, say)
+        stage.check_names()
         return (*notes, *stage.need_listener().notes)
 
 
@@ -155,42 +164,16 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
     Raises SonicBulletError.
     """
     as_call(say, "say")
-    quiet = _stage(path, sr=8_000, seed=0, microphones=(), material=None)  # nobody hears it: contacts alone
+    quiet = _stage(path, sr=8_000, seed=0, microphones=())  # nobody hears it: contacts alone
     with quiet as stage, seen_settings() as seen:
         stage.run(as_seconds(seconds, "seconds"), None, say)
         listener = stage.need_listener()
-        return (*diagnose_world(listener.world, seen=seen), *_nothing_added(listener), *_mute_bodies(listener))
-
-
-def _nothing_added(listener: Listener) -> tuple[Finding, ...]:
-    if not listener.world.has_bodies or any(body.material is not None for body in listener.world.bodies):
-        return ()
-    return (
-        Finding(
-            "nothing-added",
-            "error",
-            "no body has a material: all are silent partners",
-            "add(body, material=…), or return it in build's cast",
-        ),
-    )
+        return (*diagnose_world(listener.world, seen=seen), *find_nothing_added(listener), *find_mute_bodies(listener))
 
 
 def as_seconds(seconds: object, name: str) -> float:
     """A length of physics time. Raises SceneError."""
     return as_number(seconds, name, "give seconds of physics time, above 0", above=0, most=1e6, error=SceneError)
-
-
-def _mute_bodies(listener: Listener) -> tuple[Finding, ...]:
-    return tuple(
-        Finding(
-            "no-audible-mode",
-            "info",
-            f"body {body.body_id} link {body.link} ({body.name}) has no mode below 20 kHz: it clicks but does not ring",
-            "nothing to mend; a larger or thinner body rings",
-        )
-        for body in listener.world.bodies
-        if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
-    )
 
 
 @dataclass(slots=True)
@@ -201,7 +184,7 @@ class _Stage:
     sr: int
     seed: int
     microphones: tuple[Sensor, ...] | None
-    material: Material | None
+    choice: MaterialChoice = field(default_factory=MaterialChoice)
     residual: bool = True
     supports: bool = True
     begin: Callable[[Listener], object] | None = None
@@ -228,7 +211,7 @@ class _Stage:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
             run = _run_built if defines_build(self.path) else _run_plain
-            with running_scene(self.path):
+            with running_scene(self.path), choosing(self.choice):
                 return run(self, seconds, progress, say)
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
@@ -247,6 +230,13 @@ class _Stage:
         if self.listener is None:
             raise SceneError(f"scene '{self.path.name}' made no physics step", "call stepSimulation in it")
         return self.listener
+
+    def check_names(self) -> None:
+        """Raise SceneError where a name that was given a material, or silenced, is nobody's who is or was there."""
+        if self.choice:
+            world = self.need_listener().world
+            here = world.record_names([(*who, None) for who in world.all_links()])
+            self.choice.check_names([*here, *(body.name for body in world.bodies)], f"scene '{self.path.name}'")
 
     def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()
@@ -291,6 +281,11 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
     stage.listener = listener = stage.attached(client, places)
     stage.microphones = None
     user_code(stage.path, partial(listener.add_all, cast, progress=say))
+    said: tuple[str, ...] = ()
+    if stage.choice:
+        stage.check_names()
+        static = partial(is_static, client._client)
+        said = add_links(listener, named_links(listener.world, stage.choice), static, say)
     act = getattr(module, "act", None)
     stage.ready()
     own = getattr(module, "SECONDS", DEFAULT_SECONDS)
@@ -301,7 +296,7 @@ def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, 
         client.stepSimulation()
         if progress is not None:
             progress(min(listener.time_s / total, 1.0))
-    return ()
+    return said
 
 
 def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
@@ -324,7 +319,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
             what = f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name"
             raise SceneError(what, "write listener = sonic_bullet.attach(...)")
         return ()
-    material = stage.material or as_material(DEFAULT_MATERIAL)
+    material = stage.choice.everyone or as_material(DEFAULT_MATERIAL)
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
     stage.microphones = None
     known: set[int] = set()
@@ -343,7 +338,9 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
         stage.need_listener().step()
 
     run_script(stage.path, (before, after), total, progress=progress)
-    return (f"every body sounds as {material.name}: the script names no materials", *said)
+    apart = ", ".join(f"{name} as {one.name}" for name, one in stage.choice.named.items())
+    but = f", but {apart}" if apart else ""
+    return (f"every body sounds as {material.name}{but}: the script names no materials", *said)
 
 
 def _listener_in(names: dict[str, Any]) -> Listener | None:

@@ -36,8 +36,8 @@ from sonic_bullet.cli.examples import (
     RESIDUAL_EPILOG,
 )
 from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options
-from sonic_bullet.cli.play_command import play
-from sonic_bullet.cli.render_command import render
+from sonic_bullet.cli.scenes.play_command import play
+from sonic_bullet.cli.scenes.render_command import render
 from sonic_bullet.cli.soundtrack.film_command import film
 from sonic_bullet.cli.soundtrack.score_command import score
 
@@ -138,7 +138,7 @@ def materials(json_to: str | None) -> None:
 @json_option
 def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     """Name the settings of a scene that would ruin its sound, and how to mend them."""
-    from sonic_bullet.cli.scene_commands import run_doctor
+    from sonic_bullet.cli.scenes.scene_commands import run_doctor
 
     run_doctor(scene, seconds, json_to)
 
@@ -246,6 +246,8 @@ def case() -> None:
     metavar="A.wav [B.wav]...",
     help="The strikes' recordings. [default: all in the folder]",
 )
+@click.option("--split", is_flag=True, help="Cut recordings of several strikes into takes of one each.")
+@click.option("--hold-out", type=int, metavar="N", help="Hold every N-th take out of the fit, to judge it by.")
 @click.option("--mesh", metavar="M", help="Mesh of what was struck.")
 @click.option("--units", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True, help="Of the mesh.")
 @click.option(

@@ -6,6 +6,7 @@ Examples:
   sonic-bullet render my_sim.py -o out.flac --material wood
   sonic-bullet render scenes/drop.py -o out.wav --contacts drop.npz --json
   sonic-bullet render scenes/drop.py -o out.wav --contacts small.npz --models reference
+  sonic-bullet render scenes/drop.py -o out.wav --material mug=glass --silent board
   sonic-bullet render drop.npz -o again.wav      (the same bits, without PyBullet)
   sonic-bullet render drop.npz -o stereo.wav --microphone 0,-1,0.5 --microphone 0,1,0.5"""
 
@@ -48,6 +49,7 @@ A verdict is none, explained, unexplained or worse-than-silence (exit 1)."""
 CASE_EPILOG = """\b
 Examples:
   sonic-bullet case new my_case --mesh bar.obj --recordings taps/*.wav --material steel --sensor pressure
+  sonic-bullet case new my_taps long_recording.wav --split --hold-out 3
   sonic-bullet case check my_case
   sonic-bullet fit my_case -o preset.json"""
 

@@ -12,7 +12,7 @@ from typing import Any
 import click
 import numpy as np
 
-from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, write_csv
+from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, take_tables, write_csv
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
 from sonic_bullet.files.cases import LARGEST, Case, CaseObject, CaseRecording, medium_of, read_case
 from sonic_bullet.records import Array
@@ -172,43 +172,23 @@ def described(found: Any) -> dict[str, Any]:
     }
 
 
-def _takes(found: Any) -> list[str]:
-    """How far the prediction of each take is, in a table; nothing where no take could be compared."""
-    if not found.takes:
-        return []
-
-    def shown(value: float) -> str:
-        return f"{value:.1f} dB" if np.isfinite(value) else "-"
-
-    held = all(t.split == "holdout" for t in found.takes)
-    head = "takes that were not fitted" if held else "takes, as none is held out"
-    rows = [
-        (
-            t.file,
-            shown(t.predicted_db),
-            shown(t.silence_db),
-            shown(t.other_take_db),
-            "fitted" if t.free_gain else "known",
-        )
-        for t in found.takes
-    ]
-    return [table((head, "predicted", "silence", "nearest other take", "gain"), rows)]
-
-
 def line_rows(found: Any) -> list[dict[str, Any]]:
     """A row an observed line, object by object: frequency, decay, T60, η and Q with spreads, and the fitted mode it is.
 
     mode_hz is None where the line is no mode.
     """
     rows = []
-    for o in found.objects:
-        lines = o.evidence.lines
-        mode = dict(zip(o.line[o.line >= 0].tolist(), o.freq_hz[o.line >= 0].tolist(), strict=True))
+    shaped = {o.evidence.thing.name: o for o in found.objects}
+    for e in found.evidence:
+        lines, o = e.lines, shaped.get(e.thing.name)
+        mode = (
+            {} if o is None else dict(zip(o.line[o.line >= 0].tolist(), o.freq_hz[o.line >= 0].tolist(), strict=True))
+        )
         for k in range(len(lines.freq_hz)):
             freq, decay, sd = lines.freq_hz[k], lines.decay_per_s[k], lines.identified_sd_per_s[k]
             own = {"freq_hz": freq, "freq_sd_hz": lines.freq_sd_hz[k], "decay_per_s": decay, "decay_sd_per_s": sd}
             rows.append(
-                {"object": o.evidence.thing.name}
+                {"object": e.thing.name}
                 | {name: finite(value) for name, value in own.items()}
                 | decay_values(freq, decay, sd)
                 | {"mode_hz": mode.get(k)}
@@ -235,7 +215,7 @@ def _summary(found: Any) -> str:
         ("sigma", *shown(fit.sigma, sd[3])),
     ]
     paired = sum(int((o.line >= 0).sum()) for o in found.objects)
-    lines = sum(len(o.evidence.lines.freq_hz) for o in found.objects)
+    lines = sum(len(e.lines.freq_hz) for e in found.evidence)
     correction: Array = (
         np.concatenate([o.correction[o.line >= 0] for o in found.objects]) if found.objects else np.zeros(0)
     )
@@ -262,5 +242,5 @@ def _summary(found: Any) -> str:
         )
     if found.log_spectral_db >= 0:
         text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
-    text += _takes(found)
+    text += take_tables(found.takes)
     return "\n".join(text)

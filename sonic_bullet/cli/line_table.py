@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from sonic_bullet.cli.output import table
+
 Row = dict[str, float | int | None]
 
 
@@ -58,3 +60,26 @@ def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequenc
     writer.writerows(rows)
     with replacing(path) as file:
         file.write(text.getvalue().encode())
+
+
+def take_tables(takes: Any) -> list[str]:
+    """How far the prediction of each take is, in a table; nothing where no take could be compared."""
+    if not takes:
+        return []
+
+    def shown(value: float) -> str:
+        return f"{value:.1f} dB" if math.isfinite(value) else "-"
+
+    held = all(t.split == "holdout" for t in takes)
+    head = "takes that were not fitted" if held else "takes, as none is held out"
+    rows = [
+        (
+            t.file,
+            shown(t.predicted_db),
+            shown(t.silence_db),
+            shown(t.other_take_db),
+            "fitted" if t.free_gain else "known",
+        )
+        for t in takes
+    ]
+    return [table((head, "predicted", "silence", "nearest other take", "gain"), rows)]

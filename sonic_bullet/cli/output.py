@@ -3,7 +3,7 @@
 result -> JSON  -> PATH, or stdout and nothing else there
        -> text  -> stdout
 warnings        -> stderr, a line each
-progress        -> stderr, on a terminal only
+progress        -> stderr: on a terminal one line, rewritten, else a line a stage and every 4 s
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.machine.terminal import shown_by, status
+from sonic_bullet.machine.progress import is_shown, on_terminal, percent, shown_by, status
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
@@ -132,11 +132,12 @@ def write_json(json_to: str | None, value: Any) -> None:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
-    """A function of the share done and one of what is being done before that, drawn on a terminal's stderr; in a pipe
-    they do nothing.
+    """A function of the share done and one of what is being done before that, drawn on a terminal's stderr; in a
+    pipe, lines as of `status`.
     """
-    if not sys.stderr.isatty():
-        yield (lambda share: None), (lambda text: None)
+    if not (is_shown() and on_terminal()):
+        with status(label) as say:
+            yield percent(say), say
         return
     from rich.console import Console
     from rich.markup import escape

@@ -70,8 +70,16 @@ def scene_options(command: Any) -> Any:
             ),
             click.option(
                 "--material",
-                metavar="M",
-                help="Material of the bodies of a script that names none (a name or a preset file).",
+                metavar="[NAME=]M",
+                multiple=True,
+                help="Material (a name or a preset file) of the body NAME, or of all that sounds, whatever the scene "
+                "or log says; repeatable. Motion and mass stay.",
+            ),
+            click.option(
+                "--silent",
+                metavar="NAME",
+                multiple=True,
+                help="No microphone hears the body NAME; others touch it as before; repeatable.",
             ),
         )
     ):

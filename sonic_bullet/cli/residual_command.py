@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet.cli.fit_command import as_case
+from sonic_bullet.cli.line_table import take_tables
 from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
 from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.records import Residual
@@ -28,43 +30,41 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
 
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
         with status(source) as progress:
-            preset, strikes = (_shaped if whole else _unshaped)(source, one, progress)
+            preset, strikes, takes = (_shaped if whole else _unshaped)(source, one, progress)
         write_preset(str(to), preset)
         if picture is not None:
             from sonic_bullet.plots.residual_plot import write_residual_picture
 
             write_residual_picture(picture, strikes)
-        say(_summary(source, strikes.residual))
-    write_json(json_to, described(strikes.residual))
+        say("\n".join([_summary(source, strikes.residual), *take_tables(takes)]))
+    write_json(json_to, described(strikes.residual) | {"takes": [asdict(take) for take in takes]})
 
 
-def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
-    """Preset and strikes of a case, or of a recording of a known shape."""
+def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
+    """Preset and strikes of a case, or of a recording of a known shape; how near its takes are with the residual."""
     import msgspec
 
     from sonic_bullet.estimator.fit.fitted_preset import preset_of
+    from sonic_bullet.estimator.fit.held_out_takes import predicted_takes
     from sonic_bullet.estimator.fit.material_fit import fit_case
     from sonic_bullet.estimator.residual.recorded_strikes import case_strikes
     from sonic_bullet.residual.code import form_of
 
     case = as_case(source, one)
     warn(case.warnings)
-    if not any(
-        r.split == "fit" and r.file is not None and r.object in case.objects and case.objects[r.object].mesh is not None
-        for r in case.recordings
-    ):
+    if not any(r.split == "fit" and r.file is not None for r in case.recordings):
         raise FileError(
-            f"case {case.name} has no 'fit' recording of an object with a mesh",
-            "a residual is what a recording has beside its object's modes",
+            f"case {case.name} has no 'fit' recording", "a residual is what a recording has beside its object's modes"
         )
     found = fit_case(case, progress=progress)
     warn(found.warnings)
     progress("taking what is left")
     strikes = case_strikes(found)
-    return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes
+    takes = predicted_takes(found, residual=strikes.residual, progress=progress)
+    return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes, takes
 
 
-def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any]:
+def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
     """Preset and strikes of a recording without a shape: a named material, the recording's features in place
     of modes.
     """
@@ -93,7 +93,7 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
     warn(f"{source}: {words}" for words in [channel_words(len(sound), one["channel"])] if words)
     progress("looking for modes")
     strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
-    return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes
+    return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes, ()
 
 
 def described(residual: Residual) -> dict[str, Any]:

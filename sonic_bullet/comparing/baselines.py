@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
-from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels, onsets_s, t60_s
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels, level_words, onsets_s, t60_s
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.comparing.tolerance import (
@@ -180,7 +180,8 @@ def _changes(baseline: SceneBaseline, side: Side) -> list[str]:
     x = side.sound.samples()
     found = []
     if x.shape != (baseline.channels, baseline.frames):
-        found.append(f"length {baseline.frames / baseline.sr:.4g} → {x.shape[1] / side.sr:.4g} s, {len(x)} channels")
+        lasts = f"length {baseline.frames / baseline.sr:.4g} → {x.shape[1] / side.sr:.4g} s"
+        found.append(f"{lasts}, channels {baseline.channels} → {len(x)}")
     change = [
         (f, new - old)
         for f, old, new in zip(baseline.band_hz, baseline.band_db, band_levels(x, side.sr).tolist(), strict=False)
@@ -188,10 +189,10 @@ def _changes(baseline: SceneBaseline, side: Side) -> list[str]:
     ]
     if change:
         f, most = max(change, key=lambda pair: abs(pair[1]))
-        found.append(f"level at {f:g} Hz {most:+.2g} dB, the most of all bands")
+        found.append(f"it is {level_words(most)} than the baseline in the octave at {f:g} Hz, where they differ most")
     onsets, t60 = onsets_s(x, side.sr), t60_s(x, side.sr)
     if len(onsets) != len(baseline.onsets_s):
-        found.append(f"onsets {len(baseline.onsets_s)} → {len(onsets)}")
+        found.append(f"{len(baseline.onsets_s)} → {len(onsets)} onsets")
     if t60 is not None and baseline.t60_s is not None and abs(t60 / baseline.t60_s - 1) > 0.005:
         found.append(f"T60 {baseline.t60_s:.3g} → {t60:.3g} s")
     return found

@@ -25,6 +25,7 @@ from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, r
 from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records.coerce import as_call
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.render import render_kept
@@ -35,6 +36,7 @@ Tell = Callable[[str], None]
 ORDER = {True: 0, None: 1, False: 2}
 
 
+@says_so(text="say")
 def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> Comparison:
     """What of B is other than of A, and why.
 

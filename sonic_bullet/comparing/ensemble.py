@@ -73,7 +73,8 @@ class Audibility:
         """One line."""
         what = "beyond chance" if self.beyond_chance else "within chance"
         tail = f"; {self.note}" if self.note else ""
-        return f"{what}: rank {self.rank} of {self.runs + 1} (p = {self.p:.2g}) among starts 0.1 mm apart{tail}"
+        asked = f"its distance from A is rank {self.rank} of {self.runs + 1}, among runs of A started 0.1 mm apart"
+        return f"{what}: {asked} (p = {self.p:.2g}){tail}"
 
 
 @dataclass(slots=True, eq=False)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, at_common_rate, band_levels, onsets_s
+from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, at_common_rate, band_levels, level_words, onsets_s
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import CompareError
@@ -61,7 +61,7 @@ def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closen
     if abs(a.seconds - b.seconds) > 1e-6 or a.channels != b.channels:
         faults.append(f"length {a.seconds:.4g} → {b.seconds:.4g} s, channels {a.channels} → {b.channels}")
     if a.onset_count != b.onset_count:
-        faults.append(f"events {a.onset_count} → {b.onset_count}")
+        faults.append(f"onsets {a.onset_count} → {b.onset_count}")
     heights = [one for one in (*a.band_db, *b.band_db) if one is not None]
     floor = max(heights, default=0.0) - RANGE_DB
     change, most_hz = 0.0, 0.0
@@ -70,7 +70,9 @@ def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closen
         if abs(new - old) > abs(change):
             change, most_hz = new - old, f
     said = (
-        f"octave levels differ by {change:+.2g} dB at most, at {most_hz:g} Hz" if change else "octave levels are equal"
+        f"octave levels differ most at {most_hz:g} Hz, where the second sound is {level_words(change)}"
+        if change
+        else "octave levels are equal"
     )
     if abs(change) > tolerance_db:
         faults.append(said)

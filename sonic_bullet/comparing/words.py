@@ -73,7 +73,7 @@ def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
     what = one.what.removeprefix("start ")
     if one.at_a is not None and one.at_b is not None and same(one.a, one.b):
         return who, f"{head}{what} in step {one.at_a} → {one.at_b}"
-    return who, f"{head}{what}{change_words(one.what, one.a, one.b).removeprefix(one.what)} under way"
+    return who, f"{head}{what}{change_words(one.what, one.a, one.b).removeprefix(one.what)}, set while the scene runs"
 
 
 def logged_words(one: Logged) -> str:
@@ -103,7 +103,7 @@ def change_words(what: str, a: Any, b: Any) -> str:
         return f"{name} changed in {int((one != other).sum())} of {one.size} numbers"
     share = f" ({_percent(float(other) / float(one))})" if one.ndim == 0 and float(one) and key not in COUNTS else ""
     if key in ("start position",):
-        share = f" ({float(np.linalg.norm(other - one)) * 1000:.3g} mm away)"
+        share = f" (moved by {_distance(other - one)})"
     return f"{name} {shown(a)} → {shown(b)}{unit}{share}"
 
 
@@ -117,8 +117,19 @@ def _places(name: str, a: Any, b: Any) -> str:
         if p is None or q is None:
             moved.append(f"{number}: {type(x).__name__} → {type(y).__name__}")
         elif not np.array_equal(p, q):
-            moved.append(f"{number} is {float(np.linalg.norm(q - p)) * 100:.3g} cm away")
+            moved.append(f"{number} moved by {_distance(q - p)}, from {_point(p)} to {_point(q)} m")
     return f"{name.rstrip('s')} {', '.join(moved)}"
+
+
+def _distance(vector_m: Any) -> str:
+    """A length of a vector (3,) in m, in mm below 1 cm and in cm below 1 m."""
+    length_m = float(np.linalg.norm(vector_m))
+    factor, unit = (1000, "mm") if length_m < 0.01 else (100, "cm") if length_m < 1 else (1, "m")
+    return f"{length_m * factor:.3g} {unit}"
+
+
+def _point(place_m: Any) -> str:
+    return f"({', '.join(f'{x:.6g}' for x in place_m)})"
 
 
 def name_of(a: Side, b: Side, who: Who, link: int) -> str:

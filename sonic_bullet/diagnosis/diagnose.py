@@ -32,6 +32,7 @@ from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_samp
 from sonic_bullet.files import channel_of, read_audio
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 
@@ -66,6 +67,7 @@ class Diagnosis:
         return self.closed.verdict
 
 
+@says_so(text="progress")
 @one_thread()
 def diagnose(
     case: Case | str | os.PathLike[str],

@@ -61,6 +61,7 @@ class _Body(msgspec.Struct):
     dynamics: dict[str, float] = {}
     options: ModalOptions | None = None
     mounting: str | float = "free"
+    silent: bool = False
 
 
 class _Change(msgspec.Struct):
@@ -147,6 +148,7 @@ def pack_body(x: Body, material: int | None, model: int | None) -> _Body:
         pack_values(x.dynamics),
         x.options,
         x.mounting,
+        bool(x.silent),
     )
 
 

@@ -29,9 +29,10 @@ their own:
                      "body": index of who was moved, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
-      of each body: dynamics, options, mounting; of all: engine, versions, residual, supports (see `Body`, `ContactLog`)
+      of each body: dynamics, options, mounting, silent; of all: engine, versions, residual, supports (see `Body`,
+          `ContactLog`)
     format "sonic-bullet-contacts/2"        the same without pose_body (a step's bodies are the first of the log),
-          changes and all that the last line names; models' arrays are not deflated, and of their own types
+          changes and all that the lines above name; models' arrays are not deflated, and of their own types
     format "sonic-bullet-contacts/1"        and without events
 
 Steps are written and read by blocks (`step_entries`): a log may be larger than the memory.

@@ -11,7 +11,7 @@ from copy import copy
 from dataclasses import replace
 
 from sonic_bullet.listener.frames import decode
-from sonic_bullet.listener.names import Names
+from sonic_bullet.listener.names import Names, matched
 from sonic_bullet.records import Body
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.simulated import Change, Simulator, Values, finite
@@ -69,7 +69,8 @@ class Properties:
         dynamics = {**self.set_values.of(*decode(code)), **record.dynamics}
         self._now[index] = dynamics
         made = copy(record) if record.dynamics == dynamics else replace(record, dynamics=dynamics)
-        store(made, name=self.names.of(code, record.name))
+        name = self.names.of(code, record.name)
+        store(made, name=name, silent=matched(name, self.names.silent) is not None)
         return made
 
     def end(self, indices: Iterable[int]) -> None:

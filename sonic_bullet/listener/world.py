@@ -10,7 +10,7 @@ A second simulator derives from `World` and is handed to `sonic_bullet.attach` i
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
@@ -74,6 +74,19 @@ class World(ABC):
     @abstractmethod
     def name_of(self, body: int, link: int = -1) -> str:
         """What people call a link. Raises SceneError for an unknown one."""
+
+    def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
+        """What the records of links (body, link, name to be given) are or would be called, if all were added now."""
+        return [given or self.name_of(body, link) for body, link, given in links]
+
+    def all_links(self) -> tuple[tuple[int, int], ...]:
+        """(body, link) of every link in the world that could touch something; by default of those in `living`."""
+        return tuple((body.body_id, body.link) for body in self.living)
+
+    def silence(self, names: Collection[str]) -> None:
+        """Records of links, or of all links of bodies, called so are `silent` from now on. Raises SceneError."""
+        if names:
+            raise SceneError("this simulator silences nobody", "leave silent out")
 
     @abstractmethod
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:

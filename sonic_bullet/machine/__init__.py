@@ -1,3 +1,1 @@
-"""What the machine under us asks for: private folders, locked files that are not finished, compiled code, a terminal's
-line.
-"""
+"""What the machine under us asks for: private folders, locked files that are not finished, compiled code, progress."""

@@ -26,6 +26,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, compile_result
 from numba.core.serialize import dumps
 
+from sonic_bullet.machine.progress import show_stage
+
 
 class _Environments:
     """Stands where a part's code generator would be told where its constants lie: kept until its code has a place."""
@@ -147,7 +149,7 @@ class _WholeCompiler(_Compiler):
     library = Whole
 
     def compile_extra(self, function: Callable[..., Any]) -> Any:
-        with _undisturbed():
+        with _undisturbed(), show_stage(f"compiling {function.__name__}"):
             return super().compile_extra(function)
 
 

@@ -1,7 +1,7 @@
 """Somebody who waits for a command and outlives it: a process that does nothing else.
 
     supervisor ── fork ─► worker: runs the command, its scene, PyBullet, Netgen, compilers
-        ◄── lines: scene, left, closing, done (`worker`) ; Python lines of a crash (faulthandler)
+        ◄── lines: scene, left, closing, done (`worker`), stage (`progress`) ; Python lines of a crash (faulthandler)
         ──► SIGINT, SIGTERM passed on; SIGKILL to what does not end
 
 A scene may end its process without a word, crash in C, or never step; a long call of C hears no signal. The worker says
@@ -30,8 +30,19 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from sonic_bullet.machine import worker
-from sonic_bullet.machine.worker import ASK_WHERE, END_IDLE, STOPS, catch_stops, connect, escaped, scene_line, tell
+from sonic_bullet.machine import progress, worker
+from sonic_bullet.machine.worker import (
+    ASK_WHERE,
+    END_IDLE,
+    STOPS,
+    catch_stops,
+    connect,
+    end_with,
+    escaped,
+    process_control,
+    scene_line,
+    tell,
+)
 from sonic_bullet.records.errors import SceneError
 
 IDLE_S = 10.0
@@ -51,7 +62,7 @@ STAND_INS = f"{PACKAGE}/listener/pybullet/"
 LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
 _FORKS_EARLY_ONLY = sys.platform != "linux"
 """Where libraries forbid a fork once they are there (macOS)."""
-SUBREAPER, DEATH_SIGNAL = 36, 1  # prctl(2)
+SUBREAPER = 36  # prctl(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +89,7 @@ class _Worker:
     trace: str = ""
     unread: bytes = b""
     status: int | None = None
+    lines: progress.ProgressLines | None = None
 
     def listen(self, wait_s: float) -> None:
         """Read what it says, for at most that long."""
@@ -91,7 +103,11 @@ class _Worker:
                 self._take(*line.decode("utf-8", "surrogateescape").partition(" ")[::2])
 
     def _take(self, kind: str, text: str) -> None:
-        if kind == "scene":
+        if kind == "stage" and self.lines is not None:
+            self.lines.take(text)
+        elif kind == "stage":
+            progress.forward(text)
+        elif kind == "scene":
             self.scene = text
         elif kind == "left":
             self.left = [*(one for one in self.left if os.path.lexists(one)), text]
@@ -123,11 +139,12 @@ class _Worker:
         return self.trace
 
 
-def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
+def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "") -> Ending:
     """Call ``run`` in a process of its own and wait for its end, which is an exit code.
 
     alone: this process is the command's: interrupts are passed on, and the worker ends as an interpreter does; else the
     caller goes on, and what interrupts it ends the worker.
+    command: heads lines of progress; "": there are none before a stage is said.
     """
     if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
         if alone:
@@ -136,7 +153,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
     said, traces, clock = os.pipe(), os.pipe(), mmap.mmap(-1, 8)
     sys.stdout.flush(), sys.stderr.flush()
     signal.pthread_sigmask(signal.SIG_BLOCK, STOPS)  # neither process misses one between fork and handler
-    tied, before = _prctl(SUBREAPER, 1), set() if alone else set(_children())
+    tied, before = process_control(SUBREAPER, 1), set() if alone else set(_children())
     here = os.getpid()
     process = os.fork()
     if not process:
@@ -144,6 +161,8 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
         _work(run, (said[1], traces[1]), clock, alone, here)
     _close(said[1], traces[1])
     child = _Worker(process, said[0], traces[0], clock)
+    if alone and progress.is_shown() and not progress.on_terminal():
+        child.lines = progress.ProgressLines(command, time.monotonic(), progress.COMMAND_QUIET_S)
     stops: list[int] = []
     if alone:
         for word in STOPS:
@@ -154,18 +173,17 @@ def supervised(run: Callable[[], int], *, alone: bool = True) -> Ending:
         return _wait(child, stops)
     finally:
         child.kill()
+        progress.clear_stage(child.process)
         _clean_up(child, tied, before)
         _close(child.said, child.traces)
         if not alone:
-            _prctl(SUBREAPER, 0)
+            process_control(SUBREAPER, 0)
 
 
 def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool, parent: int) -> None:
     """The worker, which does not return."""
     leave = os._exit
-    _prctl(DEATH_SIGNAL, signal.SIGKILL)
-    if os.getppid() != parent:
-        leave(1)
+    end_with(parent)
     connect(*fds, clock, _end_idle)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPS)
     code = 2
@@ -205,6 +223,8 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
     while child.code is None and not child.has_ended():
         child.listen(POLL_S)
         now = time.monotonic()
+        if child.lines is not None and not stops and child.code is None and (line := child.lines.due(now)):
+            progress.write_line(line)
         if len(stops) > sent:
             if sent and now - stopped_at > 0.2:  # asked twice
                 break
@@ -221,9 +241,9 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
         if now - max(own_since, asked_at) > ASK_S or (now - own_since > IDLE_S and now - asked_at > ASK_S):
             asked_at = now
             found = _judgement(child.where(), child.scene)
-            if found == "ours":
+            if found != "own":  # a call into C that lasts does not answer
                 own_since = now
-            elif found == "own" and now - own_since > IDLE_S and not os.environ.get("SONIC_BULLET_DEBUG"):
+            elif now - own_since > IDLE_S and not os.environ.get("SONIC_BULLET_DEBUG"):
                 if ended_idle is not None:
                     break
                 ended_idle = _idle_words(Path(child.scene).name, _line_in(child.trace, child.scene))
@@ -326,12 +346,3 @@ def _children() -> list[int]:
             parent = place.read_text(errors="replace").rpartition(")")[2].split()[1]
             found += [int(place.parent.name)] * (int(parent) == os.getpid())
     return found
-
-
-def _prctl(option: int, value: int) -> bool:
-    """Linux: whether it was done."""
-    if sys.platform != "linux":
-        return False
-    import ctypes
-
-    return bool(ctypes.CDLL(None).prctl(option, value, 0, 0, 0) == 0)

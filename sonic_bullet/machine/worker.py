@@ -4,7 +4,7 @@ A message is one line of a pipe, written at once, so that lines of several proce
 
     scene PATH     whose code is run from here on          left PATH    to be removed where this process is killed
     exit  STACK    somebody calls os._exit                 closing      what was made so far is being written
-    done  CODE     the command has come to its end
+    done  CODE     the command has come to its end           stage …     what is being done (`progress`)
 
 The time of the last physics step stands in memory that both processes have.
 """
@@ -24,9 +24,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from sonic_bullet.machine.progress import open_sink
+
 LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
 ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)
 STOPS = {signal.SIGINT: "stopped", signal.SIGTERM: "terminated"}
+DEATH_SIGNAL = 1  # prctl(2)
 Handler = Callable[[int, FrameType | None], Any]
 
 
@@ -53,8 +56,10 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
 
     _LINE.fd, _LINE.clock, _LINE.process = fd, clock, os.getpid()
     catch_stops()
+    open_sink(fd)
     faulthandler.enable(traces, all_threads=False)
-    faulthandler.register(ASK_WHERE, traces, all_threads=False)  # type: ignore[arg-type]
+    # between two bytecodes: faulthandler, at any moment, ends a Python 3.12 or 3.13 now and then
+    signal.signal(ASK_WHERE, lambda _, frame: _say_where(traces, frame))  # type: ignore[arg-type]
     signal.signal(END_IDLE, at_idle)  # type: ignore[arg-type]
     leave = os._exit
 
@@ -74,10 +79,26 @@ def catch_stops() -> None:
             signal.signal(word, _stop)
 
 
+def _forget_stops() -> None:
+    """Have what ends a process end a fork of this one, at once: a pool ends its workers so."""
+    for word, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+        if signal.getsignal(word) is _stop:
+            signal.signal(word, handler)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_stops)
+
+
 def _lines_of(frame: FrameType | None) -> Iterator[str]:
     while frame is not None:
         yield f'File "{escaped(frame.f_code.co_filename)}", line {frame.f_lineno}'
         frame = frame.f_back
+
+
+def _say_where(traces: int, frame: FrameType | None) -> None:
+    with suppress(OSError):
+        os.write(traces, "".join(f"{line}\n" for line in _lines_of(frame)).encode())
 
 
 def escaped(path: str) -> str:
@@ -149,3 +170,19 @@ def temporary_folder() -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder:
         note_leftover(folder)
         yield Path(folder)
+
+
+def end_with(parent: int) -> None:
+    """Have this process, a fork, end with the one that it was forked from (Linux), or now where that one is gone."""
+    process_control(DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def process_control(option: int, value: int) -> bool:
+    """Linux: whether it was done."""
+    if sys.platform != "linux":
+        return False
+    import ctypes
+
+    return bool(ctypes.CDLL(None).prctl(option, value, 0, 0, 0) == 0)

@@ -17,6 +17,7 @@ import numpy as np
 
 from sonic_bullet.files import cache as store
 from sonic_bullet.geometry import oversize
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.sectors import MOST_MODES, Wanted
@@ -52,6 +53,7 @@ class _Unit:
     note: str
 
 
+@says_so(text="progress")
 @one_thread()
 def analyse(
     shapes: tuple[Shape, ...],
@@ -225,7 +227,9 @@ def _solve(
     if np.isfinite(found.error):
         note += f"; error at {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
         if found.error > asked.accuracy:
-            note += f", not the {100 * asked.accuracy:g} % asked for: that would cost too much, unless edge_m says so"
+            note += (
+                f", more than the {100 * asked.accuracy:g} % asked for: finer elements need more unknowns than allowed"
+            )
     return _Unit(
         found.value,
         np.ascontiguousarray(shown.shape[:, :, found.order]),

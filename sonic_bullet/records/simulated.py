@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from sonic_bullet.records.arrays import Array, frozen_array, store
 from sonic_bullet.records.bodies import Material, ModalModel
-from sonic_bullet.records.coerce import as_kind, as_number, as_text, as_whole, shown
+from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_text, as_whole, shown
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
@@ -67,7 +67,7 @@ class Body:
     until_step: the first in which it does not any more, or -1. dynamics: friction, restitution, damping, mass, as the
     simulator has them when the record begins (see `Change`). options: what was asked of its modes; None where nothing
     was, or the model was given, or an older log does not say. mounting: how it is held
-    (`records.mounting`).
+    (`records.mounting`). silent: no sensor hears it; it vibrates and touches as it does otherwise.
     """
 
     body_id: int
@@ -85,6 +85,7 @@ class Body:
     dynamics: Values = field(default_factory=dict)
     options: ModalOptions | None = None
     mounting: Mounting = "free"
+    silent: bool = False
 
     def __post_init__(self) -> None:
         where = f"body {shown(self.body_id)} link {shown(self.link)}"
@@ -100,6 +101,7 @@ class Body:
         if self.options is not None:
             as_kind(self.options, ModalOptions, f"{where}: options", "give ModalOptions, or none")
         store(self, mounting=as_mounting(self.mounting, f"{where}: mounting"))
+        as_flag(self.silent, f"{where}: silent")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,11 @@ class Change:
         known = frozen_values({name: x for name, x in self.values.items() if x is not None}, "a change")
         lost = {name: None for name in self.values if name not in known}
         store(self, values=ReadOnlyDict(dict(sorted((dict(known) | lost).items()))))
+
+
+def with_body_id(name: str, body: int) -> str:
+    """A body's or link's name in a message, with the body's id: "cube (body 3)"; "body 3" is plain enough."""
+    return name if name.split("/", maxsplit=1)[0] == f"body {body}" else f"{name} (body {body})"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Microphone
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
@@ -46,6 +47,7 @@ AT_ONCE = 64
 """Steps that a replay takes in at once, between two looks at how far it is."""
 
 
+@says_so(text="say", fraction="progress")
 def render_log(
     log: ContactLog,
     *,

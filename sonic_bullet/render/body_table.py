@@ -133,7 +133,7 @@ class BodyTable:
         # a silent partner's record begins where it first touches, not where it was put
         row["placed"] = -SPAN if material is None else body.since_step
         row["rebound"] = body.dynamics.get("restitution", UNKNOWN_REBOUND)
-        row["loaded"] = row["cause_step"] = NEVER
+        row["loaded"] = row["cause_step"] = row["since_step"] = NEVER
         return self._bodies.append(row)
 
     def copy(self) -> BodyTable:

@@ -15,6 +15,7 @@ from typing import Any
 import numba
 from numba import types
 
+from sonic_bullet.machine.progress import show_stage
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.render import driver
 
@@ -34,9 +35,10 @@ OF_A_STEP = ("position", "quaternion", "teleported")
 def make_driver(arguments: Sequence[Any]) -> None:
     """Have the driver's machine code for such arguments."""
     kinds = tuple(numba.typeof(one) for one in arguments)
-    with suppress(Exception):  # a numba whose inner parts moved: it is compiled by one process
-        _make_stages(kinds)
-    driver.advance_steps.compile(kinds)
+    with show_stage("machine code of the run time"):
+        with suppress(Exception):  # a numba whose inner parts moved: it is compiled by one process
+            _make_stages(kinds)
+        driver.advance_steps.compile(kinds)
 
 
 def _make_stages(kinds: tuple[Any, ...]) -> None:

@@ -12,7 +12,7 @@ without bound where the body is no longer small.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -109,6 +109,9 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             weight[row] = np.einsum("c,cxm,x->m", barycentric[0], corners, sensor.direction)
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
+    if body.silent:  # no sensor hears it; what it takes of its partners, and gives them, stays
+        weight[:] = 0.0
+        translation = None if translation is None else replace(translation, weight=0.0)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
     damping_growth = None if model.damping_growth_s_m is None else model.damping_growth_s_m[keep] * most
     return Resonator(

@@ -18,6 +18,7 @@ from sonic_bullet.radiation.compact import COMPACT
 from sonic_bullet.radiation.radiated import radiation_note
 from sonic_bullet.records import Array, Body, Microphone, Vibrometer
 from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.synth.strikes import SPAN
@@ -97,6 +98,9 @@ def why_silent(log: ContactLog) -> str | None:
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):
         return _untouched(log, rows, added)
+    silenced = np.array([body.silent for body in log.bodies], bool)
+    if not (added & ~silenced)[np.concatenate([rows.a[mine], rows.b[mine]])].any():
+        return f"all that was touched is silent as asked: {_names(body for body in log.bodies if body.silent)}"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
     return _mute(log, resonators) or _at_rest(log, rows, mine) or _arrives_late(log, mine)
@@ -130,9 +134,9 @@ def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
     if len(readers) == len(log.sensors):
         there = {(resonator.body.body_id, resonator.body.link) for resonator in ringing}
         if ringing and not any((sensor.body_id, sensor.link) in there for sensor in readers):
-            places = ", ".join(sorted({f"body {sensor.body_id} link {sensor.link}" for sensor in readers}))
+            places = ", ".join(sorted({_read_place(sensor, log) for sensor in readers}))
             return (
-                f"the vibrometer reads {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
+                f"the vibrometer is on {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
             )
     if ringing:
         return None
@@ -154,6 +158,12 @@ def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
         f"no audible mode: {_names(resonator.body for resonator in resonators)} has none below 20 kHz and does "
         "not move freely; a larger or thinner body rings"
     )
+
+
+def _read_place(sensor: Vibrometer, log: ContactLog) -> str:
+    bodies = [one for one in log.bodies if (one.body_id, one.link) == (sensor.body_id, sensor.link)]
+    base = f"body {sensor.body_id}" + (f" link {sensor.link}" if sensor.link >= 0 else "")
+    return _names(bodies[:1]) if bodies else base
 
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
@@ -188,13 +198,11 @@ def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     if begins_s + travels_s < log.duration_s:
         return None
     return (
-        f"the sound is still under way: the nearest microphone is {away:.3g} m off, {travels_s:.2g} s; run for "
-        "longer, or move it nearer"
+        f"the sound is still under way at the end: it needs {travels_s:.2g} s for the {away:.3g} m from the first "
+        f"contact, at {begins_s:.3g} s, to the nearest microphone; run for longer, or move it nearer"
     )
 
 
 def _names(bodies: Iterable[Body], most: int = NAMED) -> str:
-    names = [
-        body.name if body.name == f"body {body.body_id}" else f"{body.name} (body {body.body_id})" for body in bodies
-    ]
+    names = [with_body_id(body.name, body.body_id) for body in bodies]
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -51,6 +51,8 @@ BODY = np.dtype(
         ("loaded", "i8"),  # last step before the one looked at in which it carried load
         ("cause_m_s", "f8"),  # approach of its last strike that gravity and bouncing did not make, and its step
         ("cause_step", "i8"),
+        ("since_m_s", "f8"),  # approach of the fastest such strike after that one, and its step
+        ("since_step", "i8"),
     ],
     align=True,
 )

@@ -12,10 +12,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from sonic_bullet.geometry.triangles import LARGEST_M
+from sonic_bullet.listener.world import World
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import MaterialError, SonicBulletError
 from sonic_bullet.session.arguments import as_material
 from sonic_bullet.session.listening import Listener
+from sonic_bullet.session.material_choice import MaterialChoice, current_choice
 
 GROUND_M = 5.0
 """A static, flat body longer than this is ground: no board that is struck to sound is as long."""
@@ -40,9 +42,10 @@ def add_links(
         try:
             shapes = listener.world.shapes_of(*who)
             if static(*who) and is_ground(shapes):
-                listener.world.add(*who, material=as_material("concrete"))
+                made = _chosen_by_name(listener, who) or as_material("concrete")
+                listener.world.add(*who, material=made)
                 name = listener.world.name_of(*who)
-                notes.append(f"{name} is ground ({_long(shapes)}): a silent partner with concrete's contact")
+                notes.append(f"{name} is ground ({_long(shapes)}): a silent partner with {made.name}'s contact")
                 continue
             sounding[who] = material
         except SonicBulletError as error:
@@ -60,10 +63,24 @@ def add_links(
     return tuple(notes)
 
 
+def named_links(world: World, choice: MaterialChoice) -> dict[tuple[int, int], Material]:
+    """Links that a choice gives a material by name, and that were not added yet."""
+    added = {(body.body_id, body.link) for body in world.living if body.material is not None}
+    links = [who for who in world.all_links() if who not in added]
+    found = zip(links, world.record_names([(*who, None) for who in links]), strict=True)
+    made = {who: choice.material_of(name) for who, name in found if choice.names(name)}
+    return {who: one for who, one in made.items() if one is not None}
+
+
 def _silent(listener: Listener, who: tuple[int, int], error: SonicBulletError) -> str:
     name = listener.world.name_of(*who)
     what = error.what.removeprefix(f"{name}: ")
     return f"{name} is a silent partner: {what}; {HOW_IT_SOUNDS}"
+
+
+def _chosen_by_name(listener: Listener, who: tuple[int, int]) -> Material | None:
+    choice, (name,) = current_choice(), listener.world.record_names([(*who, None)])
+    return choice.material_of(name) if choice.names(name) else None
 
 
 def is_ground(shapes: tuple[Shape, ...]) -> bool:

@@ -10,9 +10,7 @@ not.
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -25,15 +23,16 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
-from sonic_bullet.machine.terminal import status
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options, shown
-from sonic_bullet.records.errors import AudioError, SceneError, SizeWarning
+from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
 from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.wanted_bodies import WantedBody, checked, oversize_notes, solved_bodies, wanted_body
+from sonic_bullet.session.material_choice import choose_materials, current_choice
+from sonic_bullet.session.wanted_bodies import WantedBody, checked, enter_bodies, solved_bodies, wanted_body
 
 
 def _opened(client: Any) -> World:
@@ -71,6 +70,7 @@ class Listener:
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = client if isinstance(client, World) else _opened(client)
+        self.world.silence(current_choice().silent)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
         how: dict[str, Any] = {"sr": self.sr, "sensors": self.sensors, "seed": self.seed, "air": self.air}
@@ -143,8 +143,8 @@ class Listener:
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
         relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
-        progress: called now and then with which link's modes or radiation are computed and how far that is; without
-        one, a terminal shows it. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        progress: called with which link's modes or radiation are computed and how far that is; without one, stderr
+        shows what takes over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
         SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
@@ -171,21 +171,18 @@ class Listener:
     ) -> list[tuple[ModalModel, ...]]:
         """The models of bodies that are listened to from now on."""
         as_call(progress, "progress")
-        wanted = checked(self.world, wanted)
-        with status("sonic_bullet") if progress is None else nullcontext(progress) as say:
-            models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, say)
+        asked = checked(self.world, wanted)
+        wanted = choose_materials(self.world, asked)
+        models = self._solved(wanted, progress=progress)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
-        for one in wanted:  # all of them first: a number is given to who has no name of its own
-            for link, name in zip(one.links, one.names, strict=bool(one.names)):
-                self.world.call(one.body, link, name)
-        for one, mine in zip(wanted, models, strict=True):
-            how: dict[str, Any] = {"material": one.material, "options": one.options if one.model is None else None}
-            how |= {} if one.mounting is None else {"mounting": one.mounting}
-            for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
-                self.world.add(one.body, link, model=model, shapes=shapes, **how)
-        for said in oversize_notes(wanted, models):
-            warnings.warn(said, SizeWarning, stacklevel=3)
-        return [tuple(mine) for mine in models]
+        return enter_bodies(self.world, wanted, models, asked)
+
+    @says_so(text="progress")
+    def _solved(
+        self, wanted: Sequence[WantedBody], *, progress: Callable[[str], None] | None = None
+    ) -> list[list[ModalModel]]:
+        assert progress is not None
+        return solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, progress)
 
     def step(self) -> Array:
         """Take in the physics step just made; returns `frame`.

@@ -9,10 +9,12 @@ gone through in order, one after another, as if there had been one process: the 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,7 @@ from sonic_bullet.parallel import one_thread, parallel_map, said_here
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, shown
-from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SonicBulletError
+from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeWarning, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.render import make_ready
@@ -120,7 +122,8 @@ def _naming(link: str, of: int) -> Iterator[None]:
         rest = "; or give another shape with mesh=" + (
             ", or add the other links one by one, by their names" if of > 1 else ""
         )
-        raise type(error)(f"{link}: {error.what}", error.remedy + rest) from error
+        what = error.what if error.what.startswith(f"{link} ") else f"{link}: {error.what}"
+        raise type(error)(what, error.remedy + rest) from error
 
 
 def solved_bodies(
@@ -144,13 +147,34 @@ def solved_bodies(
     return models
 
 
+def enter_bodies(
+    world: World,
+    wanted: Sequence[WantedBody],
+    models: Sequence[Sequence[ModalModel]],
+    asked: Sequence[WantedBody],
+) -> list[tuple[ModalModel, ...]]:
+    """Make links known to the world, with their models. asked: whose links these are, in turn; the models of each."""
+    for one in wanted:  # all of them first: a number is given to who has no name of its own
+        for link, name in zip(one.links, one.names, strict=bool(one.names)):
+            world.call(one.body, link, name)
+    for one, mine in zip(wanted, models, strict=True):
+        how: dict[str, Any] = {"material": one.material, "options": one.options if one.model is None else None}
+        how |= {} if one.mounting is None else {"mounting": one.mounting}
+        for link, (_, shapes), model in zip(one.links, one.parts, mine, strict=True):
+            world.add(one.body, link, model=model, shapes=shapes, **how)
+    for said in oversize_notes(wanted, models):
+        warnings.warn(said, SizeWarning, stacklevel=4)  # where `Listener.add` was called
+    each = chain.from_iterable(models)
+    return [tuple(islice(each, len(one.links))) for one in asked]
+
+
 def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
     """A line for each link larger than anything that is struck to sound."""
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     for one, mine in zip(wanted, models, strict=True):
-        for link, (name, _), model in zip(one.links, one.parts, mine, strict=True):
+        for (name, _), model in zip(one.parts, mine, strict=True):
             if large := oversize(model.vertex_m, model.mass_kg):
-                yield f"body {one.body} link {link} ({name}) {large}; {remedy}"
+                yield f"{name} {large}; {remedy}"
 
 
 def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:
@@ -208,7 +232,7 @@ def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: S
             radiation_of(model, air)
 
     def make(which: str, ready: Callable[[], None]) -> None:
-        say(f"machine code of {which}")
+        say(f"machine code of {which}, kept for later runs")
         ready()
 
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]

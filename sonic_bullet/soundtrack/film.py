@@ -18,6 +18,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import check_levels, gain_per_pa
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.pictures import Camera, Standing, open_pictures
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import arrays_in_order
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
@@ -75,6 +76,7 @@ def pictures_in(log: ContactLog, fps: Fraction, seconds: float | None = None) ->
     return max(math.ceil(wanted * fps), 1)
 
 
+@says_so(fraction="progress")
 def make_film(
     path: str | os.PathLike[str],
     log: ContactLog,

@@ -330,7 +330,7 @@ def test_a_log_with_wishes(scene: Path, asked: dict[str, Any]) -> None:
         (["scene.py"], "--output"),
         ([], "Missing argument"),
         (["cut.npz", "-o", "a.wav"], "cut.npz is cut"),
-        (["good.npz", "-o", "a.wav", "--material", "wood"], "--material"),
+        (["good.npz", "-o", "a.wav", "--material", "nobody=wood"], "called 'nobody'"),
         (["good.npz", "-o", "a.wav", "--seconds", "5"], "lasts 1.000 s"),
     ],
 )
@@ -457,6 +457,7 @@ def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(
     scene: Path, monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO]
 ) -> None:
     told = stream()
+    monkeypatch.delenv("SONIC_BULLET_PROGRESS", raising=False)
 
     def render_scene(path: object, **options: Any) -> RenderResult:
         options["say"]("modes of cup (body 3): assembling")

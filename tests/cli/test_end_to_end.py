@@ -143,7 +143,7 @@ def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sou
     assert again["frames"] == 9600
     parts = ("bodies", "engine", "versions", "events", "changes")
     assert {name: again[name] for name in parts} == {name: told[name] for name in parts}
-    assert [body["name"] for body in told["bodies"]] == ["the bar", "link0"]
+    assert [body["name"] for body in told["bodies"]] == ["the bar", "body 0"]
     assert told["bodies"][0]["options"]["count"] == 10 and told["engine"]["numSolverIterations"] == 50
     assert told["bodies"][0]["dynamics"]["linearDamping"] == 0.01, "as build set it"
     good(

@@ -213,3 +213,40 @@ def test_a_comparison_with_a_revision_that_is_stopped_leaves_no_tree(tmp_path: P
     assert status == 143, said
     assert not left_behind(tmp_path)
     assert subprocess.run([*git, "worktree", "list"], capture_output=True, check=True).stdout.count(b"\n") == 1
+
+
+def test_a_process_that_is_asked_at_every_moment_where_it_is_does_its_work() -> None:
+    """Whoever answers between two bytecodes cannot be met in the middle of a call, as a Python 3.12 or 3.13 was."""
+    work = (
+        "import sonic_bullet.machine.supervisor as s, sys, time\n"
+        "from pathlib import Path\n"
+        "from sonic_bullet.machine.worker import running_scene\n"
+        "s.ASK_S = 0.0\n"
+        "def run():\n"
+        "    end = time.monotonic() + 3\n"
+        "    with running_scene(Path('a.py')):\n"
+        "        while time.monotonic() < end:\n"
+        "            compile('def f(x):\\n return [y for y in range(x)]\\n' * 50, 'b', 'exec'), sorted(range(1000))\n"
+        "    return 7\n"
+        "sys.exit(s.supervised(run).code)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", work], cwd=REPO, check=False, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 7, done.stderr
+
+
+def test_a_pool_of_a_scene_ends_its_workers_as_everywhere() -> None:
+    """Which it does by a signal that is an interrupt of ours in the scene's own process alone."""
+    code = (
+        "import signal, sys\n"
+        "from multiprocessing import get_context\n"
+        "from sonic_bullet.machine.worker import catch_stops\n"
+        "catch_stops()\n"
+        "before = signal.getsignal(signal.SIGTERM)\n"
+        "with get_context('fork').Pool(1) as pool:\n"
+        "    assert pool.apply(signal.getsignal, (signal.SIGTERM,)) is signal.SIG_DFL\n"
+        "    assert pool.apply(signal.getsignal, (signal.SIGINT,)) is signal.default_int_handler\n"
+        "assert signal.getsignal(signal.SIGTERM) is before is not signal.SIG_DFL\n"
+    )
+    subprocess.run([sys.executable, "-c", AWAKE.replace(MAIN, code)], check=True, timeout=60)

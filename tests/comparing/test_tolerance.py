@@ -26,7 +26,7 @@ def measures(*sounds: Array) -> SoundMeasures:
 def test_a_gain_is_within_its_decibels(gain_db: float, within: bool) -> None:
     found = closeness(measures(ring(1000)), measures(ring(1000) * 10 ** (gain_db / 20)), 0.5)
     assert found.within is within
-    assert f"{gain_db:+.2g} dB" in found.words
+    assert f"{abs(gain_db):.2g} dB {'louder' if gain_db > 0 else 'quieter'}" in found.words
 
 
 def test_one_band_of_many_is_enough_to_fail() -> None:
@@ -47,7 +47,7 @@ def test_another_event_fails_whatever_the_levels() -> None:
     other = measures(ring(1000), 0.9 * ring(1000, 0.3))
     found = closeness(one, other, 60.0)
     assert not found.within
-    assert "events 1 → 2" in found.words
+    assert "onsets 1 → 2" in found.words
 
 
 def test_another_length_fails_and_silence_is_like_silence() -> None:

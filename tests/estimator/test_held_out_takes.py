@@ -15,9 +15,11 @@ from click.testing import CliRunner
 from sonic_bullet.cli import cli
 from sonic_bullet.diagnosis.selection import stepwise
 from sonic_bullet.estimator.fit.fitted_preset import recorded_lines
-from sonic_bullet.estimator.fit.held_out_takes import typical_strike
+from sonic_bullet.estimator.fit.held_out_takes import predicted_takes
 from sonic_bullet.estimator.fit.material_fit import fit_case
+from sonic_bullet.estimator.fit.typical_strike import typical_strike
 from sonic_bullet.estimator.lines.joint_lines import Lines
+from sonic_bullet.estimator.residual.recorded_strikes import case_strikes
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Array, Material
 from tests.made.case import make
@@ -138,3 +140,44 @@ def test_no_effect_is_sought_from_farther_than_silence(
     assert done.exit_code == 1, done.output
     assert "worse-than-silence" in done.output and "no effect was sought" in done.output
     assert json.loads(out.read_text())["provenance"]["verdict"] == "worse-than-silence"
+
+
+def test_what_lies_outside_the_band_is_no_part_of_a_distance(tmp_path: Path) -> None:
+    """A line above the case's band that one take has and the others have not."""
+    plain, loud = case_of(tmp_path, 1), tmp_path / "loud"
+    case = json.loads((plain / "case.json").read_text()) | {"band_hz": [100.0, 6000.0]}
+    (plain / "case.json").write_text(json.dumps(case))
+    shutil.copytree(plain, loud)
+    sound, _ = soundfile.read(loud / "take3.wav")
+    t = np.arange(len(sound) - SR // 20) / SR
+    sound[SR // 20 :] += 0.05 * np.exp(-20 * t) * np.sin(2 * np.pi * 9000 * t)
+    soundfile.write(loud / "take3.wav", sound, SR, subtype="FLOAT")
+    (a,), (b,) = (fit_case(read_case(folder)).takes for folder in (plain, loud))
+    assert abs(a.predicted_db - b.predicted_db) < 0.2 and abs(a.silence_db - b.silence_db) < 0.2
+
+
+def test_the_residual_of_an_object_without_a_shape_joins_its_lines(tmp_path: Path) -> None:
+    """It is what the takes have beside the lines that the preset plays; the command says how near they are with it."""
+    out, told = tmp_path / "p.json", tmp_path / "residual.json"
+    words = ["residual", str(case_of(tmp_path, 1)), "-o", str(out), "--json", str(told)]
+    done = CliRunner().invoke(cli, words)
+    assert done.exit_code == 0, done.output
+    assert "takes that were not fitted" in done.output
+    (take,) = json.loads(told.read_text())["takes"]
+    assert take["split"] == "holdout" and take["predicted_db"] < 1.5 * take["other_take_db"]
+    made = json.loads(out.read_text())
+    assert made["residual"] and made["effects"][0]["id"] == "recorded-lines"
+
+
+@pytest.mark.slow
+def test_a_residual_brings_takes_nearer_that_begin_with_noise(tmp_path: Path) -> None:
+    folder = case_of(tmp_path, 1)
+    rng, n = np.random.default_rng(5), SR // 4
+    for path in sorted(folder.glob("take*.wav")):
+        sound, _ = soundfile.read(path)
+        sound[SR // 20 : SR // 20 + n] += 0.05 * rng.standard_normal(n) * np.exp(-np.arange(n) / (0.03 * SR))
+        soundfile.write(path, sound, SR, subtype="FLOAT")
+    found = fit_case(read_case(folder))
+    (lines,), (whole,) = found.takes, predicted_takes(found, residual=case_strikes(found).residual)
+    assert whole.predicted_db < lines.predicted_db - 1
+    assert whole.predicted_db < 1.5 * whole.other_take_db

@@ -1,4 +1,4 @@
-"""From a scene to its log, and from the log to another microphone, another level, stems, a film: one gain for all."""
+"""From a scene to its log, and from it to another microphone, level, material, to stems, a film: one gain for all."""
 
 from __future__ import annotations
 
@@ -63,6 +63,22 @@ def test_the_scale_gives_pascals_back_at_another_microphone() -> None:
     assert np.abs(restored - pascals).max() <= 2**-23 * np.abs(pascals).max()
     # both files peak at -1 dBFS, and what was twice as far away is still the quieter one
     assert np.abs(restored).max() < np.abs(read_audio("near.wav")[0]).max()
+
+
+def test_stems_and_a_film_of_another_material_are_those_of_its_sound() -> None:
+    """One log, its bar of glass and its board silent: mix, stems and film agree, and the log of it replays so."""
+    pytest.importorskip("av")
+    from tests.made.films import decoded
+
+    words = ("--material", "bar=glass", "--silent", "board")
+    assert run("render", "log.npz", "-o", "g.wav", "--stems", "g", "--contacts", "g.npz", *words) == 0
+    assert run("film", "log.npz", "-o", "g.mov", "--size", "64x48", "--fps", "25", *words) == 0
+    mix, film = soundfile.read("g.wav")[0], decoded(Path("g.mov"))
+    stems = {one.stem.split("-", 1)[1]: soundfile.read(one)[0] for one in Path("g").glob("*.wav")}
+    assert not stems.get("board", np.zeros(1)).any()
+    assert np.abs(stems["bar"] - mix).max() <= 2**-22 and np.abs(film.sound[: len(mix)] - mix).max() < 2**-22
+    assert run("render", "g.npz", "-o", "again.wav") == 0
+    assert Path("again.wav").read_bytes() == Path("g.wav").read_bytes() != Path("mix.wav").read_bytes()
 
 
 def test_a_film_has_the_same_sound_and_holds_its_last_picture() -> None:

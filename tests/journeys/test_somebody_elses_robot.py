@@ -29,7 +29,7 @@ def test_a_robot_on_the_usual_ground_is_heard_and_the_rest_is_named(tmp_path: Pa
     told = json.loads(done.stdout)
     notes = "\n".join(told["notes"])
     assert "plane (body 0) is ground (static, 200 m long): a silent partner with concrete's contact" in notes
-    assert "(body 3) is a silent partner: mesh is a flat sheet" in notes
+    assert "body 3 is a silent partner: mesh is a flat sheet" in notes
     assert {body["body"] for body in told["bodies"] if body["material"] == "steel"} == {1, 2}
     assert {body["body"] for body in told["bodies"] if body["modes"]} == {1}  # the cube has none below 20 kHz
     assert soundfile.info(tmp_path / "robot.wav").duration == 0.5

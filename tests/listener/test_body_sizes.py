@@ -82,7 +82,7 @@ def test_listener_doctor_and_render_tell_of_a_block_of_400_000_cubic_metres(
         plane, cube = client.loadURDF("plane.urdf"), client.loadURDF("cube_small.urdf", [0, 0, 1])
         listener = sb.attach(client, sr=8000, microphone=())
         for _ in range(2):
-            with pytest.warns(SizeWarning, match=r"body 0 .*200 m long.*globalScaling=0\.001"):
+            with pytest.warns(SizeWarning, match=r"body 0.*200 m long.*globalScaling=0\.001"):
                 listener.add(plane, material="concrete", count=1)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -110,11 +110,11 @@ def test_listener_doctor_and_render_tell_of_a_block_of_400_000_cubic_metres(
             )
             == 0
         )
-        assert "note: body 0" in capfd.readouterr().err
+        assert "note: plane (body 0)" in capfd.readouterr().err
     assert command(monkeypatch, "render", str(tmp_path / "a.npz"), "-o", str(tmp_path / "b.wav")) == 0
     assert "200 m long" in capfd.readouterr().err
     assert command(monkeypatch, "doctor", str(tmp_path / "s.py"), "--seconds", "0.01") == 0
-    assert "warning: scale: body 0" in capfd.readouterr().out
+    assert "warning: scale: plane (body 0)" in capfd.readouterr().out
 
 
 @cache

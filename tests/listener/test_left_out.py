@@ -81,7 +81,7 @@ def test_its_record_ends_and_the_note_names_it(client: Any, hooked: bool) -> Non
     step()
     client.resetBaseVelocity(bad, NAN_SPEED)
     with pytest.warns(
-        SceneWarning, match=rf"body {bad} \(.+\) has a pose or speed that is not a number, or beyond 1e9: it is mute"
+        SceneWarning, match=rf"body {bad} has a pose or speed that is not a number, or beyond 1e9: it is mute"
     ) as said:
         for _ in range(30):
             step()
@@ -141,9 +141,9 @@ def test_a_partner_of_absurd_mass_is_muted(client: Any, hooked: bool) -> None:
             client.stepSimulation()
             if not hooked:
                 world.after_step()
-    assert [w.category for w in said if f"body {bad} (link0) has a mass or inertia" in str(w.message)] == [
-        SceneWarning
-    ], [str(w.message) for w in said]
+    assert [w.category for w in said if f"body {bad} has a mass or inertia" in str(w.message)] == [SceneWarning], [
+        str(w.message) for w in said
+    ]
     assert world.step_count == 60
     assert world.index_of(good) >= 0
 
@@ -246,12 +246,12 @@ def test_a_soft_body_is_left_out_and_named_once(client: Any, hooked: bool) -> No
             if not hooked:
                 steps.append(world.after_step())
     assert [w.category for w in said] == [SceneWarning], [str(w.message) for w in said]
-    assert f"body {cloth} (cloth_z_up) is soft" in str(said[0].message)
+    assert f"cloth_z_up (body {cloth}) is soft" in str(said[0].message)
     assert touched > 10, "something lay on the cloth: the test tests something"
     assert {record.body_id for record in world.bodies} <= {0, body, far}
     assert world.index_of(far) >= 0
     assert len(steps) == 200
     assert (cloth, -1) not in links_with_shapes(world.client_id)
-    with pytest.raises(SceneError, match=f"body {cloth} .*soft"):
+    with pytest.raises(SceneError, match=f"body {cloth}.*soft"):
         world.add(cloth)
     assert "nan" not in {finding.id for finding in diagnose_world(client)}

@@ -12,6 +12,7 @@ import warnings
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pybullet
 import pybullet_data
 from pybullet_utils.bullet_client import BulletClient
@@ -64,6 +65,8 @@ def listen(name: str, *, sound: bool) -> dict[str, object]:
     notes = add_links(listener, cast, partial(is_static, client._client))
     for _ in range(STEPS):
         client.stepSimulation()
+    if sound:
+        assert np.isfinite(listener.sound()).all()
     return {"links": len(links), "notes": notes, "steps": len(listener.contacts.steps)}
 
 

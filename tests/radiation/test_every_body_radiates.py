@@ -96,3 +96,56 @@ def test_panels_that_lie_twice_fall_to_the_law_and_it_is_told(tmp_path: Path) ->
         radiated.radiation_and_note.cache_clear()
         weight, damping, note = radiated.radiation_and_note(twice, Air(), tmp_path)
         assert note == compact.COMPACT and np.isfinite(weight).all() and (damping > 0).all()
+
+
+def two_boxes() -> trimesh.Trimesh:
+    """Their surfaces pass through each other."""
+    one, other = trimesh.creation.box((0.1, 0.03, 0.03)), trimesh.creation.box((0.03, 0.1, 0.02))
+    other.apply_translation((0.02, 0.01, 0.003))
+    return trimesh.util.concatenate([one, other])
+
+
+def open_bowl(radius_m: float = 0.05) -> trimesh.Trimesh:
+    """A half sphere of sheet: no volume."""
+    angle = np.linspace(0.15, np.pi / 2, 10)
+    return trimesh.creation.revolve(radius_m * np.c_[np.sin(angle), 1 - np.cos(angle)], sections=24)
+
+
+def spoon() -> trimesh.Trimesh:
+    """A bowl of sheet that passes through its handle."""
+    handle = trimesh.creation.box((0.1, 0.008, 0.003))
+    handle.apply_translation((0.065, 0, 0.02))
+    return trimesh.util.concatenate([open_bowl(0.02), handle])
+
+
+PANDA = "franka_panda/meshes/collision"
+SURFACES = {
+    "two boxes through each other": two_boxes,
+    "a racing car's wheel": "racecar/meshes/left_rear_wheel.obj",
+    "Panda's finger": f"{PANDA}/finger.obj",
+    "Panda's link1": f"{PANDA}/link1.obj",
+}
+SLOW = {
+    "a spoon": spoon,
+    "an open bowl": open_bowl,
+    "Husky's wheel": "husky/meshes/wheel.stl",
+    "a bicycle's wheel": "bicycle/files/wheel_scaled.stl",
+    "Panda's hand": f"{PANDA}/hand.obj",
+    **{f"Panda's link{i}": f"{PANDA}/link{i}.obj" for i in (0, 2, 3, 4, 5, 6, 7)},
+}
+
+
+@pytest.mark.parametrize("name", [*SURFACES, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_surfaces_that_others_made_radiate_in_wood(name: str) -> None:
+    """Some are open, some pass through themselves: what has modes has a weight and a loss."""
+    made = {**SURFACES, **SLOW}[name]
+    if isinstance(made, str):
+        pybullet_data = pytest.importorskip("pybullet_data")
+        mesh = trimesh.load(Path(pybullet_data.getDataPath(), made), force="mesh")
+    else:
+        mesh = made()
+    shape = Shape("mesh", vertex_m=np.array(mesh.vertices), face=np.array(mesh.faces))
+    model = analyse((shape,), load_material("wood"), count=6)
+    weight, damping, note = far_field.radiation_and_note(model, Air())
+    assert model.mode_count == 6 and note in ("", compact.COMPACT)
+    assert np.isfinite(weight).all() and (np.abs(weight) > 0).all() and (damping > 0).all()

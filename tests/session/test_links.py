@@ -241,7 +241,8 @@ def test_a_terminal_shows_which_link_is_computed(
     stream: type[io.StringIO],
     shown: bool,
 ) -> None:
-    """Without `progress`: one rewritten line on a terminal's stderr, nothing in a pipe."""
+    """Without `progress`: one rewritten line on a terminal's stderr, in a pipe nothing of what is quick."""
+    monkeypatch.delenv("SONIC_BULLET_PROGRESS", raising=False)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "200")
     body = boxes(client, tmp_path)
@@ -258,7 +259,7 @@ def test_a_terminal_shows_which_link_is_computed(
 
 def test_a_status_within_a_status_writes_into_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A script that `sonic-bullet render` runs adds bodies of its own: one line, not two that fight for it."""
-    from sonic_bullet.machine.terminal import shown_by, status
+    from sonic_bullet.machine.progress import shown_by, status
 
     monkeypatch.setattr("sys.stderr", Terminal())
     seen: list[str] = []

@@ -73,7 +73,7 @@ def test_names_are_numbered_in_order_of_appearance_whatever_the_ids(client: Any,
             seen.append([next(b.name for b in reversed(bodies) if b.body_id == x) for x in (*made, ground)])
             listener.detach()
     assert len(seen) == 24
-    assert {(names[2], names[3], names[4]) for names in seen} == {("cube", "plate", "link0")}
+    assert {(names[2], names[3], names[4]) for names in seen} == {("cube", "plate", "body 4")}
     assert {frozenset(names[:2]) for names in seen} == {frozenset({"cube 2", "cube 3"})}
 
 
@@ -83,14 +83,14 @@ def test_a_silent_partner_that_is_added_later_keeps_its_name(client: Any) -> Non
     sounding(listener, one, name="plate")
     run(client, 80)
     before = {body.body_id: body.name for body in listener.contacts.bodies}
-    assert before == {one: "plate", ground: "link0"}
+    assert before == {one: "plate", ground: f"body {ground}"}
     sounding(listener, ground)
     run(client, 1)
     sounding(listener, one)
     assert [(b.name, b.body_id, b.until_step) for b in listener.contacts.bodies] == [
         ("plate", one, 81),
-        ("link0", ground, 80),
-        ("link0", ground, -1),
+        (f"body {ground}", ground, 80),
+        (f"body {ground}", ground, -1),
         ("plate", one, -1),
     ]
     assert listener.world.name_of(one) == f"plate (body {one})"
@@ -115,8 +115,8 @@ def test_a_name_by_hand_goes_before_a_number_whatever_the_order(client: Any) -> 
     bodies = [box(client, (x, 0, 0.2)) for x in range(3)]
     listener = sb.attach(client)
     how = {"material": STEEL, "model": plate_model()}
-    listener.add_all({bodies[0]: how, bodies[1]: how, bodies[2]: {**how, "name": "link0"}})
-    assert [body.name for body in listener.contacts.bodies] == ["link0 2", "link0 3", "link0"]
+    listener.add_all({bodies[0]: how, bodies[1]: how, bodies[2]: {**how, "name": "body 0"}})
+    assert [body.name for body in listener.contacts.bodies] == ["body 0 #2", "body 1", "body 0"]
 
 
 @pytest.mark.parametrize("name", ["", "  ", "a\nb", 3, b"x"])
@@ -336,7 +336,7 @@ def test_reset_names_and_knows_as_a_fresh_listener_does(tmp_path: Path) -> None:
                 listener.reset()
             run(client, 60)
             listener.contacts.save(tmp_path / f"{name}.npz")
-    assert [body.name for body in sb.read_log(tmp_path / "a.npz").bodies] == ["plate", "link0", "link0 2"]
+    assert [body.name for body in sb.read_log(tmp_path / "a.npz").bodies] == ["plate", "body 3", "body 0"]
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 

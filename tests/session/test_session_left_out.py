@@ -108,7 +108,7 @@ def test_what_falls_on_cloth_overflows_nowhere(client: Any) -> None:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.warns(SceneWarning, match=f"body {cloth} .*soft"):
+        with pytest.warns(SceneWarning, match=f"body {cloth}.*soft"):
             listener = sb.attach(client, microphone=[sb.Microphone(np.array([0, 0, 0.5])), sb.ModalSum()])
         sounding_box(client, listener, (0, 0, 0.6))
         box(client, (0.3, 0, 0.6))

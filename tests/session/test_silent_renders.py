@@ -46,20 +46,20 @@ SCENES = {
         "    ball(client, (0, 0, 0.06))\n"
         '    return {still: {"material": STEEL, "model": MODEL}}\n'
     ),
-    "no audible mode: link0 (body 0) has none": (
+    "no audible mode: body 0 has none": (
         "MODEL = box_model(EDGES_M, (), STEEL)\n\n"
         "def build(client):\n    still = box(client, (0, 0, 0), mass=0, turn=(0, 0, 0))\n"
         "    ball(client, (0, 0, 0.06))\n"
         '    return {still: {"material": STEEL, "model": MODEL}}\n'
     ),
-    "the vibrometer reads body 2 link -1": (
+    "the vibrometer is on body 2, and only body 1 was touched": (
         "MICROPHONE = [Vibrometer(2, (0, 0, 0), (0, 0, 1))]\n\n"
         "def build(client):\n    floor(client)\n"
         "    return {box(client, (0, 0, 0.1)): PLATE, box(client, (0, 0, 9)): PLATE}\n"
     ),
     "support at rest": "def build(client):\n    client.setGravity(0, 0, -9.81)\n    floor(client)\n"
     f"    return {{{REST}: PLATE}}\n",
-    "still under way": "MICROPHONE = (0, 0, 1000)\n\ndef build(client):\n    floor(client)\n"
+    "m from the first contact, at": "MICROPHONE = (0, 0, 1000)\n\ndef build(client):\n    floor(client)\n"
     "    return {box(client, (0, 0, 0.1)): PLATE}\n",
     "there is no microphone": "MICROPHONE = ()\n\ndef build(client):\n    floor(client)\n"
     "    return {box(client, (0, 0, 0.1)): PLATE}\n",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 EPILOG = """\b
 Examples:
   sonic-bullet film scenes/tabletop.py -o tabletop.mp4 --fps 60
-  sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow link0
+  sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow ball
   sonic-bullet film drop.npz -o drop.mkv --camera 0.5,-1,0.8 --look-at 0,0,0.1 --size 1920x1080
 Frame rates are fractions: 24, 25, 30000/1001. Needs PyAV: pip install 'sonic_bullet[film]'"""
 
@@ -60,22 +60,16 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @json_option
 def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
-    from sonic_bullet.cli.scene_commands import (
-        DEFAULT_SR,
-        Wish,
-        check_request,
-        is_log,
-        replayed,
-        simulated,
-        with_partial,
-    )
+    from sonic_bullet.cli.scenes.scene_commands import check_request, with_partial
+    from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, Wish, is_log, replayed, simulated
     from sonic_bullet.files import check_sr
     from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
     from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size
 
     rate = None if options["sr"] is None else check_sr(options["sr"])
     level = LevelWish(**{name: options[name] for name in OPTIONS})
-    check_request(scene, options["seconds"], level, options["material"])
+    check_request(scene, options["seconds"], level)
+    materials = WantedMaterials.read(options["material"], options["silent"])
     look = FilmLook(
         as_fps(options["fps"]),
         check_size(options["size"]),
@@ -99,7 +93,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     with clean_stdout(json_to) as say:
         with progress_bar(Path(scene).name) as (progress, tell):
             wish = Wish(
-                options["seconds"], rate, options["microphones"], options["seed"], options["material"], None, None,
+                options["seconds"], rate, options["microphones"], options["seed"], materials, None, None,
                 progress, tell, at_end, level.tail_db,
             )  # fmt: skip
             try:
@@ -112,7 +106,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         events = None
         with quiet_stderr():
             import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
-        with progress_bar("film") as (progress, tell):
+        with progress_bar("pictures") as (progress, tell):
             if options["overlay"]:
                 from sonic_bullet.soundtrack.sound_events import find_sound_events
 

@@ -49,7 +49,7 @@ materials and an export script for Blender."""
 def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
     """Give a baked animation (.glb .gltf .json .npz) its sound, or a scene that of bodies that it moves by hand."""
     from sonic_bullet.cli.output import described_render
-    from sonic_bullet.cli.scene_commands import summary, with_partial
+    from sonic_bullet.cli.scenes.scene_commands import summary, with_partial
     from sonic_bullet.files import check_audio_output, check_sr, write_audio, write_log
 
     sr, level = check_sr(options["sr"]), LevelWish(**{name: options[name] for name in OPTIONS})

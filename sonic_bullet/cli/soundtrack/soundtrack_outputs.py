@@ -18,7 +18,7 @@ from sonic_bullet.cli.output import folder_place
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
-    from sonic_bullet.cli.scene_commands import Replay
+    from sonic_bullet.cli.scenes.scene_runs import Replay
     from sonic_bullet.files import AudioReport, ContactLog
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.soundtrack.sound_events import SoundEvent

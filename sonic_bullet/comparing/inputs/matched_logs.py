@@ -18,7 +18,7 @@ from sonic_bullet.listener.calls import leaves, same
 from sonic_bullet.records import Array, Body
 from sonic_bullet.records.errors import CompareError
 
-NO_NAME = re.compile(r"^(body \d+|link\d+|baseLink)( \d+)?$")
+NO_NAME = re.compile(r"^(body \d+|link\d+|baseLink)( #?\d+)?$")
 """What a simulator calls who has no name."""
 NO_INPUT = ("body_id", "link", "epoch", "name", "since_step", "until_step", "model")
 """Fields of a body that say who and when it is; its modes follow from the rest."""

@@ -33,7 +33,7 @@ def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
     with np.errstate(divide="ignore", invalid="ignore"):
         decay = (b.decay_per_s[:n] / a.decay_per_s[:n] - 1) * 100
     decay = decay[np.isfinite(decay)]
-    words = [f"modes {_spread(cents, 'cents')}"] if np.abs(cents).max() > 1e-6 else []
+    words = [f"frequencies {_spread(cents, 'cents')}"] if np.abs(cents).max() > 1e-6 else []
     values = {"cents": round(float(np.median(cents)), 4), "modes_a": a.mode_count, "modes_b": b.mode_count}
     if len(decay) and np.abs(decay).max() > 1e-6:
         words.append(f"decays {_spread(decay, '%')}")
@@ -46,7 +46,7 @@ def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
         mac = (x * y).sum(axis=0) ** 2 / ((x * x).sum(axis=0) * (y * y).sum(axis=0))
         values["mac_least"] = round(float(mac.min()), 4)
         if mac.min() < 0.99:
-            words.append(f"shapes turn or trade places (least MAC {mac.min():.2f})")
+            words.append(f"shapes turn or trade places (modal assurance {mac.min():.2f} at least)")
     else:
         words.append(f"surface of {len(a.vertex_m)} → {len(b.vertex_m)} vertices")
     return Consequence("modes", f"{name}: {', '.join(words) or 'modes change in their last bits'}", None, values)

@@ -16,6 +16,7 @@ import itertools
 import numpy as np
 
 from sonic_bullet.comparing.comparison_record import Consequence
+from sonic_bullet.comparing.outcome.sound_effects import level_words
 from sonic_bullet.records import Array
 
 DELAY_MOST_S = 0.5
@@ -49,7 +50,7 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
         a = a[list(order)]
     delay, sign, share, chance = _delay(a, b, sr)
     if share < min(chance, COMMON_SHARE):
-        words = f"nothing in common: of B's power A explains {share:.1e}, chance would up to {chance:.1e}"
+        words = f"nothing in common: A explains {share:.1e} of B's power, no more than chance does ({chance:.1e})"
         return [Consequence("unrelated", words, None, {"share": share, "chance": chance})]
     if 0 < abs(delay) <= GROUP_DELAY and not _only_delayed(a, b, delay):
         delay = 0
@@ -180,12 +181,12 @@ def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
             values = {"freq_hz": [float(f) for f in freq], "db": [round(float(v), 3) for v in response]}
             return [Consequence("filter", words, None, values)]
     if abs(20 * np.log10(max(abs(gain), 1e-12))) > GAIN_DB and level < -20:
-        words = f"gain {20 * np.log10(abs(gain)):+.3g} dB"
+        words = f"B is A, {level_words(float(20 * np.log10(abs(gain))), digits=3)}"
         found.append(Consequence("gain", words, None, {"gain_db": float(20 * np.log10(abs(gain)))}))
     if level > LEFT_DB and clean:
         found.append(_left(left, level, sr))
     elif level > LEFT_DB - 60 and not found and clean:
-        words = f"samples differ by rounding: what is left is {level:.0f} dB below the recording"
+        words = f"samples differ by rounding: the difference is {abs(level):.0f} dB below A"
         found.append(Consequence("rounding", words, None, {"left_db": level}))
     return found
 
@@ -226,10 +227,15 @@ def _left(left: Array, level: float, sr: int) -> Consequence:
     share = spectrum[max(0, k - 3) : k + 4].sum() / spectrum.sum()
     if share > 0.5:
         freq = k * sr / left.shape[1]
-        return Consequence("tone", f"a tone at {freq:.1f} Hz, {level:.1f} dB re the recording", None, {"freq_hz": freq})
+        return Consequence("tone", f"a tone at {freq:.1f} Hz is added, {_added_level(level)}", None, {"freq_hz": freq})
     spread = float(np.exp(np.log(spectrum + 1e-300).mean()) / spectrum.mean())
     what = "noise is added" if spread > 0.2 else "something else sounds besides"
-    return Consequence("noise", f"{what}, {level:.1f} dB re the recording", None, {"left_db": level})
+    return Consequence("noise", f"{what}, {_added_level(level)}", None, {"left_db": level})
+
+
+def _added_level(level_db: float) -> str:
+    """How strong something is that is added."""
+    return f"{abs(level_db):.1f} dB {'above' if level_db > 0 else 'below'} A as a whole"
 
 
 def _db(part: Array, whole: Array) -> float:

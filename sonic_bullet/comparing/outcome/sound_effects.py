@@ -43,13 +43,13 @@ def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     found: list[Consequence] = []
     n = min(a.shape[1], b.shape[1])
     if a.shape[0] != b.shape[0]:
-        return [Consequence("channels", f"{a.shape[0]} → {b.shape[0]} channels", 0.0)]
+        return [Consequence("channels", f"A has {a.shape[0]} channels, B {b.shape[0]}", 0.0)]
     where = np.flatnonzero((a[:, :n] != b[:, :n]).any(axis=0))
     if len(where):
         first = int(where[0])
-        found.append(Consequence("sample", f"first sample that differs at {first / sr * 1e3:.4g} ms", first / sr))
+        found.append(Consequence("sample", f"A and B are equal for the first {first / sr * 1e3:.4g} ms", first / sr))
     if a.shape[1] != b.shape[1]:
-        found.append(Consequence("length", f"length {a.shape[1] / sr:.4g} → {b.shape[1] / sr:.4g} s", n / sr))
+        found.append(Consequence("length", f"A lasts {a.shape[1] / sr:.4g} s, B {b.shape[1] / sr:.4g} s", n / sr))
     found += [one for one in (_levels(a, b, sr), _onsets(a, b, sr), _decay(a, b, sr), _loudness(a, b, sr)) if one]
     return found
 
@@ -77,10 +77,15 @@ def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
     change = other - one
     total = 10 * math.log10(float(np.square(b).mean()) / float(np.square(a).mean()))
     k = int(np.argmax(np.where(loud, np.abs(change), -1)))
-    most = f", most at {_hz(OCTAVES_HZ[k])}: {change[k]:+.2g} dB" if abs(change[k]) > 0.005 else ""
+    most = f"; most in the octave at {_hz(OCTAVES_HZ[k])}: {level_words(change[k])}" if abs(change[k]) > 0.005 else ""
     values: dict[str, Any] = {"total_db": total, "band_hz": list(OCTAVES_HZ[: len(change)])}
     values["band_db"] = [round(float(x), 4) if good else None for x, good in zip(change, loud, strict=True)]
-    return Consequence("level", f"level {total:+.2g} dB{most}", None, values)
+    return Consequence("level", f"B is {level_words(total)} than A in all{most}", None, values)
+
+
+def level_words(change_db: float, unit: str = "dB", digits: int = 2) -> str:
+    """A change of level from A to B, as one says it: "5 dB quieter"."""
+    return f"{abs(change_db):.{digits}g} {unit} {'louder' if change_db >= 0 else 'quieter'}"
 
 
 def onsets_s(x: Array, sr: int) -> list[float]:
@@ -110,12 +115,13 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
         at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > FRAME_S), None)
         longer = one if len(one) > len(other) else other
         at = longer[shared] if at is None else at
-        return Consequence("onset", f"onsets {len(one)} → {len(other)}", at, {"a_s": one, "b_s": other})
+        return Consequence("onset", f"{len(one)} onsets in A, {len(other)} in B", at, {"a_s": one, "b_s": other})
     moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > FRAME_S / 2]
     if not moved:
         return None
     most = max(moved, key=lambda pair: abs(pair[0]))
-    words = f"{len(moved)} of {len(one)} onsets move, most by {most[0] * 1e3:+.3g} ms at {most[1]:.3g} s"
+    later = f"{abs(most[0]) * 1e3:.3g} ms {'later' if most[0] > 0 else 'earlier'}"
+    words = f"{len(moved)} of {len(one)} onsets come at another time, the one at {most[1]:.3g} s in A {later} in B"
     return Consequence("onset", words, moved[0][1], {"a_s": one, "b_s": other})
 
 
@@ -137,7 +143,7 @@ def _decay(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = t60_s(a, sr), t60_s(b, sr)
     if one is None or other is None or abs(other / one - 1) < 0.005:
         return None
-    words = f"T60 {one:.3g} → {other:.3g} s ({(other / one - 1) * 100:+.2g} %)"
+    words = f"T60 {one:.3g} s in A, {other:.3g} s in B ({(other / one - 1) * 100:+.2g} %)"
     return Consequence("decay", words, None, {"a_s": one, "b_s": other})
 
 
@@ -150,7 +156,7 @@ def _loudness(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = (float(pyloudnorm.Meter(sr).integrated_loudness(x.T / peak)) for x in (a, b))
     if not (math.isfinite(one) and math.isfinite(other)) or abs(other - one) < 0.05:
         return None
-    return Consequence("loudness", f"loudness {other - one:+.2g} LU", None, {"change_lu": other - one})
+    return Consequence("loudness", f"B is {level_words(other - one, 'LU')} than A", None, {"change_lu": other - one})
 
 
 def _hz(f: float) -> str:

@@ -99,7 +99,7 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     """
     assert h.signal is not None
     sound = direct_as_expected(h)
-    reach = int(SPAN_S[1] * h.sr)
+    reach = min(int(SPAN_S[1] * h.sr), h.signal.shape[1])
     n = min(h.signal.shape[1], 3 * reach)
     found = []
     for x, y in zip(sound[:, :n], h.signal[:, :n], strict=True):

@@ -1,7 +1,8 @@
 """Takes held against the fit: how far its prediction of each is, beside silence and beside another take.
 
     take r, from its onset            ──┐
-    placed modes, or typical lines p  ──┴─► D(r, g·p)     g: of least D, where the impulse is not known
+    placed modes, or typical lines p  ──┴─► D(r, g·p)     g: of least D, where the impulse is not known;
+                                                          p with what a residual adds to it, where one is given
     nothing                           ────► D(r, 0)
     the fit's own takes t             ────► min over t and g of D(r, g·t)
 
@@ -12,16 +13,17 @@ noise's power added, silence with that alone. A prediction farther than silence 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from sonic_bullet.estimator.fit.case_fit import TakeDistance
-from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_sound
+from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_modes
 from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
-from sonic_bullet.estimator.lines.joint_lines import Lines
+from sonic_bullet.estimator.fit.typical_strike import typical_strike
 from sonic_bullet.estimator.lines.log_spectral import (
     Floor,
     floor_between,
@@ -30,8 +32,9 @@ from sonic_bullet.estimator.lines.log_spectral import (
     spectra_distance_db,
 )
 from sonic_bullet.files.cases import CaseRecording
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.residual.offline import residual_sound
 
 if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.case_fit import CaseFit
@@ -41,43 +44,13 @@ GAIN_REACH_DB = 40.0
 """The best gain is looked for this far about equal energy."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TypicalStrike:
-    """What a strike of unknown place leaves of each line. amplitude (k,) complex, in the recordings' units at the mean
-    level of the takes; spread_db (k,): standard deviation over takes about it, 0 where there is one take.
-    """
-
-    amplitude: Array
-    spread_db: Array
-
-
-def typical_strike(lines: Lines) -> TypicalStrike:
-    """Amplitudes of the lines in the middle of the takes.
-
-    Magnitudes are geometric means of takes brought to one level, as D and ears count decibels. Phases are those of
-    the take whose magnitudes are nearest to the means: lines that overlap keep the phases in which they were recorded.
-    """
-    size = np.maximum(np.abs(lines.amplitude), np.nan_to_num(lines.amplitude_sd) + 1e-300)
-    db = 20 * np.log10(size)
-    weight = np.broadcast_to(np.maximum(np.nan_to_num(lines.energy), 1e-300) ** 0.5, db.shape)
-    level = np.average(db, axis=1, weights=weight)[:, None]
-    middle = (db - level).mean(axis=0)
-    off = db - level - middle
-    nearest = int(np.argmin(np.average(off**2, axis=1, weights=weight)))
-    phase = np.exp(1j * np.angle(lines.amplitude[nearest]))
-    spread = off.std(axis=0, ddof=1) if len(db) > 1 else np.zeros(db.shape[1])
-    return TypicalStrike(10 ** ((middle + level.mean()) / 20) * phase, spread)
-
-
 def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
     """The fit with the distances of the takes held out, or of its own where none is; and with the verdict that it is
     worse than silence where it is.
 
     Raises SonicBulletError.
     """
-    takes = take_distances(found, split="holdout", progress=progress) or take_distances(
-        found, split="fit", progress=progress
-    )
+    takes = predicted_takes(found, progress=progress)
     judged = replace(found, takes=takes)
     if not judged.worse_than_silence:
         return judged
@@ -90,13 +63,20 @@ def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = Non
     return replace(judged, fit=replace(found.fit, verdict=verdict))
 
 
-def take_distances(
-    found: CaseFit, *, split: str = "holdout", progress: Callable[[str], None] | None = None
+def predicted_takes(
+    found: CaseFit, *, residual: Residual | None = None, progress: Callable[[str], None] | None = None
 ) -> tuple[TakeDistance, ...]:
-    """Distances of all takes of a split that have audio, of objects that were fitted.
+    """Distances of the takes held out, or of the fit's own where none is; with a residual, where given.
 
     Raises SonicBulletError where a file cannot be read.
     """
+    return next((rows for split in ("holdout", "fit") if (rows := _of_split(found, split, residual, progress))), ())
+
+
+def _of_split(
+    found: CaseFit, split: str, residual: Residual | None, progress: Callable[[str], None] | None
+) -> tuple[TakeDistance, ...]:
+    """Distances of all takes of a split that have audio, of objects that were fitted."""
     rows: list[TakeDistance] = []
     for e in found.evidence:
         mine = tuple(
@@ -107,12 +87,12 @@ def take_distances(
         if not mine or e.signals is None:
             continue
         if progress is not None:
-            progress(f"predicting {len(mine)} takes of {e.thing.name}")
+            progress(f"predicting takes of {e.thing.name}")
         signals, sr = recorded_signals(found.case, e.thing, mine)
-        takes = [power_spectra(take) for take in in_band(e.signals, e.sr, found.case.band_hz)] if sr == e.sr else []
+        takes = [power_spectra(take) for take in e.signals] if sr == e.sr else []
         for recording, signal in zip(mine, signals, strict=True):
             others = [t for t, r in zip(takes, e.recordings, strict=False) if r != recording]
-            rows.append(_distances(found, e, recording, in_band(signal, sr, found.case.band_hz), sr, others))
+            rows.append(_distances(found, e, recording, signal, sr, others, residual))
     return tuple(rows)
 
 
@@ -123,9 +103,10 @@ def _distances(
     signal: Array,
     sr: int,
     others: list[tuple[Array, ...]],
+    residual: Residual | None,
 ) -> TakeDistance:
-    floor, power = floor_between([signal]), power_spectra(signal)
-    made, free = predicted_take(found, e, recording, len(signal), sr)
+    floor, power = floor_between([signal]).within(sr, found.case.band_hz), power_spectra(signal)
+    made, free = predicted_take(found, e, recording, len(signal), sr, residual)
     modelled = power_spectra(made)
     nearest = [_distance_at_best_gain(power, other, floor, noisy=False) for other in others]
     return TakeDistance(
@@ -138,20 +119,22 @@ def _distances(
     )
 
 
-def predicted_take(found: CaseFit, e: RecordedObject, recording: CaseRecording, n: int, sr: int) -> tuple[Array, bool]:
-    """Sound (n,) of a take by the fit, and whether its gain is free.
+def predicted_take(
+    found: CaseFit, e: RecordedObject, recording: CaseRecording, n: int, sr: int, residual: Residual | None = None
+) -> tuple[Array, bool]:
+    """Sound (n,) of a take by the fit, with what a residual adds to it, and whether its gain is free.
 
     A strike of known place on a mesh is played by its modes; any other by the lines as they were struck on average.
     """
+    typical = typical_strike(e.lines)
+    modes, free = (typical.freq_hz, typical.decay_per_s, typical.amplitude), True
     if e.family is not None and recording.position_m is not None and np.isfinite(found.gain_sd):
-        try:
-            return strike_sound(found, recording, n, sr), recording.impulse_n_s is None
-        except SonicBulletError:
-            pass
-    lines = e.lines
-    if not len(lines.freq_hz):
-        return np.zeros(n), True
-    return damped_sum(lines.freq_hz, np.nan_to_num(lines.decay_per_s), typical_strike(lines).amplitude, n, sr), True
+        with suppress(SonicBulletError):
+            modes, free = strike_modes(found, recording, sr), recording.impulse_n_s is None
+    sound = damped_sum(*modes, n, sr)
+    if residual is not None:
+        sound = sound + residual_sound(residual, *modes, n, sr)
+    return sound, free
 
 
 def _distance(
@@ -185,13 +168,3 @@ def _distance_at_best_gain(
     at = float(steps[int(np.nanargmin(costs))])
     best = minimize_scalar(cost, bounds=(at - 8, at + 8), method="bounded", options={"xatol": 0.1})
     return float(min(best.fun, np.nanmin(costs)))
-
-
-def in_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
-    """Signals (..., n) within a band, by their spectrum; as they are where the band is all that a rate holds."""
-    if band_hz[0] <= 20 and band_hz[1] >= 0.45 * sr:
-        return signal
-    spectrum = np.fft.rfft(signal, axis=-1)
-    freq = np.fft.rfftfreq(signal.shape[-1], 1 / sr)
-    spectrum[..., (freq < band_hz[0]) | (freq > band_hz[1])] = 0
-    return np.asarray(np.fft.irfft(spectrum, signal.shape[-1]))

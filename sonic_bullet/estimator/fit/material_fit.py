@@ -27,6 +27,7 @@ from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 
@@ -43,6 +44,7 @@ __all__ = [
 ]
 
 
+@says_so(text="progress")
 def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> CaseFit:
     """The material of a case, from its 'fit' strikes alone.
 

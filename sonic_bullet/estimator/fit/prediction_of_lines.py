@@ -45,14 +45,14 @@ def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Arr
     return damped_sum(o.freq_hz[observed], o.decay_per_s[observed], (gain * pattern * start)[observed], n, sr)
 
 
-def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, corrected: bool = True) -> Array:
-    """What the fit predicts of any strike of a case (n,): of a fitted object with its corrections, of another object of
-    the material without.
+def strike_modes(
+    found: CaseFit, recording: CaseRecording, sr: int, *, corrected: bool = True
+) -> tuple[Array, Array, Array]:
+    """Frequency, decay (m,) and complex amplitude (m,) that the fit predicts of any strike of its case: of a fitted
+    object with its corrections, of another object of the material without.
 
     Raises FileError, MeshError where the object has no mesh or the strike no place.
     """
-    from dataclasses import replace
-
     from sonic_bullet.estimator.fit.object_fit import object_of
     from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
     from sonic_bullet.records.errors import FileError
@@ -60,13 +60,19 @@ def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, c
     if recording.position_m is None:
         raise FileError("a strike without a place cannot be predicted", "give its position")
     thing = found.case.objects[recording.object]
-    same = [o for o in found.objects if o.evidence.thing.name == recording.object]
+    same = next((o for o in found.objects if o.evidence.thing.name == recording.object), None)
     guess = guess_of(thing)
-    body = same[0].evidence.family if same else body_family(found.case, thing, guess, "default", lambda _: None)
+    body = same.evidence.family if same else body_family(found.case, thing, guess, "default", lambda _: None)
     if body is None:
         raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
     seen = observed(found.case, thing, guess, (recording,), body)
-    made = object_of(found, thing, guess, body, seen, same[0] if same else None)
-    if not corrected:
-        made = replace(made, freq_hz=made.model_hz)
-    return predicted(made, made.pattern[0], found.fit.sigma, n, sr)
+    made = object_of(found, thing, guess, body, seen, same)
+    freq = made.freq_hz if corrected else made.model_hz
+    in_range = freq < 0.5 * sr
+    amplitude = found.fit.sigma * made.pattern[0] * seen.start(freq, made.decay_per_s)
+    return freq[in_range], made.decay_per_s[in_range], amplitude[in_range]
+
+
+def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, corrected: bool = True) -> Array:
+    """What the fit predicts of any strike of a case (n,). Raises FileError, MeshError as `strike_modes`."""
+    return damped_sum(*strike_modes(found, recording, sr, corrected=corrected), n, sr)

@@ -14,8 +14,9 @@ import numpy as np
 
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
+from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
-from sonic_bullet.estimator.lines.onset import span
+from sonic_bullet.estimator.lines.onset import span, until_next_hit
 from sonic_bullet.files import channel_of, channel_words, read_audio
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
@@ -31,6 +32,7 @@ CLIPPED = 8  # samples in a row at the file's peak
 # after an onset; of the usual length: that much shorter is worth a word
 LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5
 SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
+LOWEST_HZ = 20.0  # of a case that names no band: nothing is to be taken off below
 CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
 
@@ -209,7 +211,7 @@ def _sounds(
 
     Raises FileError, AudioError.
     """
-    sounds, rates, remarks = [], [], []
+    sounds, limited, rates, remarks = [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
         sound, sr = read_audio(r.file or "")
@@ -221,9 +223,17 @@ def _sounds(
             )
         rates.append(sr)
         several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))
-        if case.onset_s is None and (observed := span(sounds[-1], sr)).hits > 1:
-            remarks.append(f"{r.file} holds {observed.hits} hits: only what comes before the second is used")
-            sounds[-1] = sounds[-1][: observed.stop]
+        limited.append(sounds[-1])
+        if case.band_hz[0] > LOWEST_HZ:
+            limited[-1] = limit_band(sounds[-1], sr, case.band_hz)
+            sounds[-1] = limit_band(sounds[-1], sr, (case.band_hz[0], np.inf))
+        known = None if case.onset_s is None else round(case.onset_s * sr)
+        one = span(limited[-1], sr) if known is None else until_next_hit(limited[-1], sr, known)
+        if one.later:
+            used = ": only what comes before the second is used" if known is None else ", all of which is used"
+            remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
+            if known is None:
+                sounds[-1], limited[-1] = sounds[-1][: one.stop], limited[-1][: one.stop]
     remarks += [
         f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}"
         for words, names in several.items()
@@ -232,7 +242,7 @@ def _sounds(
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
     sr = rates[0]
-    starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in sounds]
+    starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in limited]
     lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
     length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
     if length < max(LEAST_SAMPLES, LEAST_S * sr):

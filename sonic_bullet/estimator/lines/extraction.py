@@ -23,6 +23,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
+from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
@@ -36,6 +37,7 @@ EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's fil
 ROUNDS = 6
 ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
 FEW, MANY = 3, 40
+RESTORED = 3  # times that modes get back what a limit above took of them
 MOST_MODES = 140
 SECONDS_MAX = 8.0
 LEAST_SAMPLES = 512
@@ -72,30 +74,48 @@ def extract(
     high = min(high, 0.49 * sr)
     if not 0 < low < high:
         raise AudioError(f"band is {low:g} to {high:g} Hz", f"give a band inside 0 to {sr / 2:g} Hz")
-    part = onset.span(signal, sr) if onset_s is None else onset.Span(round(onset_s * sr), len(signal), 1)
+    clipped = onset.clipped_samples(signal)
+    limited = signal
+    if band_hz is not None:
+        signal, limited = limit_band(signal, sr, (low, np.inf)), limit_band(signal, sr, (low, high))
+    part = (
+        onset.span(limited, sr) if onset_s is None else onset.until_next_hit(limited, sr, max(0, round(onset_s * sr)))
+    )
+    quiet = limited[: part.start]
+    steady_above = len(quiet) > 0 and _rms(signal[: part.start] - quiet) > _rms(quiet)
+    if steady_above:
+        signal = limited  # what is above was there before; else it belongs to the impact, which a limit would smear
     x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
-    notes, hopeless = _doubts(signal, x, part.hits, sr)
+    notes, hopeless = _doubts(x, part.describe_hits(sr), clipped, sr)
     modes, noise = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
         else _modes(x, sr, (low, high))
     )
     start = part.start
+    for _ in range(RESTORED if steady_above and len(modes.pole) else 0):
+        # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
+        model = np.zeros(len(limited))
+        model[start : start + len(x)] = -likelihood.residual(np.zeros(len(x)), modes, sr)
+        signal = limited + limit_band(model, sr, (low, np.inf)) - limit_band(model, sr, (low, high))
+        x = signal[start : start + len(x)]
+        modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), THOROUGH), noise, _least(x))
+        noise = measured(likelihood.residual(x, modes, sr), sr, FLOOR * _rms(x), len(modes.pole), (low, high))
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
         modes = _moved(x, modes, noise, (low, high), start - part.start)
-    return _features(x, modes, noise, (low, high), start, notes)
+    banded = limited[start : start + len(x)]
+    return _features(x, banded, modes, noise, (low, high), start, notes, whole=band_hz is None)
 
 
-def _doubts(signal: Array, x: Array, hits: int, sr: int) -> tuple[list[str], bool]:
+def _doubts(x: Array, hits: str, clipped: int, sr: int) -> tuple[list[str], bool]:
     """What can be said against a recording before any mode is looked for, and whether that is enough not to look."""
     notes, hopeless = [], False
-    if hits > 1:
-        notes.append(f"{hits} hits: only what comes before the second, {len(x) / sr:.3g} s, is used")
-    clipped = onset.clipped_samples(signal)
+    if hits:
+        notes.append(f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used")
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
     if len(x) < SHORT_S * sr:
@@ -137,7 +157,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
         return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
-    least = 2 * np.log(1.5 * len(x) / FALSE_ALARMS)
+    least = _least(x)
     modes, noise = _first(x, sr, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(ROUNDS):
@@ -154,9 +174,14 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
         )
         if len(trial.pole) <= len(modes.pole):
             break
-        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole))
+        modes, noise = trial, measured(likelihood.residual(x, trial, sr), sr, floor, len(trial.pole), band_hz)
     modes = _pruned(x, band_hz, _fit(x, modes, sr, band_hz, THOROUGH), noise, least)
-    return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole))
+    return modes, measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
+
+
+def _least(x: Array) -> float:
+    """Least energy of a mode over the noise's density: what the strongest of all cells reaches once in twenty."""
+    return float(2 * np.log(1.5 * len(x) / FALSE_ALARMS))
 
 
 def _least_of_a_second(modes: int, least: float) -> float:
@@ -185,7 +210,7 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
     """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be
     identified.
     """
-    density = np.maximum(noise_density(x, tail=True), floor)
+    density = np.maximum(noise_density(x, sr, band_hz, tail=True), floor)
     slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
@@ -194,14 +219,14 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
     if len(pole) > most:
         pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
     start = likelihood.amplitudes(x, pole, sr)
-    noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole))
+    noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole), band_hz)
     if not len(pole):
         return start, noise
     energy = likelihood.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
     kept = np.argsort(-energy, kind="stable")[:MOST_MODES]
     kept = kept[energy[kept] > least]
     modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
-    noise = measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole))
+    noise = measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
     return _pruned(x, band_hz, modes, noise, least), noise
 
 
@@ -245,21 +270,32 @@ def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float
 
 
 def _features(
-    x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], start: int, notes: list[str]
+    x: Array,
+    banded: Array,
+    modes: Sinusoids,
+    noise: Noise,
+    band_hz: tuple[float, float],
+    start: int,
+    notes: list[str],
+    *,
+    whole: bool,
 ) -> Features:
+    """Features of the modes of a signal (n,); banded (n,): what the band alone holds of it. whole: no band was asked
+    for, whose edge makes lines at the onset that are none.
+    """
     k, sr = len(modes.pole), noise.sr
-    left = likelihood.residual(x, modes, sr)
-    explained = 1 - float(left @ left) / float(x @ x)
+    left = banded - (x - likelihood.residual(x, modes, sr))
+    explained = 1 - float(left @ left) / float(banded @ banded)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
     tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
-    for which, said in ((tone, "do not decay"), (vague & ~tone, "have no decay that can be told")):
+    for which, said in ((tone, "do not decay"), (vague & ~tone & whole, "have no decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
-    front = x[: int(FRONT * len(x))]
+    front = banded[: int(FRONT * len(x))]
     # a rattle starts with its most; speech, noise, music do not
-    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(x @ x)
+    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(banded @ banded)
     if explained < EXPLAINED:
         given = "" if modal else "; no feature is given"
         notes.append(

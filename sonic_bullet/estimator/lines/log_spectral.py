@@ -24,6 +24,7 @@ FLOOR_WINDOW = 1024
 MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
 SIDE = 8  # bins of the short window to each side
 REACH = 2.5  # of a frequency, up and down: more than a strong hum and its skirt take up
+HIDING = 1e30  # variance over which nothing stands
 QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
 
@@ -47,6 +48,11 @@ class Floor:
                 _taken_in(self.variance, wide) if wide > 1.5 else self.variance,
             )
         )
+
+    def within(self, sr: int, band_hz: tuple[float, float]) -> Floor:
+        """The same for a band: outside it no sound stands above the noise."""
+        freq = np.linspace(0, sr / 2, len(self.variance))
+        return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), HIDING, self.variance))
 
 
 def _taken_in(variance: Array, wide: float) -> Array:

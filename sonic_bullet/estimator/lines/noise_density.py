@@ -55,22 +55,29 @@ def white(rms: float, sr: int) -> Noise:
     return Noise(np.full(2, rms), np.ones(1), sr)
 
 
-def measured(left: Array, sr: int, floor: float, modes: int = 0) -> Noise:
-    """Noise of what is left (n,) of a recording without its modes, four numbers each; floor: least density."""
-    density = np.maximum(_lower_half(left) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor)
+def measured(left: Array, sr: int, floor: float, modes: int = 0, band_hz: tuple[float, float] = (0.0, np.inf)) -> Noise:
+    """Noise of what is left (n,) of a recording without its modes, four numbers each, by what the band holds;
+    floor: least density.
+    """
+    density = np.maximum(
+        _lower_half(left, sr, band_hz) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor
+    )
     count = len(left) // FRAME
     frames = left[: count * FRAME].reshape(count, FRAME) * np.hanning(FRAME + 2)[1:-1]
     power = np.abs(np.fft.rfft(frames, axis=1))[:, 2:-2] ** 2 / (3 / 8 * FRAME)
     here = np.interp(np.linspace(0, 1, FRAME // 2 + 1)[2:-2], np.linspace(0, 1, len(density)), density)
-    course = np.median(power / here**2, axis=1) / np.log(2)
+    freq = np.fft.rfftfreq(FRAME, 1 / sr)[2:-2]
+    inside = (freq >= band_hz[0]) & (freq <= band_hz[1])
+    use = inside if inside.any() else np.abs(freq - np.mean(band_hz)) < sr / FRAME
+    course = np.median((power / here**2)[:, use], axis=1) / np.log(2)
     return Noise(density, np.maximum(course, 1e-3) if count else np.ones(1), sr)
 
 
-def _lower_half(left: Array) -> Array:
+def _lower_half(left: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     """Rms per sample (n_f,) over frequency 0 … sr/2, from the lower half of the power in neighbourhoods that
     overlap.
     """
-    power = np.abs(np.fft.rfft(left)) ** 2 / len(left)
+    power = _mirrored(np.abs(np.fft.rfft(left)) ** 2 / len(left), sr, band_hz)
     width = min(max(26, len(power) // 60), len(power))
     side = np.pad(power, width // 2, mode="reflect")
     near = np.sort(np.lib.stride_tricks.sliding_window_view(side, width)[:: max(1, width // 8)], axis=1)
@@ -80,15 +87,21 @@ def _lower_half(left: Array) -> Array:
     return np.asarray(np.sqrt(np.interp(np.arange(len(power)), at, mean)))
 
 
-def noise_density(signal: Array, *, tail: bool = False) -> Array:
-    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level; tail: from the last third, else from
-    all.
+def _mirrored(power: Array, sr: int, band_hz: tuple[float, float]) -> Array:
+    """Power (n_f,) over 0 … sr/2 with what the band holds mirrored at its edges in place of what it does not."""
+    first, last = (round(min(f, sr / 2) / (sr / 2) * (len(power) - 1)) for f in band_hz)
+    return np.pad(power[first : last + 1], (first, len(power) - 1 - last), mode="reflect")
+
+
+def noise_density(signal: Array, sr: int, band_hz: tuple[float, float], *, tail: bool = False) -> Array:
+    """Rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level, by what the band holds; tail: from
+    the last third, else from all.
     """
     from scipy.ndimage import percentile_filter
 
     part = signal[-len(signal) // 3 :] if tail else signal
     window = np.hanning(len(part)) if tail else np.ones(len(part))
-    power = np.abs(np.fft.rfft(part * window)) ** 2 / (window**2).sum()
+    power = _mirrored(np.abs(np.fft.rfft(part * window)) ** 2 / (window**2).sum(), sr, band_hz)
     power = np.concatenate([power, power[-1:]]) if len(power) < 64 else power
     width = max(25, len(power) // 60)
     coarse = max(1, width // 50)

@@ -3,8 +3,7 @@ signal.
 
 energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block ->
 about the onset the modes observed after it, run backwards, against silence: the sample where the sound takes over from
-silence -> the onset a later rise of half of all bands by `AGAIN_DB` above what they held the 30 ms before: another hit;
-what follows it is left out. Beats are no hit: they swell in their own bands only
+silence -> the onset a later strike (strike_times.py): another hit; what follows it is left out
 """
 
 from __future__ import annotations
@@ -14,25 +13,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
+from sonic_bullet.estimator.lines.strike_times import GAP_S, find_strikes
 from sonic_bullet.records import Array
 
 BLOCK_S = 1e-3
-AGAIN_DB, NEAR_DB = 6.0, 20.0
-LEAST_GAP_S = 0.02
-FRAME_S, BANDS = 5e-3, 24
+NEAR_DB = 20.0
+HUM, STEADY = 0.5, 1.2  # power before a strike over that after it; of its first half over that of its second
 CLIPPED_RUN = 3
+SHOWN = 6  # hits whose times are said
 REACH = 64  # samples that the first guess may be off
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Samples from the onset to the end or the next hit; hits: how many onsets there are; before: samples that
-    precede it.
-    """
+    """Samples from the onset to the end or the next hit; later: those at which hits after the first begin."""
 
     start: int
     stop: int
-    hits: int
+    later: tuple[int, ...] = ()
+
+    @property
+    def hits(self) -> int:
+        """How many onsets there are."""
+        return 1 + len(self.later)
+
+    def describe_hits(self, sr: int) -> str:
+        """Say how many hits there are, and when; nothing of a single one."""
+        times = [f"{at / sr:.2f}" for at in (self.start, *self.later)][:SHOWN]
+        more = ", …" if self.hits > SHOWN else f" and {times.pop()}"
+        return f"{self.hits} hits, at {', '.join(times)}{more} s" if self.later else ""
 
 
 def levels(signal: Array, sr: int) -> tuple[Array, int]:
@@ -46,7 +55,7 @@ def span(signal: Array, sr: int) -> Span:
     """The first impact of a recording (n,) that is not silent."""
     power, block = levels(signal, sr)
     if len(power) < 4:
-        return Span(0, len(signal), 1)
+        return Span(0, len(signal))
     floor = max(float(np.quantile(power, 0.05)), 1e-20)
     early = int(np.argmax(power >= power.max() * 10 ** (-NEAR_DB / 10)))  # the first hit, be a later one louder
     loud = early + int(np.argmax(power[early : early + 10]))
@@ -57,33 +66,30 @@ def span(signal: Array, sr: int) -> Span:
     edge = max(6 * sigma, 0.02 * float(np.abs(signal).max()))
     over = np.flatnonzero(np.abs(signal[first * block :]) > edge)
     start = first * block + (int(over[0]) if len(over) else 0)
-    again = _hits(signal[start:], sr, float(power[loud]))
-    if not len(again):
-        return Span(start, len(signal), 1)
-    return Span(start, start + int(again[0]), 1 + len(again))
+    found = until_next_hit(signal, sr, start)
+    first, half = found.stop, (found.stop - start) // 2
+    before, after = signal[start:first], signal[first : first + round(GAP_S * sr)]
+    if (
+        found.later
+        and np.abs(after).max() > np.abs(before).max()
+        and _power(before) < HUM * _power(after)
+        and _power(before[:half]) < STEADY * _power(before[half:])
+    ):
+        begin = first - block  # what neither strikes nor decays before a strike is hum or noise, and no hit
+        over = np.flatnonzero(np.abs(signal[begin:]) > np.abs(before).max())
+        return Span(begin + int(over[0]), (*found.later[1:], len(signal))[0], found.later[1:])
+    return found
 
 
-def _hits(signal: Array, sr: int, loudest: float) -> Array:
-    """Samples (h,) at which bands rise together again, at least `LEAST_GAP_S` after the start and after one another."""
-    frame = 1 << round(np.log2(FRAME_S * sr))
-    count = len(signal) // frame
-    if count < 12:
-        return np.zeros(0, int)
-    frames = signal[: count * frame].reshape(count, frame)
-    power = np.abs(np.fft.rfft(frames * np.hanning(frame + 2)[1:-1], axis=1)) ** 2
-    edge = np.unique(np.geomspace(2, frame // 2, BANDS + 1).astype(int))
-    level = 10 * np.log10(np.add.reduceat(power[:, : edge[-1]], edge[:-1], axis=1) + 1e-20)
-    reach = 6
-    before = np.lib.stride_tricks.sliding_window_view(level, reach, axis=0).max(axis=2)[:-1]
-    rise = np.median(np.maximum(level[reach:], np.roll(level, -1, axis=0)[reach:]) - before, axis=1)
-    near = (frames[reach:] ** 2).mean(axis=1) > loudest * 10 ** (-NEAR_DB / 10)
-    sample = (np.flatnonzero((rise > AGAIN_DB) & near) + reach) * frame
-    sample = sample[sample < len(signal) - LEAST_GAP_S * sr]
-    kept: list[int] = []
-    for at in sample[sample > LEAST_GAP_S * sr]:
-        if not kept or at - kept[-1] > 2 * LEAST_GAP_S * sr:
-            kept.append(int(at) - frame)
-    return np.array(kept, int)
+def until_next_hit(signal: Array, sr: int, start: int) -> Span:
+    """The impact of a recording (n,) that begins at sample ``start``."""
+    strikes = find_strikes(signal, sr)
+    later = tuple(round(t * sr) for t in strikes[strikes > start / sr + GAP_S])
+    return Span(start, later[0] if later else len(signal), later)
+
+
+def _power(signal: Array) -> float:
+    return float((signal**2).mean())
 
 
 def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float) -> int:

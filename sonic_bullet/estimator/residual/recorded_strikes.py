@@ -19,13 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.material_fit import CaseFit
+from sonic_bullet.estimator.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
+from sonic_bullet.estimator.fit.typical_strike import ringing
+from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.estimator.perceptual.loudness import bark
 from sonic_bullet.estimator.perceptual.matching import energy
-from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import StruckModes
 
@@ -116,39 +117,49 @@ def strikes_of(
 
 
 def case_strikes(found: CaseFit) -> Strikes:
-    """The residual of a fitted case, of the object with the most strikes.
+    """The residual of a fitted case, of the object with the most strikes: beside its modes, or, where no mode of a
+    shape is known, beside the lines that its preset plays.
 
     Raises AudioError where no recording can be used.
     """
-    observed = [o for o in found.objects if o.evidence.signals is not None and len(o.freq_hz)]
-    if not observed:
+    shaped = {o.evidence.thing.name: o for o in found.objects if len(o.freq_hz)}
+    recorded = [e for e in found.evidence if e.signals is not None and (e.thing.name in shaped or len(e.lines.freq_hz))]
+    if not recorded:
         raise AudioError(
-            f"case {found.case.name} has no recording of a body with a mesh",
+            f"case {found.case.name} has no recording in which anything rings",
             "a residual is what a recording has beside its modes",
         )
-    o = max(observed, key=lambda x: len(x.evidence.recordings))
-    e = o.evidence
-    assert e.signals is not None and e.seen is not None
+    e = max(recorded, key=lambda x: (x.thing.name in shaped, len(x.recordings)))
+    assert e.signals is not None
     sr, n = e.sr, e.signals.shape[1]
     left = np.stack([signal - lines_sound(e.lines, i, n, sr) for i, signal in enumerate(e.signals)])
-    use = o.freq_hz < sr / 2
+    lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
+    modes = _played_modes(found, shaped[e.thing.name]) if e.thing.name in shaped else _played_lines(e.lines)
+    names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
+    return strikes_of(e.signals, left, sr, lines, modes, f"{found.case.name}: {names}"[:400])
+
+
+def _played_lines(lines: Lines) -> tuple[Array, Array, Array]:
+    """Frequency, decay (m,), amplitude (s, m) of the lines that a preset plays where no shape is known."""
+    keep = ringing(lines)
+    return lines.freq_hz[keep], lines.decay_per_s[keep], lines.amplitude[:, keep]
+
+
+def _played_modes(found: CaseFit, o: ObjectFit) -> tuple[Array, Array, Array]:
+    """Frequency, decay (m,), amplitude (s, m) of what a fit plays of the strikes of a shape: of those without a place
+    what was recorded.
+    """
+    e = o.evidence
+    assert e.seen is not None
+    use = o.freq_hz < e.sr / 2
     measured = (
         np.where(o.line >= 0, e.lines.amplitude[:, o.line], 0.0)
         if len(e.lines.freq_hz)
-        else np.zeros((len(e.signals), len(o.line)))
+        else np.zeros((len(e.recordings), len(o.line)))
     )
     predicted = found.fit.sigma * o.pattern * e.seen.start(o.freq_hz, o.decay_per_s)
     amplitude = np.where(np.isfinite(predicted), predicted, measured)
-    lines = e.lines.freq_hz, np.nan_to_num(e.lines.decay_per_s), np.nan_to_num(e.lines.amplitude)
-    names = ", ".join(r.file.name for r in e.recordings if r.file is not None)
-    return strikes_of(
-        e.signals,
-        left,
-        sr,
-        lines,
-        (o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]),
-        f"{found.case.name}: {names}"[:400],
-    )
+    return o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]
 
 
 def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) -> Strikes:
@@ -169,31 +180,3 @@ def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) 
     observed = damped(found.freq_hz, found.decay_per_s, amplitude, len(signal), sr)
     modes = found.freq_hz, found.decay_per_s, amplitude[None]
     return strikes_of(signal[None], (signal - observed)[None], sr, modes, modes, name)
-
-
-def strike_modes(found: CaseFit, recording: CaseRecording, sr: int) -> tuple[Array, Array, Array]:
-    """Frequency, decay (m,) and complex amplitude (m,) that a fit predicts of any strike of its case at rate ``sr``.
-
-    Raises FileError, MeshError.
-    """
-    from sonic_bullet.estimator.fit.object_fit import object_of
-    from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed
-
-    if recording.position_m is None:
-        raise FileError("a strike without a place cannot be predicted", "give its position")
-    thing = found.case.objects[recording.object]
-    same = next((o for o in found.objects if o.evidence.thing.name == recording.object), None)
-    guess = guess_of(thing)
-    body = (
-        same.evidence.family if same is not None else body_family(found.case, thing, guess, "default", lambda _: None)
-    )
-    if body is None:
-        raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
-    seen = observed(found.case, thing, guess, (recording,), body)
-    made = object_of(found, thing, guess, body, seen, same)
-    use = made.freq_hz < sr / 2
-    return (
-        made.freq_hz[use],
-        made.decay_per_s[use],
-        (found.fit.sigma * made.pattern[0] * seen.start(made.freq_hz, made.decay_per_s))[use],
-    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Collection, Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,7 +25,7 @@ from sonic_bullet.records.coerce import LISTED, shown
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, usual_mounting
-from sonic_bullet.records.simulated import Simulator, Values, finite
+from sonic_bullet.records.simulated import Simulator, Values, finite, with_body_id
 
 HEAVIEST_KG = 1e12
 DYNAMICS = {
@@ -39,6 +39,9 @@ DYNAMICS = {
     "collisionMargin": 11,
 }
 """Places in getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set."""
+
+PLACEHOLDER = "link0"
+"""What createMultiBody calls the base of a body, which has no name then."""
 
 
 def check_exists(client_id: int, body: int, link: int) -> None:
@@ -64,7 +67,7 @@ def check_usable(client_id: int, body: int) -> None:
     """Raise SceneError where an existing body is soft, or its pose or speed is not a number."""
     if is_soft(client_id, body):
         raise SceneError(
-            f"body {body} ({link_name(client_id, body, -1)}) is a soft body, which cannot sound",
+            f"{describe_link(client_id, body)} is a soft body, which cannot sound",
             "load it as a rigid body with createMultiBody or loadURDF",
         )
     if read_motion(client_id, read_roster(client_id, [other for other in body_ids(client_id) if other != body])).broken:
@@ -74,14 +77,19 @@ def check_usable(client_id: int, body: int) -> None:
 
 
 def link_name(client_id: int, body: int, link: int) -> str:
-    """A name for people: the body's, and the link's where it is not the base."""
+    """A name for people: the body's, and the link's where it is not the base; "body 2" where nobody gave any."""
     base, whole = (text.decode(errors="replace") for text in pybullet.getBodyInfo(body, physicsClientId=client_id))
-    name = whole or base or f"body {body}"
+    name = whole or (base if base != PLACEHOLDER else "") or f"body {body}"
     return (
         name
         if link < 0
         else f"{name}/{pybullet.getJointInfo(body, link, physicsClientId=client_id)[12].decode(errors='replace')}"
     )
+
+
+def describe_link(client_id: int, body: int, link: int = -1) -> str:
+    """A link in a message: its name and its body's id."""
+    return with_body_id(link_name(client_id, body, link), body)
 
 
 def link_names(client_id: int, body: int) -> list[str]:
@@ -260,8 +268,23 @@ class AskedLinks(World):
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
         own = link_name(self.client_id, body, link)
-        name = self.properties.names.called(int(encode(body, link)), own)
-        return name if name == f"body {body}" else f"{name} (body {body})"
+        return with_body_id(self.properties.names.called(int(encode(body, link)), own), body)
+
+    def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
+        """What the records of links (body, link, name to be given) are or would be called, if all were added now."""
+        return self.properties.names.expected(
+            [(int(encode(body, link)), link_name(self.client_id, body, link), given) for body, link, given in links]
+        )
+
+    def all_links(self) -> tuple[tuple[int, int], ...]:
+        """(body, link) of every link in the world that has a collision shape; none where the connection is lost."""
+        from sonic_bullet.listener.pybullet.clients import is_connected, links_with_shapes
+
+        return links_with_shapes(self.client_id) if is_connected(self.client_id) else ()
+
+    def silence(self, names: Collection[str]) -> None:
+        """Records of links, or of all links of bodies, called so are `silent` from now on."""
+        self.properties.names.silent = frozenset(names)
 
     def link_name(self, body: int, link: int) -> str:
         """The link's own name, without its body's."""

@@ -19,7 +19,7 @@ from sonic_bullet.listener.frames import NO_NUMBER
 from sonic_bullet.listener.polling import FORCE
 from sonic_bullet.listener.properties import SetValues
 from sonic_bullet.listener.pybullet import collision_shapes
-from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, link_name
+from sonic_bullet.listener.pybullet.body_facts import checked_mass_kg, describe_link
 from sonic_bullet.listener.pybullet.clients import client_id_of
 from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
@@ -28,6 +28,7 @@ from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.restitution import endless_bounces, lost_restitution
 from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m, read_surfaces
 from sonic_bullet.records.errors import MeshError, SceneError
+from sonic_bullet.records.simulated import with_body_id
 
 LONGEST_STEP_S = 1 / 120
 SMALLEST_M = 1e-3
@@ -142,7 +143,7 @@ def _lids(client_id: int) -> list[Finding]:
                 Finding(
                     "hull-lid",
                     "warning",
-                    f"body {body} ({link_name(client_id, body, link)}) is hollow, but moving meshes collide "
+                    f"{describe_link(client_id, body, link)} is hollow, but moving meshes collide "
                     "as their convex hull: hits land on an invisible lid",
                     "decompose it with pybullet.vhacd, build it of several shapes, or fix it with mass 0 and "
                     "GEOM_FORCE_CONCAVE_TRIMESH",
@@ -190,7 +191,7 @@ def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
                 Finding(
                     "scale",
                     "warning",
-                    f"body {body} ({link_name(client_id, body, link)}) is {size:.3g} m long",
+                    f"{describe_link(client_id, body, link)} is {size:.3g} m long",
                     "PyBullet thinks in metres: load a mesh made in millimetres with scale 0.001",
                 )
             )
@@ -250,7 +251,7 @@ def _oversized(world: PyBulletWorld) -> list[Finding]:
         Finding(
             "scale",
             "warning",
-            f"body {body.body_id} ({body.name}) {words}",
+            f"{with_body_id(body.name, body.body_id)} {words}",
             "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres; "
             "leave it out of the sound if it is the ground",
         )
@@ -274,7 +275,7 @@ def _densities(world: PyBulletWorld) -> list[Finding]:
                 Finding(
                     "density",
                     "warning",
-                    f"body {body.body_id} ({body.name}) weighs {body.mass_kg:.3g} kg, but a solid of "
+                    f"{with_body_id(body.name, body.body_id)} weighs {body.mass_kg:.3g} kg, but a solid of "
                     f"{body.material.name} of that size {expected:.3g} kg",
                     "set its mass with changeDynamics, or check the mesh's scale",
                 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from sonic_bullet.listener.pybullet.body_facts import link_name
+from sonic_bullet.listener.pybullet.body_facts import describe_link
 from sonic_bullet.listener.pybullet.poses import read_roster
 
 Severity = Literal["error", "warning", "info"]
@@ -31,5 +31,5 @@ def all_links(client_id: int) -> list[tuple[int, int]]:
 
 def name_links(client_id: int, links: list[tuple[int, int]]) -> str:
     """The first of them in words, and how many more."""
-    first = f"body {links[0][0]} ({link_name(client_id, *links[0])})"
+    first = describe_link(client_id, *links[0])
     return first if len(links) == 1 else f"{first} and {len(links) - 1} more"

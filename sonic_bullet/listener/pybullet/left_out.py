@@ -22,6 +22,7 @@ from sonic_bullet.listener.frames import LINK_SPAN
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneWarning
+from sonic_bullet.records.simulated import with_body_id
 
 
 class BodiesLeftOut:
@@ -36,10 +37,8 @@ class BodiesLeftOut:
     def mute(self, bodies: Mapping[int, str], what: str) -> None:
         """Leave bodies, with their names, out from now on. what: they have that is wrong."""
         self.muted.update(bodies)
-        who = ", ".join(f"{body} ({name})" for body, name in bodies.items())
-        subject, be, them = (
-            (f"body {who} has", "it is", "it") if len(bodies) == 1 else (f"bodies {who} have", "they are", "them")
-        )
+        who = ", ".join(with_body_id(name, body) for body, name in bodies.items())
+        subject, be, them = (f"{who} has", "it is", "it") if len(bodies) == 1 else (f"{who} have", "they are", "them")
         self._say(
             f"{subject} {what}: {be} mute until removed or added anew; check mass, inertia and what touches {them}"
         )
@@ -49,14 +48,15 @@ class BodiesLeftOut:
         for body, name in soft.items():
             if body not in self.soft:
                 self._say(
-                    f"body {body} ({name}) is soft: PyBullet tells neither its mass nor its speed, so it "
+                    f"{with_body_id(name, body)} is soft: PyBullet tells neither its mass nor its speed, so it "
                     "neither sounds nor strikes"
                 )
         self.soft = set(soft)
 
     def meet_drawn(self, body: int, name: str) -> None:
         """Note a body whose drawn shape stands in for what it collides as."""
-        text = f"body {body} ({name}) sounds as what is drawn, which fills the same space: how it was made was not seen"
+        who = with_body_id(name, body)
+        text = f"{who} sounds as what is drawn, which fills the same space: how it was made was not seen"
         if text not in self.notes:
             self._say(text)
 

@@ -12,7 +12,7 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.listener.properties import SetValues
-from sonic_bullet.listener.pybullet.body_facts import link_name
+from sonic_bullet.listener.pybullet.body_facts import describe_link
 from sonic_bullet.listener.pybullet.clients import client_id_of
 from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
 
@@ -88,7 +88,7 @@ def endless_bounces(client_id: int, known: SetValues) -> list[Finding]:
         Finding(
             "restitution-threshold",
             "warning",
-            f"restitutionVelocityThreshold is {threshold:g} m/s: body {body} ({link_name(client_id, body, link)}), of "
+            f"restitutionVelocityThreshold is {threshold:g} m/s: {describe_link(client_id, body, link)}, of "
             f"restitution {e:.2g} against what it touches, never comes to rest at a step of "
             f"{settings['fixedTimeStep']:.4g} s but bounces on at about {speed:.2g} m/s",
             f"set restitutionVelocityThreshold above {speed:.2g} m/s (Bullet's default is 0.2), or a shorter step",

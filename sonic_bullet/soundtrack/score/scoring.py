@@ -17,6 +17,7 @@ import numpy as np
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.listener.animated import AnimatedBody, PoseStage
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, shown
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
@@ -66,6 +67,7 @@ def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale
     return read_keyframes(place, fps, scale)
 
 
+@says_so(text="say", fraction="progress")
 def score_animation(
     animation: str | os.PathLike[str] | Animation,
     *,

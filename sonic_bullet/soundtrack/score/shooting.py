@@ -85,7 +85,7 @@ class Shooting:
                 owed = np.where(np.any(before.touching, axis=1, keepdims=True), 0.0, missing)
             before = shot = self._shot(k, best.speed, best.restitution, polled=True).shot
             last = shot.motion[-1]
-            self._start = self._followed(last, self._motion[k + 1])
+            self._start = self._followed(last, self._motion[k + 1], np.asarray(shot.touching.any(axis=1)))
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
             self._trust_m_s = self._speed_m_s
             if progress is not None:
@@ -93,15 +93,15 @@ class Shooting:
         if before is not None:
             found += self._corrected(before, owed)
 
-    def _followed(self, end: Array, pose: Array) -> Array:
+    def _followed(self, end: Array, pose: Array, touching: Array) -> Array:
         """Where the next frame begins: at its pose (b,), or, where noise hides the difference, where this one ended:
-        begun at noisy poses anew, what rests would fall a little in every frame.
+        begun at poses anew, what rests, touching (b,), would fall a little in every frame.
         """
-        if self._hidden_m < POSE_M:
-            return pose
+        good = np.sqrt(ENOUGH) * POSE_M
+        hidden = np.where(touching, max(self._hidden_m, good), self._hidden_m if self._hidden_m >= POSE_M else 0.0)
         away = np.linalg.norm(end["position_m"] - pose["position_m"], axis=1)
         turned = np.linalg.norm(rotation(pose["quaternion_xyzw"], end["quaternion_xyzw"]), axis=1)
-        within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < self._hidden_m)
+        within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < hidden)
         return np.where(within, end, pose)
 
     def _corrected(self, shot: Shot, missing: Array) -> list[tuple[Array, Array]]:

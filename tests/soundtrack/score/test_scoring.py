@@ -12,7 +12,7 @@ from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import assembled
 from sonic_bullet.soundtrack.score.scoring import score_animation
 from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events
-from tests.made.animations import MASS_KG, ball_animation, bounce_m, dropped, export_of
+from tests.made.animations import MASS_KG, RADIUS_M, ball_animation, bounce_m, dropped, export_of
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +80,31 @@ def test_noise_is_not_played(fps: float, seed: int) -> None:
     assert heard[0][1] == pytest.approx(mass * 9.81 * fall_s, abs=hidden + 0.2 * mass * 9.81 * fall_s)
     assert not [one for one in heard[1:] if one[0] > fall_s + 0.1 or one[1] < hidden / 2]
     assert any("not played" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("fps", [24.0, 25.0, 30.0, 48.0, 60.0])
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.7])
+def test_a_landing_is_played_whole_wherever_in_a_frame_it_falls(fps: float, restitution: float) -> None:
+    """m v (1 + e) within a twentieth, once. One in the last sixth of a frame was played with 84 % of it."""
+    drop_m, fall_s = 0.3, float(np.sqrt(2 * 0.3 / 9.81))
+    for phase in (0.02, 0.3, 0.6, 0.85, 0.97):
+        frame = int(np.ceil(fall_s * fps))
+        struck_s = (frame + phase) / fps
+        time_s = np.arange(frame + int(0.1 * fps) + 2) / fps - struck_s + fall_s
+        height = bounce_m(np.abs(time_s), drop_m, restitution)
+        height[time_s > fall_s] = np.maximum(height[time_s > fall_s], RADIUS_M)
+        found = score_animation(replace(ball_animation(height, fps), materials={"ball": "plastic"}), sr=8000)
+        landing = [one for one in impacts(found.log) if abs(one[0] - struck_s) < 0.03]
+        expected = MASS_KG * (1 + restitution) * 9.81 * fall_s
+        assert [impulse for _, impulse in landing] == [pytest.approx(expected, rel=0.05)], phase
+        assert landing[0][0] == pytest.approx(struck_s, abs=1 / 240), phase
+
+
+def test_who_came_to_rest_carries_its_weight_and_is_struck_no_more() -> None:
+    time_s, fall_s = np.arange(20) / 48, float(np.sqrt(2 * 0.1 / 9.81))
+    height = np.where(time_s < fall_s, bounce_m(time_s, 0.1, 0.0), RADIUS_M)
+    found = score_animation(replace(ball_animation(height, 48.0), materials={"ball": "plastic"}), sr=8000)
+    assert len(impacts(found.log)) == 1
+    late = found.log.steps[-50:]
+    load = [abs(float(step.contacts.row["impulse_n_s"][:, 2].sum())) / step.dt_s for step in late]
+    assert load == pytest.approx(np.full(50, MASS_KG * 9.81), rel=0.01)

@@ -6,8 +6,7 @@ and at 240 Hz Bullet's own correction (0.2 of the depth a step) would throw them
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,7 @@ from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.pybullet.questions import Settings, contact_points
-from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
-from sonic_bullet.machine.worker import temporary_folder
+from sonic_bullet.listener.pybullet.staged.body_shapes import collision_options, compound
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
@@ -30,6 +28,8 @@ TILT_M = 2e-3
 queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m)."""
 
 
+MOMENT_S = 1e-6
+"""Length of the step that shows who overlaps: nothing moves in it."""
 SAME_FACE = 0.9
 """Cosine of the angle between normals up to which places are of one face: tilts of small bodies are a quarter of it."""
 
@@ -68,12 +68,12 @@ class AnimatedStage:
 
     def _made(self, body: AnimatedBody) -> int:
         ask, cid = pybullet, self.client_id
-        made_of = [options for shape in body.shapes for options in _collision(shape, body)]
+        made_of = [options for shape in body.shapes for options in collision_options(shape, body)]
         if len(made_of) > 1 and any("indices" in options for options in made_of):
             raise AnimationError(
                 f"body '{body.name}': one of its meshes has too many faces", "make it a body of its own"
             )
-        shape = _compound(made_of, cid)
+        shape = compound(made_of, cid)
         if shape < 0:
             raise AnimationError(f"body '{body.name}': PyBullet makes no collision shape of it", "simplify its mesh")
         made = int(ask.createMultiBody(body.mass_kg, shape, physicsClientId=cid))
@@ -180,7 +180,7 @@ class AnimatedStage:
         pybullet.setTimeStep(dt_s, physicsClientId=cid)
         course = between(start, end, steps, dt_s)
         motion, raws = np.zeros((steps + 1, many), MOTION), []
-        touching = np.zeros((many, many), bool)
+        touching, loaded = np.zeros((many, many), bool), np.zeros((many, many), bool)
         for row in range(many):
             self._set(row, start[row] if not self.held[row] else course[0, row])
             if not self.held[row]:
@@ -192,76 +192,88 @@ class AnimatedStage:
                 self._set(row, course[step, row])
             pybullet.stepSimulation(physicsClientId=cid)
             points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
-            for one in points:
-                if one[9] > 0:
-                    a, b = self.row_of[one[1]], self.row_of[one[2]]
-                    touching[a, b] = touching[b, a] = True
+            now = self._loaded(points)
+            motion[step + 1] = self._after(course[step + 1])
+            fresh = now & ~loaded if step else np.zeros_like(now)  # a start that overlaps is a pose as it was given
+            self._carry_back(points, fresh, motion[step], motion[step + 1], dt_s)
+            loaded, touching = now, touching | now
             raws.append(raw)
-            if polled or step == steps - 1:
-                motion[step + 1] = course[step + 1]
-                for row in np.flatnonzero(~self.held).tolist():
-                    out = motion[step + 1, row]
-                    out["position_m"], out["quaternion_xyzw"] = pybullet.getBasePositionAndOrientation(
-                        self.ids[row], physicsClientId=cid
-                    )
-                    out["velocity_m_s"], out["spin_rad_s"] = pybullet.getBaseVelocity(
-                        self.ids[row], physicsClientId=cid
-                    )
-        return Shot(motion, tuple(raws), touching)
+        late = self._struck_late(motion, loaded, dt_s, polled)
+        raws[-1] = np.concatenate([raws[-1], late[0]])
+        return Shot(motion, tuple(raws), touching | late[1])
+
+    def _loaded(self, points: Sequence[tuple[Any, ...]]) -> Array:
+        """(b, b) who exchanges a force."""
+        found = np.zeros((len(self.ids), len(self.ids)), bool)
+        for one in points:
+            if one[9] > 0:
+                a, b = self.row_of[one[1]], self.row_of[one[2]]
+                found[a, b] = found[b, a] = True
+        return found
+
+    def _after(self, course: Array) -> Array:
+        """MOTION (b,) now, of who is held as `course` says."""
+        made, cid = course.copy(), self.client_id
+        for row in np.flatnonzero(~self.held).tolist():
+            out, body = made[row], self.ids[row]
+            out["position_m"], out["quaternion_xyzw"] = pybullet.getBasePositionAndOrientation(
+                body, physicsClientId=cid
+            )
+            out["velocity_m_s"], out["spin_rad_s"] = pybullet.getBaseVelocity(body, physicsClientId=cid)
+        return made
+
+    def _carry_back(
+        self, points: Sequence[tuple[Any, ...]], fresh: Array, before: Array, after: Array, dt_s: float
+    ) -> bool:
+        """Move bodies to where they were had they been struck as they met, and not when Bullet sees that they overlap:
+        at most a step earlier, `after` (b,) in place; whether there was such an impact. fresh (b, b): whose to look at.
+        """
+        early_s = np.zeros(len(self.ids))
+        falls = 2 * float(np.linalg.norm(self.gravity_m_s2)) * dt_s
+        for one in points if fresh.any() else ():
+            a, b = self.row_of[one[1]], self.row_of[one[2]]
+            if not (fresh[a, b] and one[9] > 0 and one[8] < 0):
+                continue
+            speed = -_point_speed(before[a], one[5]) @ one[7] + _point_speed(before[b], one[6]) @ one[7]
+            if speed > falls:  # what rests falls for a step at each pose
+                early_s[[a, b]] = np.maximum(early_s[[a, b]], min(-one[8] / speed, dt_s))
+        for row in np.flatnonzero((early_s > 0) & ~self.held).tolist():
+            out = after[row]
+            out["position_m"] += early_s[row] * (out["velocity_m_s"] - before[row]["velocity_m_s"])
+            turn = early_s[row] * (out["spin_rad_s"] - before[row]["spin_rad_s"])
+            out["quaternion_xyzw"] = turned(out["quaternion_xyzw"][None], turn[None])[0]
+            self._set(row, out)
+        return bool(early_s.any())
+
+    def _struck_late(self, motion: Array, loaded: Array, dt_s: float, polled: bool) -> tuple[Array, Array]:
+        """RAW rows of who meets in the last step of a shot and overlaps at its end, which Bullet would see a step
+        later: one of a microsecond shows it. Who touches so (b, b) and where that leads, into the last of `motion`.
+        """
+        cid = self.client_id
+        pybullet.setTimeStep(MOMENT_S, physicsClientId=cid)
+        pybullet.stepSimulation(physicsClientId=cid)
+        points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
+        fresh = self._loaded(points) & ~loaded
+        before, after = motion[-1].copy(), self._after(motion[-1])
+        if not self._carry_back(points, fresh, before, after, dt_s):
+            return NO_RAW, np.zeros_like(loaded)
+        motion[-1] = after
+        rows = self.rows(raw["body_a"]), self.rows(raw["body_b"])
+        late = raw[fresh[rows] & (raw["force_n"] > 0)].copy()
+        for one in late:  # in the step's own terms: its length, and the pose at its start
+            a, b = self.row_of[int(one["body_a"])], self.row_of[int(one["body_b"])]
+            travel_m = [dt_s * _point_speed(before[i], one[p]) for i, p in ((a, "point_a_m"), (b, "point_b_m"))]
+            one["point_a_m"] -= travel_m[0]
+            one["point_b_m"] -= travel_m[1]
+            one["gap_m"] -= (travel_m[0] - travel_m[1]) @ one["normal"]
+            for force in ("force_n", "friction_1_n", "friction_2_n"):
+                one[force] *= MOMENT_S / dt_s
+        return late, fresh
 
 
-def _compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
-    """A collision shape of one or several; several meshes go through files, of which PyBullet makes hulls."""
-    if len(shapes) == 1:
-        return int(pybullet.createCollisionShape(**shapes[0], physicsClientId=client_id))
-    with temporary_folder() as folder:
-        names = [str(Path(folder, f"{number}.obj")) for number in range(len(shapes))]
-        for name, shape in zip(names, shapes, strict=True):
-            if "vertices" in shape:
-                Path(name).write_text(_wavefront(np.array(shape["vertices"])), "ascii")
-        made = pybullet.createCollisionShapeArray(
-            shapeTypes=[one["shapeType"] for one in shapes],
-            radii=[one.get("radius", 0.0) for one in shapes],
-            halfExtents=[one.get("halfExtents", [0, 0, 0]) for one in shapes],
-            lengths=[one.get("height", 0.0) for one in shapes],
-            fileNames=[name if "vertices" in one else "" for name, one in zip(names, shapes, strict=True)],
-            meshScales=[[1, 1, 1]] * len(shapes),
-            collisionFramePositions=[one["collisionFramePosition"] for one in shapes],
-            collisionFrameOrientations=[one["collisionFrameOrientation"] for one in shapes],
-            physicsClientId=client_id,
-        )
-    return int(made)
-
-
-def _wavefront(vertex: Array) -> str:
-    """A hull's corners as a mesh file; which faces they have does not matter to who takes their hull."""
-    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertex.tolist()]
-    return "\n".join([*corners, *(f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertex) - 1))]) + "\n"
-
-
-def _collision(shape: Shape, body: AnimatedBody) -> Iterator[dict[str, Any]]:
-    """What createCollisionShapeArray wants of a shape; of a mesh its convex pieces."""
-    placed = {
-        "collisionFramePosition": shape.position_m.tolist(),
-        "collisionFrameOrientation": shape.quaternion_xyzw.tolist(),
-    }
-    size = shape.size_m.tolist()
-    if shape.kind == "sphere":
-        yield {"shapeType": pybullet.GEOM_SPHERE, "radius": size[0], **placed}
-    elif shape.kind == "box":
-        yield {"shapeType": pybullet.GEOM_BOX, "halfExtents": [x / 2 for x in size], **placed}
-    elif shape.kind in ("capsule", "cylinder"):
-        kind = pybullet.GEOM_CAPSULE if shape.kind == "capsule" else pybullet.GEOM_CYLINDER
-        yield {"shapeType": kind, "radius": size[0], "height": size[1], **placed}
-    elif shape.kind == "plane":
-        yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
-    else:
-        found = pieces(shape, body.name, body.mass_kg > 0)
-        for corner in found:
-            yield {"shapeType": pybullet.GEOM_MESH, "vertices": corner.tolist(), **placed}
-        if not found:
-            bare = {"vertices": shape.vertex_m.tolist(), "indices": shape.face.ravel().tolist()}
-            yield {"shapeType": pybullet.GEOM_MESH, **bare, **placed}
+def _point_speed(motion: Array, point_m: Any) -> Array:
+    """Velocity (3,) of a body's point at a place of the world."""
+    return np.asarray(motion["velocity_m_s"] + np.cross(motion["spin_rad_s"], point_m - motion["position_m"]))
 
 
 def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) -> Array:
@@ -321,6 +333,7 @@ class AnimatedWorld(PyBulletWorld):
         self._at += 1
         now = Motion(self._past.roster, rows)
         self._memory.poll(raw, stepped=True)
+        self._memory.touches = None  # nobody sleeps: what rests to the bit carries its weight
         step = self._usual(now, True) or self._unusual(now, True, None)
         self._past = now
         self.step_count += 1

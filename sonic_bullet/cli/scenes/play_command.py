@@ -14,7 +14,8 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import json_option, scene_options
-from sonic_bullet.records.errors import AudioError, FileError, SceneError
+from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, check_scene_file, is_log
+from sonic_bullet.records.errors import AudioError, SceneError
 
 if TYPE_CHECKING:
     from sonic_bullet.live import Playback, PlaybackReport
@@ -54,10 +55,8 @@ REFRESH_S = 0.25  # of the line on a terminal
 def play(scene: str, json_to: str | None, **options: Any) -> None:
     """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
     path = Path(scene)
-    if not path.is_file():
-        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
-    if path.suffix.lower() not in (".py", ".npz"):
-        raise FileError(f"cannot play {scene}: neither a scene nor a log", "give a file that ends in .py or .npz")
+    check_scene_file(scene, "play")
+    materials = WantedMaterials.read(options.pop("material"), options.pop("silent"))
     (json_to,) = places(json_to)
     given = {name: value for name, value in options.items() if value not in (None, ())}
     if given.get("device", "").isdecimal():
@@ -66,7 +65,7 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
         with progress_bar(path.name) as (progress, tell):
             show = _Show({name: given.pop(name) for name in CARD_OPTIONS if name in given}, progress, tell)
             try:
-                notes = (_play_log if path.suffix.lower() == ".npz" else _play_scene)(scene, given, show)
+                notes = (_play_log if is_log(scene) else _play_scene)(scene, given, materials, show)
             except KeyboardInterrupt as error:
                 said = [str(error) or "stopped", *([str(show.report)] if show.playback is not None else [])]
                 raise KeyboardInterrupt("; ".join(said)) from error
@@ -102,7 +101,7 @@ class _Show:
             self._drawn_s = time.perf_counter()
 
 
-def _play_scene(scene: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
+def _play_scene(scene: str, given: dict[str, Any], materials: WantedMaterials, show: _Show) -> tuple[str, ...]:
     with quiet_stderr():
         from sonic_bullet.scene import run_scene
         from sonic_bullet.session import Listener
@@ -110,10 +109,10 @@ def _play_scene(scene: str, given: dict[str, Any], show: _Show) -> tuple[str, ..
     def begin(listener: Listener) -> None:
         show.playback = listener.play(**show.card)
 
-    return run_scene(scene, begin, **given, progress=show, say=show.tell)
+    return run_scene(scene, begin, **given, **materials.options, progress=show, say=show.tell)
 
 
-def _play_log(path: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
+def _play_log(path: str, given: dict[str, Any], materials: WantedMaterials, show: _Show) -> tuple[str, ...]:
     import numpy as np
 
     from sonic_bullet.files import check_sr, read_log
@@ -121,10 +120,9 @@ def _play_log(path: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
     from sonic_bullet.records import Microphone
     from sonic_bullet.records.coerce import as_number
     from sonic_bullet.render import LATENCY_STEPS, log_frames
+    from sonic_bullet.session.chosen_in_log import with_choice
 
-    if "material" in given:
-        raise FileError("--material does not apply to a contact log, whose bodies bring theirs", "leave it out")
-    log = read_log(path)
+    log, said = with_choice(read_log(path), materials.choice(), path, show.tell)
     log = replace(
         log,
         sr=check_sr(given.get("sr", log.sr)),
@@ -140,4 +138,4 @@ def _play_log(path: str, given: dict[str, Any], show: _Show) -> tuple[str, ...]:
         for number, frame in enumerate(frames, start=1):
             show.playback.push(frame, time.perf_counter())
             show(number / len(log.steps))
-    return ()
+    return said

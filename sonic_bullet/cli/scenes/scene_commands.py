@@ -5,8 +5,7 @@ not at all.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,15 @@ from sonic_bullet.cli.output import (
     status,
     write_json,
 )
+from sonic_bullet.cli.scenes.scene_runs import (
+    Replay,
+    WantedMaterials,
+    Wish,
+    check_scene_file,
+    is_log,
+    replayed,
+    simulated,
+)
 from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_warnings
 from sonic_bullet.cli.soundtrack.soundtrack_outputs import Soundtrack, SoundtrackWish
 from sonic_bullet.files import (
@@ -26,7 +34,6 @@ from sonic_bullet.files import (
     check_audio_output,
     check_sr,
     kept_name,
-    read_log,
     write_audio,
     write_log,
 )
@@ -35,11 +42,7 @@ from sonic_bullet.records.errors import AudioError, FileError, SceneError, Sonic
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
-    from sonic_bullet.files.rows.spool import KeptSound
     from sonic_bullet.scene import RenderResult
-    from sonic_bullet.session import Listener
-
-DEFAULT_SR = 48_000
 
 
 def run_render(
@@ -54,7 +57,8 @@ def run_render(
     json_to: str | None,
     microphones: tuple[tuple[float, float, float], ...],
     seed: int | None,
-    material: str | None,
+    material: tuple[str, ...],
+    silent: tuple[str, ...],
     residual: bool | None,
     supports: bool | None,
     **others: Any,
@@ -65,7 +69,8 @@ def run_render(
     """
     rate = None if sr is None else check_sr(sr)
     level = LevelWish(**{name: others.pop(name) for name in OPTIONS})
-    check_request(scene, seconds, level, material)
+    check_request(scene, seconds, level)
+    materials = WantedMaterials.read(material, silent)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
     extras = SoundtrackWish(**others).checked(output)
@@ -81,7 +86,7 @@ def run_render(
                     rate,
                     microphones,
                     seed,
-                    material,
+                    materials,
                     residual,
                     supports,
                     progress,
@@ -148,30 +153,12 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     )
 
 
-def is_log(scene: str) -> bool:
-    """Whether a scene is a contact log, by its name."""
-    return Path(scene).suffix.lower() == ".npz"
-
-
-def check_request(scene: str, seconds: float | None, level: LevelWish, material: str | None) -> None:
+def check_request(scene: str, seconds: float | None, level: LevelWish) -> None:
     """Raise what is wrong with what is asked of a scene or log, before anything runs."""
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
     level.check()
-    if not Path(scene).is_file():
-        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
-    if Path(scene).suffix.lower() not in (".py", ".npz"):
-        raise FileError(
-            f"cannot render {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz"
-        )
-    if material is not None and is_log(scene):
-        raise FileError(
-            "--material does not apply to a contact log, whose bodies bring theirs", "leave it out, or render the scene"
-        )
-    if material is not None:
-        from sonic_bullet.presets import load_material
-
-        load_material(material)
+    check_scene_file(scene, "render")
 
 
 def _check_places(output: str, *others: str | None) -> tuple[str, str | None, str | None, str | None, str | None]:
@@ -189,84 +176,6 @@ def _check_places(output: str, *others: str | None) -> tuple[str, str | None, st
         check_picture_output(picture)
     to, *found = places(output, *others)
     return str(to), found[0], found[1], found[2], found[3]
-
-
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """What the user asked of a render; None and empty: as the scene or the log has it."""
-
-    seconds: float | None
-    rate: int | None
-    microphones: tuple[tuple[float, float, float], ...]
-    seed: int | None
-    material: str | None
-    residual: bool | None
-    supports: bool | None
-    progress: Callable[[float], None]
-    say: Callable[[str], None]
-    at_end: Callable[[Listener], object] | None = None
-    tail_db: float | None = None
-
-
-def simulated(scene: str, wish: Wish) -> RenderResult:
-    """A scene, run."""
-    with quiet_stderr():
-        from sonic_bullet.scene import render_scene
-
-    sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
-    asked: dict[str, Any] = {
-        "seconds": wish.seconds,
-        "sr": sr,
-        "seed": wish.seed or 0,
-        "microphones": places,
-        "material": wish.material,
-        "residual": wish.residual is not False,
-        "supports": wish.supports is not False,
-        "tail_db": wish.tail_db,
-    }
-    return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Replay:
-    """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
-
-    sound: KeptSound
-    log: ContactLog
-    sr: int
-    notes: tuple[str, ...] = ()
-
-
-def replayed(path: str, wish: Wish) -> Replay:
-    """A log's sound: bit for bit the render it came from, where no option changes it."""
-    import numpy as np
-
-    from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_kept, render_notes
-
-    log = read_log(path)
-    if wish.microphones:
-        log = replace(log, sensors=tuple(Microphone(np.array(place)) for place in wish.microphones))
-    if wish.seed is not None:
-        log = replace(log, seed=wish.seed)
-    if wish.residual is not None:
-        log = replace(log, residual=wish.residual)
-    if wish.supports is not None:
-        log = replace(log, supports=wish.supports)
-    if (seconds := wish.seconds) is not None:
-        if seconds > log.duration_s + 1e-9:
-            raise AudioError(
-                f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s",
-                "give fewer seconds, or simulate the scene for longer",
-            )
-        log = log.first(int((log.start_s < seconds - 1e-9).sum()))
-    rate = wish.rate or log.sr
-    try:
-        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, progress=wish.progress, say=wish.say)
-    except (SonicBulletError, KeyboardInterrupt) as error:
-        error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
-        raise
-    return Replay(sound, log, rate, render_notes(sound, log))
 
 
 def _written(output: str, result: RenderResult | Replay, level: LevelWish, made: Soundtrack | None) -> AudioReport:
@@ -319,12 +228,11 @@ def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
 
 def _oversized(log: ContactLog) -> tuple[str, ...]:
     from sonic_bullet.geometry import oversize
+    from sonic_bullet.records.simulated import with_body_id
 
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-    return tuple(
-        f"body {body.body_id} link {body.link} ({body.name}) {words}; {remedy}" for body, words in large if words
-    )
+    return tuple(f"{with_body_id(body.name, body.body_id)} {words}; {remedy}" for body, words in large if words)
 
 
 def summary(report: AudioReport, log: ContactLog) -> str:

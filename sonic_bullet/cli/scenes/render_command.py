@@ -51,6 +51,6 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 @soundtrack_options
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
-    from sonic_bullet.cli.scene_commands import run_render
+    from sonic_bullet.cli.scenes.scene_commands import run_render
 
     run_render(**options)

@@ -1,0 +1,157 @@
+"""What a command asks of a scene or a contact log, and the run or replay of it, for `render`, `film` and `play`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.cli.output import quiet_stderr
+from sonic_bullet.records.errors import AudioError, FileError, MaterialError, SonicBulletError
+
+if TYPE_CHECKING:
+    from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.files.rows.spool import KeptSound
+    from sonic_bullet.scene import RenderResult
+    from sonic_bullet.session import Listener
+    from sonic_bullet.session.material_choice import MaterialChoice
+
+DEFAULT_SR = 48_000
+
+
+@dataclass(frozen=True, slots=True)
+class WantedMaterials:
+    """The options --material and --silent. everyone: of all that sounds; named: by names of bodies; silent: names."""
+
+    everyone: str | None = None
+    named: dict[str, str] = field(default_factory=dict)
+    silent: tuple[str, ...] = ()
+
+    @classmethod
+    def read(cls, material: tuple[str, ...], silent: tuple[str, ...]) -> WantedMaterials:
+        """Those of what was given as M or NAME=M; a file whose name holds an "=" is no NAME. Every M is read once, so
+        that a wrong one is said before anything runs. Raises MaterialError, FileError.
+        """
+        from sonic_bullet.presets import load_material
+
+        everyone, named = None, {}
+        for given in material:
+            name, equals, of = ("", "", given) if "=" not in given or Path(given).is_file() else given.partition("=")
+            if equals and not (name.strip() and of.strip()):
+                raise MaterialError(f"--material {given} is neither M nor NAME=M", "give --material bowl=steel")
+            load_material(of)
+            if (equals and name in named) or (not equals and everyone is not None):
+                whom = name if equals else "all bodies"
+                raise MaterialError(f"--material says twice what {whom} is made of", "give it once")
+            if equals:
+                named[name] = of
+            else:
+                everyone = of
+        return cls(everyone, named, silent)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Those of `render_scene` and `run_scene`."""
+        return {"material": self.everyone, "materials": self.named, "silent": self.silent}
+
+    def choice(self) -> MaterialChoice:
+        """The same, read."""
+        from sonic_bullet.session.material_choice import as_choice
+
+        return as_choice(self.everyone, self.named, self.silent)
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What the user asked of a render; None and empty: as the scene or the log has it."""
+
+    seconds: float | None
+    rate: int | None
+    microphones: tuple[tuple[float, float, float], ...]
+    seed: int | None
+    materials: WantedMaterials
+    residual: bool | None
+    supports: bool | None
+    progress: Callable[[float], None]
+    say: Callable[[str], None]
+    at_end: Callable[[Listener], object] | None = None
+    tail_db: float | None = None
+
+
+def is_log(scene: str) -> bool:
+    """Whether a scene is a contact log, by its name."""
+    return Path(scene).suffix.lower() == ".npz"
+
+
+def check_scene_file(scene: str, verb: str) -> None:
+    """Raise FileError where there is neither a scene nor a contact log to render or play."""
+    if not Path(scene).is_file():
+        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
+    if Path(scene).suffix.lower() not in (".py", ".npz"):
+        raise FileError(
+            f"cannot {verb} {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz"
+        )
+
+
+def simulated(scene: str, wish: Wish) -> RenderResult:
+    """A scene, run."""
+    with quiet_stderr():
+        from sonic_bullet.scene import render_scene
+
+    sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
+    asked: dict[str, Any] = {
+        "seconds": wish.seconds,
+        "sr": sr,
+        "seed": wish.seed or 0,
+        "microphones": places,
+        "residual": wish.residual is not False,
+        "supports": wish.supports is not False,
+        "tail_db": wish.tail_db,
+        **wish.materials.options,
+    }
+    return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay:
+    """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
+
+    sound: KeptSound
+    log: ContactLog
+    sr: int
+    notes: tuple[str, ...] = ()
+
+
+def replayed(path: str, wish: Wish) -> Replay:
+    """A log's sound: bit for bit the render it came from, where no option changes it."""
+    import numpy as np
+
+    from sonic_bullet.files import read_log
+    from sonic_bullet.records import Microphone
+    from sonic_bullet.render import render_kept, render_notes
+    from sonic_bullet.session.chosen_in_log import with_choice
+
+    log, said = with_choice(read_log(path), wish.materials.choice(), path, wish.say)
+    if wish.microphones:
+        log = replace(log, sensors=tuple(Microphone(np.array(place)) for place in wish.microphones))
+    if wish.seed is not None:
+        log = replace(log, seed=wish.seed)
+    if wish.residual is not None:
+        log = replace(log, residual=wish.residual)
+    if wish.supports is not None:
+        log = replace(log, supports=wish.supports)
+    if (seconds := wish.seconds) is not None:
+        if seconds > log.duration_s + 1e-9:
+            raise AudioError(
+                f"{path} lasts {log.duration_s:.3f} s, shorter than {seconds} s",
+                "give fewer seconds, or simulate the scene for longer",
+            )
+        log = log.first(int((log.start_s < seconds - 1e-9).sum()))
+    rate = wish.rate or log.sr
+    try:
+        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, progress=wish.progress, say=wish.say)
+    except (SonicBulletError, KeyboardInterrupt) as error:
+        error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
+        raise
+    return Replay(sound, log, rate, (*said, *render_notes(sound, log)))

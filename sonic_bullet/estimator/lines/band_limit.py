@@ -1,0 +1,52 @@
+"""A recording in the band that was asked for, so that onset, hits, noise and lines are all of it.
+
+The filter is a real, even factor on the spectrum: it delays nothing, and passes the band as it is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.estimator.lines.linear_prediction import predicted_on
+from sonic_bullet.records import Array
+
+FALL = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
+PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
+
+
+def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
+    """Keep what a recording holds in a band.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Samples.
+    sr : int
+        Their rate in Hz.
+    band_hz : (float, float)
+        Lowest and highest frequency that pass whole, in Hz.
+
+    Returns
+    -------
+    (n,) array
+        The filtered samples, at the same times.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    low, high = band_hz
+    reach = min(len(signal), round(PERIODS / max(low, 1.0) * sr))
+    # a hum or a tone goes on, and fades: one that is cut off would begin and end with a click, which is in every band
+    fade = _raised(np.arange(reach), reach, 0)
+    ends = [predicted_on(part, ORDER, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
+    whole = np.concatenate([ends[0][::-1], signal, ends[1]])
+    size = next_fast_len(2 * len(whole))
+    freq = np.arange(size // 2 + 1) * sr / size
+    gain = _raised(freq, FALL[0] * low, low)
+    if high * FALL[1] < sr / 2:
+        gain *= 1 - _raised(freq, high, FALL[1] * high)
+    return np.asarray(irfft(rfft(whole, size) * gain, size)[reach : reach + len(signal)])
+
+
+def _raised(freq: Array, start: float, stop: float) -> Array:
+    """Raised cosine (n,) from 0 at start to 1 at stop."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip((freq - start) / (stop - start), 0, 1))

@@ -1,0 +1,50 @@
+"""When a recording was struck: what linear prediction cannot know of.
+
+    recording -> prediction error filter -> power in blocks of 1 ms -> a block far above its neighbourhood: a strike
+
+Beats, swells, hum and slow decays follow from what came before; only a blow does not. What a room sends back within
+GAP_S is of the blow before it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.estimator.lines.linear_prediction import prediction_error_filter
+from sonic_bullet.records import Array
+
+ORDER = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
+BLOCK_S, GAP_S = 1e-3, 0.05
+ABOVE_DB = 12.0  # over the median of the blocks within NEAR_S: gaussian noise of 1 ms stays below 3 dB
+NEAR_S = 0.25
+BELOW_DB = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
+
+
+def find_strikes(signal: Array, sr: int) -> Array:
+    """Find when a recording was struck.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Samples, finite.
+    sr : int
+        Their rate in Hz.
+
+    Returns
+    -------
+    (s,) array
+        Times in s from the first sample, in order; empty where nothing stands out of what could be predicted.
+    """
+    from scipy.ndimage import median_filter
+    from scipy.signal import lfilter
+
+    block = max(1, round(BLOCK_S * sr))
+    count = len(signal) // block
+    if count < 20 or not np.any(signal):
+        return np.zeros(0)
+    left = lfilter(prediction_error_filter(signal, ORDER), [1.0], signal)
+    power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
+    near = median_filter(power, min(round(2 * NEAR_S / BLOCK_S), count) | 1, mode="nearest")
+    stands = power > np.maximum(near * 10 ** (ABOVE_DB / 10), power.max() * 10 ** (-BELOW_DB / 10))
+    at = np.flatnonzero(stands) * block / sr
+    return at[np.diff(at, prepend=-1.0) > GAP_S]

@@ -1,0 +1,75 @@
+"""A log with other materials: how its bodies moved and touched stays as recorded, how they ring is computed anew.
+
+ContactLog + MaterialChoice -> each body's surface, as its model in the log keeps it -> modes of the other material
+    -> ContactLog
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+
+from sonic_bullet.effects.presets_of_effects import with_material
+from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.errors import LogError, MeshError, ModalError
+from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.session.body_models import analyse_body
+from sonic_bullet.session.material_choice import MaterialChoice
+
+AS_RECORDED = "motion, masses and contact forces stay as the log recorded them"
+
+
+def with_choice(
+    log: ContactLog, choice: MaterialChoice, where: str, say: Callable[[str], None] | None = None
+) -> tuple[ContactLog, tuple[str, ...]]:
+    """The log with its bodies made of what was chosen, and silent where that was, and what a user should read of it.
+
+    Modes are those of the body's surface in the log, clamped and counted as they were. where: what errors call the log.
+    Raises SceneError for a name that no body has, LogError where the log does not hold the shape of a body that is to
+    sound, and what `modal.analyse` raises, naming the body.
+    """
+    if not choice:
+        return log, ()
+    choice.check_names([body.name for body in log.bodies], where)
+    solved: dict[tuple[int, int, str], ModalModel] = {}
+    bodies, changed = [], {}
+    for body in log.bodies:
+        silent = body.silent or choice.is_silent(body.name)
+        material = choice.material_of(body.name)
+        if material is not None and (body.material is not None or choice.names(body.name)):
+            changed[body.name] = material.name
+            bodies.append(replace(_made_of(body, material, where, solved, say), silent=silent))
+        else:
+            bodies.append(replace(body, silent=silent))
+    said = ", ".join(f"{name} is {of}" for name, of in changed.items())
+    return replace(log, bodies=tuple(bodies)), (f"{said}: {AS_RECORDED}",) if changed else ()
+
+
+def _made_of(
+    body: Body,
+    chosen: Material,
+    where: str,
+    solved: dict[tuple[int, int, str], ModalModel],
+    say: Callable[[str], None] | None,
+) -> Body:
+    material = with_material(chosen)
+    if body.material is None:
+        raise LogError(
+            f"{where} does not hold the shape of {body.name}, which was no sounding body when it was recorded",
+            f"render the scene with --material {body.name}=… instead",
+        )
+    if body.model is None or not len(body.model.face):  # ground: what it is made of is felt in contacts alone
+        return replace(body, material=material)
+    key = id(body.model), id(chosen), repr(body.options)
+    if key not in solved:
+        if say is not None:
+            say(f"modes of {body.name} in {chosen.name}")
+        # the surface is that of the solid, whatever wall an open one was given
+        options = asdict(replace(body.options or ModalOptions(), thickness_m=None))
+        surface = Shape("mesh", vertex_m=body.model.vertex_m, face=body.model.face)
+        try:
+            solved[key] = analyse_body((surface,), material, **options, progress=say)
+        except (MeshError, ModalError) as error:
+            raise type(error)(f"{body.name}: {error.what}", error.remedy) from error
+    return replace(body, material=material, model=solved[key])

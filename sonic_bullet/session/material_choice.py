@@ -1,0 +1,131 @@
+"""Who of a scene or a log is made of what, and who is silent, where a user says it beside them.
+
+material, materials by name, silent names -> MaterialChoice -> what is added (`choose_materials`)
+                                                            -> bodies of a log (`session.chosen_in_log`)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.effects.presets_of_effects import with_material
+from sonic_bullet.listener.names import matched
+from sonic_bullet.records import Material
+from sonic_bullet.records.coerce import as_items, shown
+from sonic_bullet.records.errors import SceneError
+from sonic_bullet.session.arguments import as_material, as_name
+
+if TYPE_CHECKING:
+    from sonic_bullet.listener.world import World
+    from sonic_bullet.session.wanted_bodies import WantedBody
+
+LISTED_NAMES = 40
+"""As many names as a line lists."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaterialChoice:
+    """everyone: what all that sounds is made of, None: what the scene or log says; named: of links, or of all links of
+    bodies, by name, before it; silent: names of those whom no sensor hears.
+    """
+
+    everyone: Material | None = None
+    named: Mapping[str, Material] = field(default_factory=dict)
+    silent: frozenset[str] = frozenset()
+
+    def __bool__(self) -> bool:
+        return self.everyone is not None or bool(self.named) or bool(self.silent)
+
+    def material_of(self, name: str) -> Material | None:
+        """What a link of that name is made of, None where the choice says nothing of it."""
+        found = matched(name, self.named)
+        return self.everyone if found is None else self.named[found]
+
+    def names(self, name: str) -> bool:
+        """Whether a material was chosen for a link of that name, or its body, by name."""
+        return matched(name, self.named) is not None
+
+    def is_silent(self, name: str) -> bool:
+        """Whether a link of that name is to be silent."""
+        return matched(name, self.silent) is not None
+
+    def check_names(self, names: Collection[str], where: str) -> None:
+        """Raise SceneError where a name of the choice is no link's, nor its body's; it lists the names there are."""
+        for one in (*self.named, *sorted(self.silent)):
+            if not any(matched(name, (one,)) for name in names):
+                known = list(dict.fromkeys(names))
+                more = f" and {len(known) - LISTED_NAMES} more" if len(known) > LISTED_NAMES else ""
+                listed = ", ".join(known[:LISTED_NAMES]) + more
+                raise SceneError(f"no body of {where} is called {shown(one)}", f"its bodies are: {listed or 'none'}")
+
+
+def as_choice(
+    material: str | Path | Material | None = None,
+    materials: Mapping[str, str | Path | Material] | None = None,
+    silent: Iterable[str] = (),
+) -> MaterialChoice:
+    """What a user gives, read. Raises MaterialError and FileError (a preset), SceneError (what is no name)."""
+    remedy = "give a dict from bodies' names to materials"
+    named = {} if materials is None else materials
+    if not isinstance(named, Mapping):
+        raise SceneError(f"materials is {shown(materials)}", remedy)
+    names = as_items(silent, "silent", "give a list of bodies' names", error=SceneError)
+    return MaterialChoice(
+        None if material is None else as_material(material),
+        {as_name(name): as_material(one) for name, one in named.items()},
+        frozenset(as_name(name) for name in names),
+    )
+
+
+_CHOICE: ContextVar[MaterialChoice] = ContextVar("choice", default=MaterialChoice())  # noqa: B039 - a frozen record
+
+
+@contextmanager
+def choosing(choice: MaterialChoice) -> Iterator[None]:
+    """Listeners that are made, and what is added to them, follow that choice while this lasts."""
+    before = _CHOICE.set(choice)
+    try:
+        yield
+    finally:
+        _CHOICE.reset(before)
+
+
+def current_choice() -> MaterialChoice:
+    """What was chosen; an empty choice where nothing was."""
+    return _CHOICE.get()
+
+
+def choose_materials(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+    """Who is to be added, of the materials chosen: a body whose links become different ones is several here, its links
+    in the same order.
+    """
+    choice = current_choice()
+    if choice.everyone is None and not choice.named:
+        return wanted
+    given = [
+        (one.body, link, one.names[i] if one.names else None) for one in wanted for i, link in enumerate(one.links)
+    ]
+    names = iter(world.record_names(given))
+    made: list[WantedBody] = []
+    for one in wanted:
+        chosen = [choice.material_of(next(names)) for _ in one.links]
+        for material, run in groupby(range(len(one.links)), key=lambda i: chosen[i]):
+            part = _some_links(one, list(run))
+            made.append(part if material is None else replace(part, material=with_material(material), model=None))
+    return made
+
+
+def _some_links(one: WantedBody, which: Sequence[int]) -> WantedBody:
+    if len(which) == len(one.links):
+        return one
+    parts: dict[str, Any] = {
+        name: tuple(value[i] for i in which) if (value := getattr(one, name)) else ()
+        for name in ("links", "parts", "names")
+    }
+    return replace(one, **parts)

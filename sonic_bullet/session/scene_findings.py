@@ -1,0 +1,35 @@
+"""What spoils a scene's sound that only its listener knows: who was added, and whether they ring."""
+
+from __future__ import annotations
+
+from sonic_bullet.listener import Finding
+from sonic_bullet.records.simulated import with_body_id
+from sonic_bullet.session.listening import Listener
+
+
+def find_nothing_added(listener: Listener) -> tuple[Finding, ...]:
+    """Whether no body of a world that has some was given a material."""
+    if not listener.world.has_bodies or any(body.material is not None for body in listener.world.bodies):
+        return ()
+    return (
+        Finding(
+            "nothing-added",
+            "error",
+            "no body has a material: all are silent partners",
+            "add(body, material=…), or return it in build's cast",
+        ),
+    )
+
+
+def find_mute_bodies(listener: Listener) -> tuple[Finding, ...]:
+    """Bodies without a mode that can be heard."""
+    return tuple(
+        Finding(
+            "no-audible-mode",
+            "info",
+            f"{with_body_id(body.name, body.body_id)} has no mode below 20 kHz: it clicks but does not ring",
+            "nothing to mend; a larger or thinner body rings",
+        )
+        for body in listener.world.bodies
+        if body.model is not None and body.model.mode_count == 0 and len(body.model.face)
+    )
