@@ -39,6 +39,7 @@ MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 15 s of processor and 1.2 GB at most. An edge_m allows more."""
 LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
 TRIES = 2
+WITH_LESS: tuple[Way, ...] = ("simple", "lattice")  # what is tried where a surface has too much detail
 OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
@@ -183,22 +184,29 @@ class Elements:
         for _ in range(TRIES):
             if made._unknowns < min(OVER * MOST_UNKNOWNS[self.thin], most):
                 break
-            made = made._of_size(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
+            try:
+                made = made._of_size(made.edge_m * (made._unknowns / aim) ** (1 / made._growth), fallback=False)
+            except MeshError:
+                break
         return made
 
     def bounded(self) -> Elements:
-        """The same with no more unknowns than its work allows: larger elements, less detail, or degree 2. Raises
-        MeshError where none of it is enough.
+        """The same with no more unknowns than its work allows: larger elements, less detail, a lattice, or degree 2.
+        Raises MeshError where none of it is enough.
         """
 
         def most(degree: int) -> float:
             return cost.most_unknowns(self.spare, self.modes, degree, self.thin, coarse(self.thin))
 
         made = self.within(most(3))
-        if made._unknowns > most(3) and not made._lattice:  # its surface has so much detail
+        for way in WITH_LESS:  # its surface has so much detail
+            if made._unknowns <= most(3) or made._lattice or self.at_size is None:
+                break
+            if way == "simple" and self.simple:
+                continue
             with suppress(MeshError):
-                simple = replace(made, simple=True)._of_size(self.edge_m).within(most(3))
-                made = min(made, simple, key=lambda one: one._unknowns)
+                other = replace(self, body=self.at_size(self.edge_m, way), simple=way == "simple").within(most(3))
+                made = min(made, other, key=lambda one: one._unknowns)
         if made._unknowns > min(LIMIT, most(3)):
             made = replace(made, degree=2)
         if made._unknowns > most(2):

@@ -17,7 +17,7 @@ from sonic_bullet.modal import cost, lagrange, polynomials
 from sonic_bullet.modal.elements import LIMIT, MOST_UNKNOWNS, UNKNOWNS_PER_TET, Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.meshing.filling import Way
+from sonic_bullet.modal.meshing.filling import WHOLE_FACES, Way
 from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.surfaces import prepared
@@ -55,11 +55,12 @@ def filled(
 
     # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
     first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
-    wall_m, edge_m, modes = _first(shapes, thickness_m, length_m, tensor, first, say)
+    wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first, say)
     edge = given or edge_m
     thin = edge > wall_m
     degree = 2 if given and given < WIDE * wall_m else 3
-    made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, None if given else at_size, modes)
+    anew = None if given else at_size
+    made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
     if given is None:
         made = made.bounded()
     elif made.degree == 3 and made._unknowns > LIMIT:
@@ -75,10 +76,11 @@ def _first(
     tensor: Array,
     wanted: Wanted,
     say: Callable[[str], None],
-) -> tuple[float, float, int]:
-    """The wall and the edge to begin with, in m, and about how many modes there will be: for the shortest wave of a
-    plate as thick as the body is, at the highest λ wanted or the wave of as many modes as are wanted, and no more
-    unknowns than their work allows.
+) -> tuple[float, float, int, bool]:
+    """The wall and the edge to begin with, in m, about how many modes there will be, and whether detail is left out.
+
+    The edge is for the shortest wave of a plate as thick as the body is, at the highest λ wanted or the wave of as many
+    modes as are wanted, and no more unknowns than their work allows.
     """
     skin = prepared(*soup(shapes), thickness_m)
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
@@ -96,4 +98,4 @@ def _first(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
             f"{most} unknowns: larger ones are used, unless edge_m gives their size"
         )
-    return wall * length_m, max(edge, least) * length_m, modes
+    return wall * length_m, max(edge, least) * length_m, modes, len(skin.face) > WHOLE_FACES

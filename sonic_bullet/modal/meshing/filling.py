@@ -26,7 +26,7 @@ from sonic_bullet.records.errors import MeshError
 
 Way = Literal["any", "netgen", "simple", "lattice"]
 """How what no rule fits is filled: by Netgen or what stands for it, by Netgen or not at all, its detail left out, by
-the lattice."""
+a lattice of this edge or not at all."""
 LATTICE = "lattice"  # how the note of a solid filled by one begins
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
@@ -39,9 +39,17 @@ FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch whe
 SIMPLER, SLIVER = 0.05, 0.01
 """Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
 slivers of unions, on which it takes ten times as long."""
+WHOLE_FACES = 4000  # a surface of more is simplified first: Netgen takes a second for 400
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
 LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
+LATTICE_TETS, LATTICE_MORE = 8000, 1.25
+"""What a lattice may have, or as many as are asked for; how many more there are than its volume tells."""
+WALL_TETS = 20.0  # a wall as wide as an edge and a bit: elements in a square of its width
+
+
+class TooThinError(MeshError):
+    """Walls so thin that elements for them are more than allowed."""
 
 
 def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
@@ -69,11 +77,15 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, way:
     volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
     tets = dof_budget(thickness, diagonal) / DOF_PER_TET
     edge = edge_m or edge_within_m(volume, thickness, tets)
-    if way == "lattice" or not geometry.is_closed(skin.face):
-        why = "as before" if way == "lattice" else "its surface is open"
-        return _of_lattice(skin, edge_m, volume, tets, say, why)
+    if way == "lattice":
+        return _of_lattice(skin, edge, edge, say, "as before")
+    of_lattice = edge_m or min((LATTICE_VOLUME * volume / tets) ** (1 / 3), LATTICE_WALL * thickness)
+    finest = LATTICE_LEAST * thickness
+    if not geometry.is_closed(skin.face):
+        return _of_lattice(skin, of_lattice, finest, say, "its surface is open")
     whole, simple = skin, simplified(skin, SIMPLER * edge)
-    attempts = [] if way == "simple" or _slivers(whole, edge) else [(whole, edge)]
+    detailed = way == "simple" or len(whole.face) > WHOLE_FACES or _slivers(whole, edge)
+    attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
     for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
         try:
@@ -88,7 +100,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, way:
     assert refused is not None
     if way != "any":
         raise refused
-    return _of_lattice(skin, edge_m, volume, tets, say, refused.what)
+    return _of_lattice(skin, of_lattice, finest, say, refused.what)
 
 
 def simplified(skin: Skin, tolerance_m: float) -> Skin:
@@ -102,6 +114,11 @@ def simplified(skin: Skin, tolerance_m: float) -> Skin:
         return skin
     corner, triangle = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts).astype(np.int64)
     return Skin(corner, triangle, skin.thickness_m, skin.note)
+
+
+def thick_enough_m(skin: Skin) -> float:
+    """The wall of an open surface that a lattice can fill."""
+    return float(np.sqrt(WALL_TETS * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
 
 
 def _slivers(skin: Skin, edge_m: float) -> bool:
@@ -121,20 +138,24 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
-def _of_lattice(
-    skin: Skin, edge_m: float | None, volume_m3: float, tets: float, say: Callable[[str], None], why: str
-) -> Solid:
-    edge = edge_m or min((LATTICE_VOLUME * volume_m3 / tets) ** (1 / 3), LATTICE_WALL * skin.thickness_m)
+def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str], None], why: str) -> Solid:
+    """Solid by a lattice, its edge from edge_m on until it holds the walls, finest_m or `LATTICE_TETS` at the end."""
+    filled_m3 = LATTICE_MORE * LATTICE_VOLUME * abs(geometry.volume_m3(skin.vertex_m, skin.face))
+    edge, least = max(edge_m, (filled_m3 / MOST_TETS) ** (1 / 3)), max(finest_m, (filled_m3 / LATTICE_TETS) ** (1 / 3))
     while True:
         say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
         try:
             corner, tet = stuffed(skin.vertex_m, skin.face, edge)
             _check_filled(skin, corner, tet)
             break
-        except MeshError:  # some of its walls are thinner than it is on the whole, and than an edge
-            if edge < LATTICE_LEAST * skin.thickness_m:
-                raise
-            edge *= FINER
+        except MeshError as error:  # some of its walls are thinner than it is on the whole, and than an edge
+            if edge <= least:
+                raise TooThinError(
+                    f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE_TETS} tetrahedra for its walls"
+                    f" ({skin.thickness_m:.2g} m on the mean)",
+                    "repair the mesh, or give thicker walls",
+                ) from error
+            edge = max(FINER * edge, least)
     tet, said = _largest(corner, tet)
     note = f"{LATTICE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
