@@ -8,8 +8,8 @@ read-only   this user, HOME a folder that takes nothing
 
 In all three the package is mounted read-only, in a mount namespace of its own (unshare, as root), and where this user's
 own home hides the interpreter it is opened. Outputs go to a folder that may be written. Good: exit 0, what was asked
-for is there, and nothing on stderr but notes. Where nothing can be mounted, "read-only" runs without a mount and the
-rest is counted as skipped. Exit 1 where one is not good.
+for is there, and nothing on stderr but notes and progress. Where nothing can be mounted, "read-only" runs without a
+mount and the rest is counted as skipped. Exit 1 where one is not good.
 """
 
 from __future__ import annotations
@@ -18,12 +18,14 @@ import argparse
 import importlib
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+PROGRESS = re.compile(r"\[\d+ s\] ")
 REPO = Path(__file__).resolve().parents[1]
 WAYS = ("user", "nameless", "read-only")
 UIDS = {"user": 65534, "nameless": 54321}
@@ -123,7 +125,9 @@ def good(direction: str, name: str, scratch: Path, work: Path) -> tuple[bool | N
     start = time.monotonic()
     done = subprocess.run(asked, cwd=work, check=False, capture_output=True, text=True, timeout=3000)
     lines = [
-        line for line in done.stderr.splitlines() if not line.startswith(("sonic-bullet: note:", "pybullet build time"))
+        line
+        for line in done.stderr.splitlines()
+        if not line.startswith(("sonic-bullet: note:", "pybullet build time")) and not PROGRESS.match(line)
     ]
     if name in ("fit", "residual", "diagnose"):
         lines = [line for line in lines if not line.startswith("sonic-bullet: warning:")]

@@ -12,6 +12,7 @@ import pytest
 
 REPO = Path(__file__).resolve().parents[1]
 JOURNEYS = REPO / "tests" / "journeys"
+SIGNALS = {word: signal.getsignal(word) for word in (signal.SIGINT, signal.SIGTERM)}
 os.environ.setdefault("SONIC_BULLET_PROGRESS", "0")  # lines that hang on how fast a machine is; see test_progress_*
 
 
@@ -33,13 +34,17 @@ def shared_path() -> Path:
 
 @pytest.fixture(autouse=True)
 def commands_run_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Commands called in a test's own process run there, where stubs are seen, and leave its signals as they were;
-    processes that tests start supervise.
+    """Commands called in a test's own process run there, where stubs are seen, and leave its signals as they were, as
+    do those of a module's fixtures, which are called before; processes that tests start supervise.
     """
     monkeypatch.setattr("sonic_bullet.machine.supervisor.ASK_WHERE", None)
-    before = {word: signal.getsignal(word) for word in (signal.SIGINT, signal.SIGTERM)}
+    put_back_signals()
     yield
-    for word, handler in before.items():
+    put_back_signals()
+
+
+def put_back_signals() -> None:
+    for word, handler in SIGNALS.items():
         signal.signal(word, handler)
 
 

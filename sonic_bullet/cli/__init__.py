@@ -246,6 +246,8 @@ def case() -> None:
     metavar="A.wav [B.wav]...",
     help="The strikes' recordings. [default: all in the folder]",
 )
+@click.option("--split", is_flag=True, help="Cut recordings of several strikes into takes of one each.")
+@click.option("--hold-out", type=int, metavar="N", help="Hold every N-th take out of the fit, to judge it by.")
 @click.option("--mesh", metavar="M", help="Mesh of what was struck.")
 @click.option("--units", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True, help="Of the mesh.")
 @click.option(

@@ -1,6 +1,7 @@
 """`case`: a folder of recordings to a case.json that `fit` and `diagnose` read; and whether one can be read.
 
-new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it
+new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it; recordings
+        of several strikes are cut into takes where that is asked for
 check   FOLDER -> what the case holds, and what of it is not read; or one line that says what is wrong
 schema  JSON Schema of case.json
 """
@@ -15,11 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.cli.output import table, warn
+from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_audio, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
 from sonic_bullet.files.recordings import channel_of, channel_words
 from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.errors import FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})
@@ -31,6 +34,8 @@ def run_case_new(
     folder: str,
     recordings: Sequence[str],
     *,
+    split: bool,
+    hold_out: int | None,
     mesh: str | None,
     units: str,
     material: str | None,
@@ -44,6 +49,8 @@ def run_case_new(
 
     Raises SonicBulletError.
     """
+    if hold_out is not None and hold_out < 2:
+        raise FileError(f"--hold-out is {hold_out}", "give 2 or more: some takes are to be fitted")
     place = Path(folder)
     if place.exists() and not place.is_dir():
         raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
@@ -61,23 +68,28 @@ def run_case_new(
             f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
             "give --sensor velocity, or leave it out",
         )
-    for sound in sounds:
-        read_audio(sound)
     if mesh is not None:
         from sonic_bullet.modal import read_mesh
 
         read_mesh(mesh, UNITS[units])
     thing = _object(mesh, units, material)
-    listed = [*sounds, *([Path(mesh)] if mesh is not None else [])]
-    name_of = _names(place, listed)
-    if mesh is not None:
-        thing["mesh"] = name_of[Path(mesh)]
-    _written(
-        place,
-        name_of,
-        _described(place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium),
-    )
-    print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {name_of[Path(mesh)]}"))
+    with temporary_folder() as takes:
+        if split:
+            sounds, rows = cut_takes(sounds, takes)
+            print(table(TAKE_COLUMNS, rows))
+        else:
+            for sound in sounds:
+                read_audio(sound)
+        name_of = _names(place, [*sounds, *([Path(mesh)] if mesh is not None else [])])
+        if mesh is not None:
+            thing["mesh"] = name_of[Path(mesh)]
+        case = _described(
+            place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium
+        )
+        for recording in case["recordings"][hold_out - 1 :: hold_out] if hold_out is not None else []:
+            recording["split"] = "holdout"
+        _written(place, name_of, case)
+    print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {thing['mesh']}"))
     print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
 
 

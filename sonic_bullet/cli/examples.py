@@ -49,6 +49,7 @@ A verdict is none, explained, unexplained or worse-than-silence (exit 1)."""
 CASE_EPILOG = """\b
 Examples:
   sonic-bullet case new my_case --mesh bar.obj --recordings taps/*.wav --material steel --sensor pressure
+  sonic-bullet case new my_taps long_recording.wav --split --hold-out 3
   sonic-bullet case check my_case
   sonic-bullet fit my_case -o preset.json"""
 

@@ -79,6 +79,17 @@ def catch_stops() -> None:
             signal.signal(word, _stop)
 
 
+def _forget_stops() -> None:
+    """Have what ends a process end a fork of this one, at once: a pool ends its workers so."""
+    for word, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+        if signal.getsignal(word) is _stop:
+            signal.signal(word, handler)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_stops)
+
+
 def _lines_of(frame: FrameType | None) -> Iterator[str]:
     while frame is not None:
         yield f'File "{escaped(frame.f_code.co_filename)}", line {frame.f_lineno}'

@@ -29,7 +29,7 @@ from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.records.errors import ModalError
+from sonic_bullet.records.errors import MeshError, ModalError
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
@@ -59,7 +59,8 @@ class Elements:
     """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field.
     thin: elements are wider than the wall: one layer of them.
 
-    at_size: the body filled anew by an edge, by the lattice or not; None where the user gave the edge. coarser: the
+    at_size: the body filled anew by an edge, by the lattice or not, by Netgen or not at all; None where the user gave
+    the edge. coarser: the
     size before. known: λ (m,) found, by tensor.
     """
 
@@ -69,7 +70,7 @@ class Elements:
     degree: int
     thin: bool
     edge_m: float
-    at_size: Callable[[float, bool], Filled] | None
+    at_size: Callable[[float, bool, bool], Filled] | None
     coarser: Elements | None = None
     known: dict[bytes, Array] = field(default_factory=dict)
 
@@ -214,8 +215,13 @@ class Elements:
         """
         times = 1 / FINER
         for _ in range(LARGER):
-            made = self.coarser or (self._of_size(self.edge_m * times) if self.at_size is not None else None)
-            if made is None or made._lattice != self._lattice:
+            if self.coarser is None and self.at_size is None:
+                break
+            try:  # what only tells the error of Netgen's elements is not filled by what stands for Netgen
+                made = self.coarser or self._of_size(self.edge_m * times, netgen=not self._lattice)
+            except MeshError:
+                break
+            if made._lattice != self._lattice:
                 break
             larger = self._smaller_than(made)
             if larger > ALIKE:
@@ -243,9 +249,9 @@ class Elements:
     def _unknowns(self) -> float:
         return UNKNOWNS_PER_TET[self.degree] * len(self.body.solid.tet)
 
-    def _of_size(self, edge_m: float) -> Elements:
+    def _of_size(self, edge_m: float, *, netgen: bool = False) -> Elements:
         assert self.at_size is not None
-        return replace(self, body=self.at_size(edge_m, self._lattice), edge_m=edge_m, coarser=None, known={})
+        return replace(self, body=self.at_size(edge_m, self._lattice, netgen), edge_m=edge_m, coarser=None, known={})
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
@@ -275,10 +281,10 @@ def filled(
     """
     given, thickness_m = sizes
 
-    def at_size(edge_m: float, lattice: bool) -> Filled:
+    def at_size(edge_m: float, lattice: bool, netgen: bool) -> Filled:
         cache, name = kept
         name = key("solid", name, edge_m, lattice)
-        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice)
+        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice, netgen=netgen)
 
     # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
     first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
@@ -286,7 +292,7 @@ def filled(
     edge = given or edge_m
     thin = edge > wall_m
     degree = 2 if given and given < WIDE * wall_m else 3
-    made = Elements(at_size(edge, False), length_m, clamp, degree, thin, edge, None if given else at_size)
+    made = Elements(at_size(edge, False, False), length_m, clamp, degree, thin, edge, None if given else at_size)
     if given is None:
         made = made.within(MOST_UNKNOWNS[thin])
     if made.degree == 3 and made._unknowns > LIMIT:  # the surface's detail, or a lattice's, wants so many elements

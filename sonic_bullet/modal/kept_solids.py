@@ -31,6 +31,7 @@ def kept_or_filled(
     say: Callable[[str], None],
     *,
     lattice: bool,
+    netgen: bool,
 ) -> Filled:
     """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m. Raises MeshError."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
@@ -42,7 +43,7 @@ def kept_or_filled(
         return Filled(
             Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
         )
-    body = fill(shapes, *sizes, say, lattice=lattice)
+    body = fill(shapes, *sizes, say, lattice=lattice, netgen=netgen)
     solid, skin = body.solid, body.skin
     arrays = {
         "node": solid.node_m,

@@ -234,3 +234,37 @@ def test_the_schema_names_every_field(capfd: pytest.CaptureFixture[str]) -> None
         name for part in parts.values() for name, field in part["properties"].items() if field.get("description")
     ]
     assert len(checked) == sum(len(part["properties"]) for part in parts.values()) > 30
+
+
+def test_a_long_recording_is_cut_into_takes(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Each take holds its own strike, at LEAD_S, in every channel; every third is held out."""
+    one, sr = soundfile.read("a.wav")
+    at = [4410, 26_000, 60_000, 61_000 + 22_050, 110_000]
+    sound = np.zeros((140_000, 2))
+    for k, start in enumerate(at):
+        sound[start : start + len(one), 0] += (0.3 + 0.1 * k) * one
+    sound += 1e-5 * np.random.default_rng(2).standard_normal(sound.shape)
+    soundfile.write("long.wav", sound, sr, subtype="FLOAT")
+    assert run("case", "new", "mine", "long.wav", "--split", "--hold-out", "3") == 0
+    said = capfd.readouterr().out
+    case = json.loads((place / "mine" / "case.json").read_text())
+    files = [r["file"] for r in case["recordings"]]
+    assert files == [f"long-{k:02d}.wav" for k in range(1, 6)]
+    assert [r["split"] for r in case["recordings"]] == ["fit", "fit", "holdout", "fit", "fit"]
+    for name, start in zip(files, at, strict=True):
+        take, _ = soundfile.read(place / "mine" / name)
+        row = next(line for line in said.splitlines() if line.startswith(name))
+        assert take.shape[1] == 2 and abs(float(row.split()[1]) - start / sr) < 0.002
+        begin = int(np.argmax(np.abs(take[:, 0]) > 1e-3)) / sr
+        assert abs(begin - 0.05) < 0.003, "the strike stands where it was cut for"
+    read_case(place / "mine")
+
+
+def test_what_cannot_be_cut_is_named_and_leaves_nothing(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    soundfile.write("nothing.wav", np.zeros(44_100), 44_100, subtype="FLOAT")
+    assert run("case", "new", "mine", "nothing.wav", "--split") == 2
+    assert "nothing.wav is silent" in capfd.readouterr().err
+    assert run("case", "new", "mine", "a.wav", "--hold-out", "1") == 2
+    assert not (place / "mine").exists()
+    assert run("case", "new", "mine", "a.wav", "--split") == 0
+    assert json.loads((place / "mine" / "case.json").read_text())["recordings"][0]["file"] == "a.wav"

@@ -234,3 +234,19 @@ def test_a_process_that_is_asked_at_every_moment_where_it_is_does_its_work() -> 
         [sys.executable, "-c", work], cwd=REPO, check=False, capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 7, done.stderr
+
+
+def test_a_pool_of_a_scene_ends_its_workers_as_everywhere() -> None:
+    """Which it does by a signal that is an interrupt of ours in the scene's own process alone."""
+    code = (
+        "import signal, sys\n"
+        "from multiprocessing import get_context\n"
+        "from sonic_bullet.machine.worker import catch_stops\n"
+        "catch_stops()\n"
+        "before = signal.getsignal(signal.SIGTERM)\n"
+        "with get_context('fork').Pool(1) as pool:\n"
+        "    assert pool.apply(signal.getsignal, (signal.SIGTERM,)) is signal.SIG_DFL\n"
+        "    assert pool.apply(signal.getsignal, (signal.SIGINT,)) is signal.default_int_handler\n"
+        "assert signal.getsignal(signal.SIGTERM) is before is not signal.SIG_DFL\n"
+    )
+    subprocess.run([sys.executable, "-c", AWAKE.replace(MAIN, code)], check=True, timeout=60)

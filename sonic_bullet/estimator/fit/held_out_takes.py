@@ -1,7 +1,8 @@
 """Takes held against the fit: how far its prediction of each is, beside silence and beside another take.
 
     take r, from its onset            ──┐
-    placed modes, or typical lines p  ──┴─► D(r, g·p)     g: of least D, where the impulse is not known
+    placed modes, or typical lines p  ──┴─► D(r, g·p)     g: of least D, where the impulse is not known;
+                                                          p with what a residual adds to it, where one is given
     nothing                           ────► D(r, 0)
     the fit's own takes t             ────► min over t and g of D(r, g·t)
 
@@ -86,7 +87,7 @@ def _of_split(
         if not mine or e.signals is None:
             continue
         if progress is not None:
-            progress(f"predicting {len(mine)} takes of {e.thing.name}")
+            progress(f"predicting takes of {e.thing.name}")
         signals, sr = recorded_signals(found.case, e.thing, mine)
         takes = [power_spectra(take) for take in e.signals] if sr == e.sr else []
         for recording, signal in zip(mine, signals, strict=True):

@@ -54,9 +54,11 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, lattice: bool = False) -> Solid:
+def filled(
+    skin: Skin, edge_m: float | None, say: Callable[[str], None], *, lattice: bool = False, netgen: bool = False
+) -> Solid:
     """Solid of any prepared surface. edge_m: by default from a budget of unknowns. lattice: Netgen has refused it
-    before. Raises MeshError.
+    before. netgen: nothing stands for it where it refuses. Raises MeshError.
     """
     made = by_rule(skin, edge_m)
     if made is not None:
@@ -79,6 +81,8 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, latt
         except MeshError as error:
             refused = error
     assert refused is not None
+    if netgen:
+        raise refused
     return _of_lattice(skin, edge_m, volume, tets, say, refused.what)
 
 

@@ -53,8 +53,10 @@ def fill(
     say: Callable[[str], None],
     *,
     lattice: bool = False,
+    netgen: bool = False,
 ) -> Filled:
-    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. lattice: as `filled`.
+    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. lattice, netgen: as
+    `filled`.
 
     Raises MeshError.
     """
@@ -68,7 +70,7 @@ def fill(
     else:
         skin_given = prepared(*soup(shapes), thickness_m)
         vertex, face = skin_given.vertex_m, skin_given.face
-        made = filled(_united(skin_given), edge_m, say, lattice=lattice)
+        made = filled(_united(skin_given), edge_m, say, lattice=lattice, netgen=netgen)
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))

@@ -7,6 +7,7 @@
 Elements are all of one size and well shaped. Creases of the surface are rounded within an element: that is the price.
 """
 
+# mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
 from itertools import pairwise
@@ -14,14 +15,15 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 MOST_CELLS = 400_000  # of the lattice about the body: 1 GB
 WARP_LONG, WARP_SHORT = 0.24999, 0.41189  # part of an edge [Labelle & Shewchuk 2007, table 1]
-GROUP = 32  # faces that are one dipole from afar
+GROUP = 8  # faces that are one dipole from afar
+GROUPS = 8  # groups that are one larger group
 FAR = 3.0  # radii of a group, from its middle on
-CHUNK = 4096
 RING = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))
 PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # A wedge 012 345 turned so that its vertex k comes first [Dompierre et al. 1999, table 1]
@@ -89,39 +91,70 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
     """How often (k,) a surface goes round each point (k, 3): 1 inside and 0 outside a closed one, between both at a
     hole. corner_m (f, 3, 3): faces, neighbours one after the other.
     """
+    corner_m = np.ascontiguousarray(corner_m, float)
     vector = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0]) / 2
-    start = np.arange(0, len(corner_m), GROUP)
-    area = np.add.reduceat(np.linalg.norm(vector, axis=1), start)
-    weighted = np.linalg.norm(vector, axis=1)[:, None] * corner_m.mean(axis=1)
-    middle = np.add.reduceat(weighted, start) / np.maximum(area, 1e-300)[:, None]
-    dipole = np.add.reduceat(vector, start)
-    group = np.arange(len(corner_m)) // GROUP
-    radius = np.maximum.reduceat(np.linalg.norm(corner_m - middle[group][:, None], axis=2).max(axis=1), start)
-    total = np.empty(len(point_m))
-    for at in range(0, len(point_m), CHUNK):
-        point = point_m[at : at + CHUNK]
-        away = middle - point[:, None]
-        length = np.linalg.norm(away, axis=2)
-        far = length > FAR * radius
-        sums = np.where(far, np.einsum("kgx,gx->kg", away, dipole) / np.maximum(length, 1e-300) ** 3, 0).sum(axis=1)
-        which, near = np.nonzero(~far)
-        count = np.minimum(GROUP, len(corner_m) - start[near])
-        row = np.repeat(which, count)
-        item = np.repeat(start[near] - np.cumsum(count) + count, count) + np.arange(int(count.sum()))
-        sums += np.bincount(row, _solid_angle(corner_m[item] - point[row][:, None]), len(point))
-        total[at : at + CHUNK] = sums / (4 * np.pi)
+    area = np.linalg.norm(vector, axis=1)
+    levels, members = [], GROUP
+    while True:  # groups of faces, groups of groups, until they are few
+        start = np.arange(0, len(corner_m), members)
+        total = np.add.reduceat(area, start)
+        middle = np.add.reduceat(area[:, None] * corner_m.mean(axis=1), start) / np.maximum(total, 1e-300)[:, None]
+        here = middle[np.arange(len(corner_m)) // members]
+        reach = np.maximum.reduceat(np.linalg.norm(corner_m - here[:, None], axis=2).max(axis=1), start)
+        levels.append(np.column_stack([middle, np.add.reduceat(vector, start), FAR * reach]))
+        if len(start) <= GROUPS:
+            break
+        members *= GROUPS
+    first = np.cumsum([0, *(len(level) for level in levels)])
+    return np.asarray(_winding(corner_m, np.concatenate(levels), first, np.ascontiguousarray(point_m, float)))
+
+
+@njit(nogil=True)
+def _winding(corner, group, first, point):
+    """`winding_number` of point (k, 3): group (g, 7) are middle, dipole and where it may stand for its faces, level by
+    level from first (l + 1,) on.
+    """
+    total = np.empty(len(point))
+    waits = np.empty((len(first) * GROUPS, 2), np.int64)
+    for k in range(len(point)):
+        x, y, z = point[k]
+        top = len(first) - 2
+        count = first[top + 1] - first[top]
+        for i in range(count):
+            waits[i, 0], waits[i, 1] = top, count - 1 - i
+        angle = 0.0
+        while count:
+            count -= 1
+            level, which = waits[count]
+            g = group[first[level] + which]
+            a, b, c = g[0] - x, g[1] - y, g[2] - z
+            away = np.sqrt(a * a + b * b + c * c)
+            if away > g[6]:
+                angle += (a * g[3] + b * g[4] + c * g[5]) / away**3
+            elif level:
+                end = min((which + 1) * GROUPS, first[level] - first[level - 1])
+                for child in range(end - 1, which * GROUPS - 1, -1):
+                    waits[count, 0], waits[count, 1] = level - 1, child
+                    count += 1
+            else:
+                for f in range(which * GROUP, min((which + 1) * GROUP, len(corner))):
+                    angle += _solid_angle(corner[f], x, y, z)
+        total[k] = angle / (4 * np.pi)
     return total
 
 
-def _solid_angle(corner: Array) -> Array:
-    """Solid angle (k,) of triangles (k, 3, 3) seen from the origin, positive from behind [Van Oosterom & Strackee
-    1983, eq. 8].
-    """
-    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
-    la, lb, lc = (np.sqrt(np.einsum("kx,kx->k", x, x)) for x in (a, b, c))
-    ab, bc, ca = (np.einsum("kx,kx->k", x, y) for x, y in ((a, b), (b, c), (c, a)))
-    volume = np.einsum("kx,kx->k", a, np.cross(b, c))
-    return np.asarray(2 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb))
+@njit(nogil=True)
+def _solid_angle(corner, x, y, z):
+    """Of a triangle (3, 3) seen from a point, positive from behind [Van Oosterom & Strackee 1983, eq. 8]."""
+    a0, a1, a2 = corner[0, 0] - x, corner[0, 1] - y, corner[0, 2] - z
+    b0, b1, b2 = corner[1, 0] - x, corner[1, 1] - y, corner[1, 2] - z
+    c0, c1, c2 = corner[2, 0] - x, corner[2, 1] - y, corner[2, 2] - z
+    la = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+    lb = np.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
+    lc = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
+    ab, bc, ca = a0 * b0 + a1 * b1 + a2 * b2, b0 * c0 + b1 * c1 + b2 * c2, c0 * a0 + c1 * a1 + c2 * a2
+    volume = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
+    return 2 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
 
 
 def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:

@@ -1,0 +1,85 @@
+"""A recording of several strikes cut into takes of one each.
+
+recording (channels, n) -> strikes of its loudest channel (onset.py) -> from LEAD_S before each to LEAD_S before
+the next -> a file each
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sonic_bullet.files import read_audio, write_audio
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import AudioError
+
+LEAD_S = 0.05
+"""Of what precedes a strike, which tells the noise; less where the strike before it is nearer."""
+TAKE_COLUMNS = ("take", "at", "length", "peak", "")
+
+
+def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[str, ...]]]:
+    """Cut recordings into takes.
+
+    Parameters
+    ----------
+    sounds : sequence of Path
+        Recordings; one that holds a single strike stays as it is.
+    to : Path
+        Folder for the takes, `NAME-01.wav` and so on, every channel of them.
+
+    Returns
+    -------
+    list of Path
+        A file a take, in order.
+    list of tuple
+        A row a take, by `TAKE_COLUMNS`.
+
+    Raises
+    ------
+    AudioError
+        A recording that is silent.
+    """
+    made: list[Path] = []
+    rows: list[tuple[str, ...]] = []
+    for path in sounds:
+        sound, sr = read_audio(path)
+        loudest = sound[int(np.argmax((sound**2).sum(axis=1)))]
+        bounds = take_bounds(loudest, sr)
+        if not bounds:
+            raise AudioError(f"{path} is silent", "leave it out")
+        for k, (strike, start, stop) in enumerate(bounds, 1):
+            piece = path if len(bounds) == 1 else to / f"{path.stem}-{k:02d}.wav"
+            if piece is not path:
+                write_audio(piece, sound[:, start:stop], sr, full_scale_pa=None)
+            made.append(piece)
+            rows.append(
+                (piece.name, f"{strike / sr:.3f} s", f"{(stop - start) / sr:.3f} s", *_level(loudest[start:stop]))
+            )
+    return made, rows
+
+
+def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
+    """Samples of each strike of a recording (n,), and of the start and the end of its take."""
+    from sonic_bullet.estimator.lines.onset import span
+
+    if not np.any(signal):
+        return []
+    found = span(signal, sr)
+    strikes = np.array([found.start, *found.later])
+    lead = round(LEAD_S * sr)
+    starts = np.maximum(strikes - lead, 0)
+    # the end of a strike whose next one comes within the lead is that strike
+    stops = np.append(np.maximum(starts[1:], np.minimum(strikes[:-1] + lead, strikes[1:])), len(signal))
+    return [(int(a), int(b), int(c)) for a, b, c in zip(strikes, starts, stops, strict=True)]
+
+
+def _level(signal: Array) -> tuple[str, str]:
+    """The peak of a take in dB of full scale, and whether it is clipped."""
+    from sonic_bullet.estimator.lines.onset import clipped_samples
+
+    clipped = clipped_samples(signal)
+    peak = 20 * np.log10(max(float(np.abs(signal).max()), 1e-12))
+    return f"{peak:.1f} dBFS", f"{clipped} samples clipped" if clipped else ""
