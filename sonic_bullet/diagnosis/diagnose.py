@@ -29,7 +29,7 @@ from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, until_it_breaks_off
-from sonic_bullet.files import read_channel
+from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.machine.progress import says_so

@@ -183,7 +183,9 @@ def test_a_tap_that_clips_is_said(gain: float, capfd: pytest.CaptureFixture[str]
     assert all("x.wav is clipped" in line for line in capfd.readouterr().err.strip().splitlines()[-2:])
 
 
-@pytest.mark.parametrize(("sr", "said"), [(8000, "8000 samples a second: nothing above 3920 Hz is seen"), (192_000, "")])
+@pytest.mark.parametrize(
+    ("sr", "said"), [(8000, "8000 samples a second: nothing above 3920 Hz is seen"), (192_000, "")]
+)
 def test_any_rate_gives_the_same_modes(sr: int, said: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, err, found = walk(tap(sr), capfd, sr=sr)
     assert status == 0 and said in err and bool(err) == bool(said)

@@ -239,8 +239,7 @@ def _sounds(
         for words in filter(None, (which, *doubts)):
             several.setdefault(words, []).append(str(r.file))
     remarks += [
-        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}"
-        for words, names in several.items()
+        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items()
     ]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
