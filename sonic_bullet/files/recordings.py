@@ -27,7 +27,7 @@ MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
 BLOCK_SAMPLES = 1 << 18
 DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
-SHORTEST = 256  # samples: nothing decays in fewer
+SHORTEST = 64  # samples: a millisecond at a usual rate
 # a range of full scale 1: below the one nothing is heard, below the other it is the last bits that toggle
 SILENT, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
 UNBROKEN = "give an unbroken audio file"
