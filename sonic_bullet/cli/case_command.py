@@ -17,10 +17,9 @@ from typing import Any
 
 from sonic_bullet.cli.output import table, warn
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
-from sonic_bullet.files import read_audio, replacing
+from sonic_bullet.files import read_channel, replacing
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
-from sonic_bullet.files.recordings import channel_of, channel_words
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.errors import FileError
@@ -79,7 +78,7 @@ def run_case_new(
             print(table(TAKE_COLUMNS, rows))
         else:
             for sound in sounds:
-                read_audio(sound)
+                warn(f"{sound}: {words}" for words in _doubts(sound))
         name_of = _names(place, [*sounds, *([Path(mesh)] if mesh is not None else [])])
         if mesh is not None:
             thing["mesh"] = name_of[Path(mesh)]
@@ -91,6 +90,15 @@ def run_case_new(
         _written(place, name_of, case)
     print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {thing['mesh']}"))
     print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
+
+
+def _doubts(sound: Path) -> list[str]:
+    """What is odd about a recording. Raises FileError, AudioError."""
+    from sonic_bullet.estimator.lines.onset import clipped_samples
+
+    signal, _, which = read_channel(sound)
+    clipped = clipped_samples(signal)
+    return [which] * bool(which) + [f"{clipped} samples are clipped: 'fit' refuses that"] * bool(clipped)
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
@@ -182,6 +190,8 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 def run_case_check(folder: str) -> None:
     """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
+    from sonic_bullet.estimator.fit.recorded import refuse_clipped
+
     case = read_case(folder)
     warn(case.warnings)
     rows = [_object_row(case, name) for name in case.objects]
@@ -192,9 +202,9 @@ def run_case_check(folder: str) -> None:
         if not recording.file.is_file() and recording.split != "fit":
             missing += 1
             continue
-        sound, _ = read_audio(recording.file)
-        channel_of(sound, recording.channel, recording.file.name)
-        which = channel_words(len(sound), recording.channel if recording.channel_named else None)
+        sound, _, which = read_channel(recording.file, recording.channel)
+        if recording.split == "fit":
+            refuse_clipped(sound, recording.file.name)
         warn([f"{recording.file.name}: {which}"] if which else [])
     splits = [r.split for r in case.recordings]
     listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))
