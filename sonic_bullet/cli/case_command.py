@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.hammer import FORCE_COLUMNS, PartedTake, part_force
+from sonic_bullet.cli.hammer import FORCE_COLUMNS, StrikeFiles, part_force
 from sonic_bullet.cli.output import table, warn
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_channel, replacing
@@ -69,7 +69,7 @@ def run_case_new(
         if split:
             sounds, rows = cut_takes(sounds, takes, force_channel)
             print(table(TAKE_COLUMNS, rows))
-        struck: list[PartedTake] = []
+        struck: list[StrikeFiles] = []
         if force_channel is not None:
             struck, rows = part_force(sounds, force_channel, force_newton, takes)
             sounds = [take.sound for take in struck]

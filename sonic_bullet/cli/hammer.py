@@ -20,7 +20,7 @@ FORCE_COLUMNS = ("force", "impulse", "peak", "contact", "")
 
 
 @dataclass(frozen=True, slots=True)
-class PartedTake:
+class StrikeFiles:
     """A take's sound, and its force with the impulse in N·s, None where it is not known."""
 
     sound: Path
@@ -30,7 +30,7 @@ class PartedTake:
 
 def part_force(
     takes: Sequence[Path], channel: int, newton: float | None, to: Path
-) -> tuple[list[PartedTake], list[tuple[str, ...]]]:
+) -> tuple[list[StrikeFiles], list[tuple[str, ...]]]:
     """Part takes into sound and force.
 
     Parameters
@@ -46,7 +46,7 @@ def part_force(
 
     Returns
     -------
-    list of PartedTake
+    list of StrikeFiles
         One a take, in order.
     list of tuple
         A row a take, by `FORCE_COLUMNS`.
@@ -58,7 +58,7 @@ def part_force(
     AudioError
         A force or a sound that is dead.
     """
-    made: list[PartedTake] = []
+    made: list[StrikeFiles] = []
     rows: list[tuple[str, ...]] = []
     for path in takes:
         samples, sr = read_audio(path)
@@ -78,7 +78,7 @@ def part_force(
         for file, content in zip(files, (rest, force[None]), strict=True):
             write_audio(file, content, sr, full_scale_pa=None)
         trusted = newton is not None and pulse.hits == 1 and not pulse.flat
-        made.append(PartedTake(*files, float(f"{pulse.impulse * (newton or 0):.5g}") if trusted else None))
+        made.append(StrikeFiles(*files, float(f"{pulse.impulse * (newton or 0):.5g}") if trusted else None))
         rows.append((path.name, *_cells(pulse, newton)))
     return made, rows
 

@@ -51,9 +51,9 @@ def cut_takes(
         sound, sr = read_audio(path)
         if force_channel is not None:
             live_channel(sound, force_channel, path)
-        heard = sound if force_channel is None or len(sound) == 1 else np.delete(sound, force_channel, axis=0)
-        live_channel(heard, None, path)
-        loudest = heard[int(np.argmax(np.ptp(heard, axis=1)))]
+        others = sound if force_channel is None or len(sound) == 1 else np.delete(sound, force_channel, axis=0)
+        live_channel(others, None, path)
+        loudest = others[int(np.argmax(np.ptp(others, axis=1)))]
         bounds = take_bounds(loudest, sr)
         for k, (strike, start, stop) in enumerate(bounds, 1):
             piece = path if len(bounds) == 1 else to / f"{path.stem}-{k:02d}.wav"
