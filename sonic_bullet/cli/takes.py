@@ -19,7 +19,9 @@ LEAD_S = 0.05
 TAKE_COLUMNS = ("take", "at", "length", "peak", "")
 
 
-def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[str, ...]]]:
+def cut_takes(
+    sounds: Sequence[Path], to: Path, force_channel: int | None = None
+) -> tuple[list[Path], list[tuple[str, ...]]]:
     """Cut recordings into takes.
 
     Parameters
@@ -28,6 +30,8 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
         Recordings; one that holds a single strike stays as it is.
     to : Path
         Folder for the takes, `NAME-01.wav` and so on, every channel of them.
+    force_channel : int, optional
+        Not listened to.
 
     Returns
     -------
@@ -45,8 +49,11 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
     rows: list[tuple[str, ...]] = []
     for path in sounds:
         sound, sr = read_audio(path)
-        live_channel(sound, None, path)
-        loudest = sound[int(np.argmax(np.ptp(sound, axis=1)))]
+        if force_channel is not None:
+            live_channel(sound, force_channel, path)
+        others = sound if force_channel is None or len(sound) == 1 else np.delete(sound, force_channel, axis=0)
+        live_channel(others, None, path)
+        loudest = others[int(np.argmax(np.ptp(others, axis=1)))]
         bounds = take_bounds(loudest, sr)
         for k, (strike, start, stop) in enumerate(bounds, 1):
             piece = path if len(bounds) == 1 else to / f"{path.stem}-{k:02d}.wav"
