@@ -19,35 +19,43 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-MOST = 6
+MOST = 4
 LEAD_S, LONGEST_S = 0.05, 2.5
 PAGE = Path("docs/measured/recordings-by-others.md")
 COMMANDS = ("fit", "residual", "diagnose")
+LIMIT_S = 600.0
 COLUMNS = (
     "object",
     "held out",
     "silence",
     "another take",
     "fitted",
-    "with effects",
     "with residual",
+    "`diagnose`, before",
+    "with effects",
     "effects, or the verdict",
 )
+OWN_COLUMNS = ("object", "silence", "fitted", "with residual", "effects, or the verdict")
 HEAD = """# Recordings by others
 
 Written by `python -m benchmarks.measured --data ../shared/measured`. Each row is what `case new`, `fit`, `residual`
-and `diagnose` say of recordings that somebody else made. Every second take is held out. Distances are in dB, over what
-stands 10 dB above the noise, in the case's band; one gain is fitted where no impulse is known. Silence and the nearest
-of the fitted takes stand beside them. An object of one take has none that is unheard.
+and `diagnose` say of recordings that somebody else made.
+
+Every second take is held out, of at most {most} takes of an object. Distances are in dB, log-spectral, over what stands
+10 dB above the noise, in the case's band; means over the takes held out. *Silence* and *another take* (the nearest)
+stand beside them. *Fitted* and *with residual* are what `fit` and `residual` print: one gain a take where no impulse is
+known. *Before* and *with effects* are the errors that `diagnose` judges by on the takes held out. It fits no gain a
+take, so they stand beside each other alone.
 """
 Piece = tuple[Path, float, float]
+Said = dict[str, dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,29 +132,40 @@ def made_case(thing: Object, folder: Path) -> Path:
     return folder
 
 
-def _command(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "sonic_bullet", *words], check=False, capture_output=True, text=True)
+def _command(*words: str) -> str:
+    """Run a command; the last line that it says on stderr."""
+    command = [sys.executable, "-m", "sonic_bullet", *words]
+    try:
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        return f"stopped after {LIMIT_S:.0f} s"
+    return (done.stderr.strip().splitlines() or ["no word"])[-1].removeprefix("sonic-bullet: ")
 
 
-def run(thing: Object, work: Path) -> dict[str, Any]:
+def kept(thing: Object, work: Path) -> Path:
+    """Where what the commands said of an object stays."""
+    return work / "".join(c if c.isalnum() else "-" for c in thing.name) / "said.json"
+
+
+def run(thing: Object, work: Path) -> Said:
     """What the commands say of an object: their JSON by name, or the line that they end with."""
-    folder = work / "".join(c if c.isalnum() else "-" for c in thing.name)
-    kept = folder / "said.json"
-    if kept.is_file():
-        return dict(json.loads(kept.read_text()))
+    stays = kept(thing, work)
+    folder = stays.parent
+    if stays.is_file():
+        return dict(json.loads(stays.read_text()))
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     case, said = made_case(thing, folder / "case"), {}
     for name in COMMANDS:
         to = folder / f"{name}.json"
-        done = _command(name, str(case), "-o", str(folder / f"{name}-preset.json"), "--json", str(to))
-        said[name] = (
-            json.loads(to.read_text())
-            if to.is_file()
-            else {"error": (done.stderr.strip().splitlines() or ["no word"])[-1].removeprefix("sonic-bullet: ")}
-        )
-    kept.write_text(json.dumps(said))
+        last = _command(name, str(case), "-o", str(folder / f"{name}-preset.json"), "--json", str(to))
+        said[name] = json.loads(to.read_text()) if to.is_file() else {"error": last.replace(str(folder), "").strip()}
+    stays.write_text(json.dumps(said))
     return said
+
+
+def _takes(said: Said, command: str, split: str = "holdout") -> list[dict[str, Any]]:
+    return [t for t in said[command].get("takes", []) if t["split"] == split]
 
 
 def _mean(takes: list[dict[str, Any]], name: str) -> float:
@@ -154,56 +173,106 @@ def _mean(takes: list[dict[str, Any]], name: str) -> float:
     return float(np.mean(values)) if values else float("nan")
 
 
-def row(thing: Object, said: dict[str, Any]) -> list[str]:
-    """The cells of an object in the page's table."""
-    takes = [t for t in said["fit"].get("takes", []) if t["split"] == "holdout"]
-    beside = [t for t in said["residual"].get("takes", []) if t["split"] == "holdout"]
+def _shown(value: float | None) -> str:
+    return "-" if value is None or not np.isfinite(value) else f"{value:.1f}"
+
+
+def _ends(said: Said) -> str:
+    """The effects that are named, or the verdict, or that the command was refused."""
     judged = said["diagnose"]
-    after = (judged.get("errors") or {}).get("after", {}).get("holdout")
-    effects = ", ".join(f"`{e['id']}`" for e in judged.get("effects", []))
+    return ", ".join(f"`{e['id']}`" for e in judged.get("effects", [])) or judged.get("verdict") or "refused"
+
+
+def row(thing: Object, said: Said) -> list[str]:
+    """The cells of an object in the table of takes held out."""
+    fitted, beside = _takes(said, "fit"), _takes(said, "residual")
+    errors = said["diagnose"].get("errors") or {}
+    before, after = (errors.get(when, {}).get("holdout") for when in ("before", "after"))
     values = (
-        _mean(takes, "silence_db"),
-        _mean(takes, "other_take_db"),
-        _mean(takes, "predicted_db"),
-        after if effects and after is not None else float("nan"),
+        _mean(fitted, "silence_db"),
+        _mean(fitted, "other_take_db"),
+        _mean(fitted, "predicted_db"),
         _mean(beside, "predicted_db"),
+        before,
+        after if said["diagnose"].get("effects") else None,
     )
-    shown = ["-" if not np.isfinite(v) else f"{v:.1f}" for v in values]
-    return [thing.name, str(len(takes)) if takes else "none", *shown, effects or judged.get("verdict", "-")]
+    return [thing.name, str(len(fitted)), *map(_shown, values), _ends(said)]
 
 
-def words(thing: Object, said: dict[str, Any]) -> str:
-    """What is left of an object, in the commands' own words."""
-    fit, judged = said["fit"], said["diagnose"]
-    left = (judged.get("unexplained") or {}).get("words", "")
+def own_row(thing: Object, said: Said) -> list[str]:
+    """The cells of an object of which no take is held out: distances of the takes that it was fitted to."""
+    fitted, beside = _takes(said, "fit", "fit"), _takes(said, "residual", "fit")
+    values = (_mean(fitted, "silence_db"), _mean(fitted, "predicted_db"), _mean(beside, "predicted_db"))
+    return [thing.name, *map(_shown, values), _ends(said)]
+
+
+def words(thing: Object, said: Said) -> str:
+    """What the commands say of an object and of what is left, and the line of each that was refused."""
+    left = (said["diagnose"].get("unexplained") or {}).get("words", "")
     lines = [
-        f"fit: {fit.get('verdict') or fit.get('error')}",
-        f"diagnose: {judged.get('verdict') or judged.get('error')}",
+        *(f"`{name}` refused: {said[name]['error']}" for name in COMMANDS if "error" in said[name]),
+        *(f"`{name}`: {said[name]['verdict']}" for name in COMMANDS if said[name].get("verdict")),
+        *([f"left: {left}"] if left else []),
+        *(f"warned: {one.split('/')[-1]}" for one in said["diagnose"].get("warnings", [])),
     ]
-    return f"- **{thing.name}**. " + "; ".join([*lines, *([f"left: {left}"] if left else [])]) + "."
+    return f"- **{thing.name}**. " + "; ".join(lines) + "."
 
 
-def page(found: list[tuple[Object, dict[str, Any]]]) -> str:
-    """The page."""
-    ratios = [
-        _mean(takes, "predicted_db") / _mean(takes, "other_take_db")
+def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str:
+    """How many objects, how many refusals, and how near predictions of takes held out come."""
+    refused = [f"{thing.name} (`{name}`)" for thing, said in found for name in COMMANDS if "error" in said[name]]
+    lines = [
+        f"{len(found)} objects; {len(refused)} commands were refused{': ' if refused else ''}{', '.join(refused)}."
+    ]
+    if not_run:
+        lines.append(f"Not run: {', '.join(not_run)}.")
+    for what, command in (("As fitted", "fit"), ("With the residual", "residual")):
+        means = [
+            [_mean(takes, name) for name in ("predicted_db", "other_take_db", "silence_db")]
+            for _, said in found
+            if (takes := _takes(said, command))
+        ]
+        ratios = [mine / other for mine, other, _ in means if np.isfinite(mine / other)]
+        if ratios:
+            nearer = sum(mine < silence for mine, _, silence in means)
+            lines.append(
+                f"{what}, an unheard take is predicted at {np.median(ratios):.2f} times the distance to the nearest "
+                f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst, and nearer "
+                f"than silence in {nearer} of {len(means)}."
+            )
+    gains = [
+        (errors["before"]["holdout"], errors["after"]["holdout"])
         for _, said in found
-        if (takes := [t for t in said["residual"].get("takes", []) if t["split"] == "holdout"])
-        and np.isfinite(_mean(takes, "other_take_db"))
+        if said["diagnose"].get("effects") and (errors := said["diagnose"]["errors"])["after"]["holdout"] is not None
     ]
-    table = [
-        f"| {' | '.join(COLUMNS)} |",
-        "|---" * len(COLUMNS) + "|",
-        *(f"| {' | '.join(row(*one))} |" for one in found),
-    ]
-    ratio = (
-        f"With the residual an unheard take is predicted at {np.median(ratios):.2f} times the distance to the nearest\n"
-        f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst.\n"
-        if ratios
-        else ""
+    lines.append(
+        f"`diagnose` names effects for {len(gains)} objects with takes held out; "
+        f"the error on these falls for {sum(after < before for before, after in gains)}."
     )
-    said = "\n".join(words(*one) for one in found)
-    return f"{HEAD}\n{chr(10).join(table)}\n\n{ratio}\n## What is said of each\n\n{said}\n"
+    return "\n".join(lines)
+
+
+def page(found: Sequence[tuple[Object, Said]], not_run: Sequence[str] = ()) -> str:
+    """The page."""
+    held = [one for one in found if _takes(one[1], "fit")]
+    rest = [one for one in found if not _takes(one[1], "fit")]
+    parts = [
+        HEAD.format(most=MOST),
+        summary(found, not_run),
+        "## Takes that were held out",
+        _table(COLUMNS, [row(*one) for one in held]),
+        "## No take held out",
+        "Of these the distance is that to the takes that they were fitted to: how well they are described, "
+        "not how well\nothers are predicted.",
+        _table(OWN_COLUMNS, [own_row(*one) for one in rest]),
+        "## What is said of each",
+        "\n".join(words(*one) for one in found),
+    ]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (columns, ["---"] * len(columns), *rows))
 
 
 def main() -> None:
@@ -211,18 +280,21 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=PAGE)
     parser.add_argument("--work", type=Path, help="where cases and what was said of them stay")
+    parser.add_argument("--kept", action="store_true", help="write the page of what stands in --work; name the rest")
     parser.add_argument("cases", nargs="*", metavar="CASE", help="objects whose name holds one of these alone")
     asked = parser.parse_args()
     wanted = [o for o in objects(asked.data) if not asked.cases or any(c in o.name for c in asked.cases)]
     with tempfile.TemporaryDirectory() as folder:
-        found = []
+        work, found, not_run = asked.work or Path(folder), [], []
         for thing in wanted:
-            said = run(thing, asked.work or Path(folder))
+            if asked.kept and not kept(thing, work).is_file():
+                not_run.append(thing.name)
+                continue
+            said = run(thing, work)
             found.append((thing, said))
             print(" | ".join(row(thing, said)), flush=True)
-    asked.out.write_text(page(found))
-    failed = sum("error" in said["fit"] for _, said in found)
-    print(f"{len(found)} objects, {failed} refused: {asked.out}")
+    asked.out.write_text(page(found, not_run))
+    print(f"{len(found)} objects, {len(not_run)} not run: {asked.out}")
 
 
 if __name__ == "__main__":
