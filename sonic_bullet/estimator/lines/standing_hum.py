@@ -55,8 +55,8 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
         between = np.array(
             [np.median(power[int((k + 0.35) * f / step) : int((k + 0.65) * f / step) + 1]) for k in multiple]
         )
-        beside = np.minimum(between, np.concatenate([between[:1], between[:-1]])) / np.log(2)
-        return np.asarray(multiple[(power[at] > ABOVE * beside) & (power[at] > 0)])
+        between_least = np.minimum(between, np.concatenate([between[:1], between[:-1]])) / np.log(2)
+        return np.asarray(multiple[(power[at] > ABOVE * between_least) & (power[at] > 0)])
 
     def left(f: float) -> float:
         rest = quiet - _comb(f, found, n, sr) @ _weights(quiet, f, found, sr)
