@@ -173,9 +173,9 @@ def test_fit_says_that_music_is_no_impact(capfd: pytest.CaptureFixture[str]) -> 
     assert "one impact alone does not" in check_fit(capfd)[1]
 
 
-@pytest.mark.parametrize("gain", [4.0, 30.0, -8.0])
+@pytest.mark.parametrize("gain", [3.0, -4.0])
 def test_a_tap_that_clips_is_said(gain: float, capfd: pytest.CaptureFixture[str]) -> None:
-    status, err, found = walk(np.clip(gain * tap(), -0.9, 0.9), capfd)
+    status, err, found = walk(np.clip(gain * tap(), -0.9, 0.9)[: SR // 3], capfd)
     assert status == 0 and "samples are clipped" in err and found["verdict"] != "features"
     assert run("case", "new", "mine", "--material", "steel", "x.wav") == 0
     assert "x.wav: " in (err := capfd.readouterr().err) and "samples are clipped" in err

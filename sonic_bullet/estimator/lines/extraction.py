@@ -27,6 +27,7 @@ from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
+from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -79,6 +80,8 @@ def extract(
     part = (
         onset.span(limited, sr) if onset_s is None else onset.until_next_hit(limited, sr, max(0, round(onset_s * sr)))
     )
+    hum, hum_hz = find_standing_hum(limited, sr, part.start)
+    signal, limited = signal - hum, limited - hum
     quiet = limited[: part.start]
     steady_above = len(quiet) > 0 and _rms(signal[: part.start] - quiet) > _rms(quiet)
     if steady_above:
@@ -91,7 +94,7 @@ def extract(
     notes = [f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used"] if hits else []
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
-    notes += doubts
+    notes += [*filter(None, [describe_hum(hum_hz)]), *doubts]
     modes, noise = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
