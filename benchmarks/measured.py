@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,11 +49,12 @@ HEAD = """# Recordings by others
 Written by `python -m benchmarks.measured --data ../shared/measured`. Each row is what `case new`, `fit`, `residual`
 and `diagnose` say of recordings that somebody else made.
 
-Every second take is held out, of at most {most} takes of an object. Distances are in dB, log-spectral, over what stands
-10 dB above the noise, in the case's band; means over the takes held out. *Silence* and *another take* (the nearest)
+Every second take is held out, of at most {most} takes of an object. Distances are log-spectral, in dB, over what
+stands 10 dB above the noise in the case's band. They are means over the takes held out. *Silence* and *another take* (the nearest)
 stand beside them. *Fitted* and *with residual* are what `fit` and `residual` print: one gain a take where no impulse is
 known. *Before* and *with effects* are the errors that `diagnose` judges by on the takes held out. It fits no gain a
-take, so they stand beside each other alone.
+take: compare them with each other alone. An untouched preset of the tables has no row, for no command says how far it
+is. Nor does `diagnose` say which one measurement would decide. Its warnings say what the recordings lack.
 """
 Piece = tuple[Path, float, float]
 Said = dict[str, dict[str, Any]]
@@ -210,12 +212,12 @@ def words(thing: Object, said: Said) -> str:
     """What the commands say of an object and of what is left, and the line of each that was refused."""
     left = (said["diagnose"].get("unexplained") or {}).get("words", "")
     lines = [
-        *(f"`{name}` refused: {said[name]['error']}" for name in COMMANDS if "error" in said[name]),
-        *(f"`{name}`: {said[name]['verdict']}" for name in COMMANDS if said[name].get("verdict")),
+        *(f"{name} refused: {said[name]['error']}" for name in COMMANDS if "error" in said[name]),
+        *(f"{name}: {said[name]['verdict']}" for name in COMMANDS if said[name].get("verdict")),
         *([f"left: {left}"] if left else []),
         *(f"warned: {one.split('/')[-1]}" for one in said["diagnose"].get("warnings", [])),
     ]
-    return f"- **{thing.name}**. " + "; ".join(lines) + "."
+    return "\n".join([thing.name, *(_wrapped(f"  {line}", "    ") for line in lines)])
 
 
 def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str:
@@ -236,9 +238,9 @@ def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str
         if ratios:
             nearer = sum(mine < silence for mine, _, silence in means)
             lines.append(
-                f"{what}, an unheard take is predicted at {np.median(ratios):.2f} times the distance to the nearest "
-                f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst, and nearer "
-                f"than silence in {nearer} of {len(means)}."
+                f"{what}, a take held out is predicted at {np.median(ratios):.2f} times the distance to the nearest "
+                f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst. "
+                f"It is nearer than silence in {nearer} of {len(means)}."
             )
     gains = [
         (errors["before"]["holdout"], errors["after"]["holdout"])
@@ -249,7 +251,22 @@ def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str
         f"`diagnose` names effects for {len(gains)} objects with takes held out; "
         f"the error on these falls for {sum(after < before for before, after in gains)}."
     )
-    return "\n".join(lines)
+    louder = [
+        before - _mean(takes, "predicted_db")
+        for _, said in found
+        if (takes := _takes(said, "fit"))
+        and (before := (said["diagnose"].get("errors") or {}).get("before", {}).get("holdout")) is not None
+    ]
+    if louder:
+        lines.append(
+            f"What `diagnose` begins from is {np.median(louder):.1f} dB farther from these takes than what `fit` "
+            "predicts (median)."
+        )
+    return "\n\n".join(map(_wrapped, lines))
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, 118, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def page(found: Sequence[tuple[Object, Said]], not_run: Sequence[str] = ()) -> str:
@@ -266,7 +283,7 @@ def page(found: Sequence[tuple[Object, Said]], not_run: Sequence[str] = ()) -> s
         "not how well\nothers are predicted.",
         _table(OWN_COLUMNS, [own_row(*one) for one in rest]),
         "## What is said of each",
-        "\n".join(words(*one) for one in found),
+        "```text\n" + "\n\n".join(words(*one) for one in found) + "\n```",
     ]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
