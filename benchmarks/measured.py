@@ -50,11 +50,13 @@ Written by `python -m benchmarks.measured --data ../shared/measured`. Each row i
 and `diagnose` say of recordings that somebody else made.
 
 Every second take is held out, of at most {most} takes of an object. Distances are log-spectral, in dB, over what
-stands 10 dB above the noise in the case's band. They are means over the takes held out. *Silence* and *another take* (the nearest)
-stand beside them. *Fitted* and *with residual* are what `fit` and `residual` print: one gain a take where no impulse is
-known. *Before* and *with effects* are the errors that `diagnose` judges by on the takes held out. It fits no gain a
-take: compare them with each other alone. An untouched preset of the tables has no row, for no command says how far it
-is. Nor does `diagnose` say which one measurement would decide. Its warnings say what the recordings lack.
+stands 10 dB above the noise in the case's band. They are means over the takes held out. *Silence* and *another take*
+(the nearest) stand beside them. *Fitted* and *with residual* are what `fit` and `residual` print: one gain a take where
+no impulse is known. *Before* and *with effects* are the errors that `diagnose` judges by on the takes held out. It fits
+no gain a take: compare them with each other alone. The eight takes of the bowl are microphones of one stroke.
+
+An untouched preset of the tables has no row, for no command says how far it is. Nor does `diagnose` say which one
+measurement would decide. Its warnings say what the recordings lack.
 """
 Piece = tuple[Path, float, float]
 Said = dict[str, dict[str, Any]]
