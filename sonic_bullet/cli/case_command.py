@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.cli.hammer import FORCE_COLUMNS, StrikeFiles, part_force
-from sonic_bullet.cli.output import table, warn
+from sonic_bullet.cli.output import places, table, warn
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_channel, replacing
 from sonic_bullet.files.case_schema import case_schema
@@ -35,6 +35,7 @@ def run_case_new(
     recordings: Sequence[str],
     *,
     split: bool,
+    picture: str | None,
     hold_out: int | None,
     force_channel: int | None,
     force_newton: float | None,
@@ -52,6 +53,10 @@ def run_case_new(
     Raises SonicBulletError.
     """
     _check_options(hold_out, force_channel, force_newton, mesh, material, sensor, sensor_at or sensor_direction)
+    if picture is not None and not (split and picture.endswith((".png", ".pdf", ".svg"))):
+        wrong = "pictures are .png, .pdf or .svg" if split else "there is nothing to draw without --split"
+        raise FileError(f"cannot write {picture}: {wrong}", "end the name with .png, and give --split too")
+    (drawing,) = places(picture)
     place = Path(folder)
     if place.exists() and not place.is_dir():
         raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
@@ -67,7 +72,7 @@ def run_case_new(
     thing = _object(mesh, units, material)
     with temporary_folder() as takes:
         if split:
-            sounds, rows = cut_takes(sounds, takes, force_channel)
+            sounds, rows = cut_takes(sounds, takes, force_channel, Path(drawing) if drawing else None)
             print(table(TAKE_COLUMNS, rows))
         struck: list[StrikeFiles] = []
         if force_channel is not None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.files import live_channel, read_audio, write_audio
+from sonic_bullet.plots.takes_plot import DrawnRecording, write_takes_picture
 from sonic_bullet.records import Array
 
 LEAD_S = 0.05
@@ -20,7 +21,7 @@ TAKE_COLUMNS = ("take", "at", "length", "peak", "")
 
 
 def cut_takes(
-    sounds: Sequence[Path], to: Path, force_channel: int | None = None
+    sounds: Sequence[Path], to: Path, force_channel: int | None = None, picture: Path | None = None
 ) -> tuple[list[Path], list[tuple[str, ...]]]:
     """Cut recordings into takes.
 
@@ -32,6 +33,8 @@ def cut_takes(
         Folder for the takes, `NAME-01.wav` and so on, every channel of them.
     force_channel : int, optional
         Not listened to.
+    picture : Path, optional
+        .png, .pdf or .svg to draw the recordings to, with where they are cut.
 
     Returns
     -------
@@ -47,6 +50,7 @@ def cut_takes(
     """
     made: list[Path] = []
     rows: list[tuple[str, ...]] = []
+    drawn: list[DrawnRecording] = []
     for path in sounds:
         sound, sr = read_audio(path)
         if force_channel is not None:
@@ -55,6 +59,7 @@ def cut_takes(
         live_channel(others, None, path)
         loudest = others[int(np.argmax(np.ptp(others, axis=1)))]
         bounds = take_bounds(loudest, sr)
+        drawn += [DrawnRecording(path.name, loudest, sr, bounds)] if picture is not None else []
         for k, (strike, start, stop) in enumerate(bounds, 1):
             piece = path if len(bounds) == 1 else to / f"{path.stem}-{k:02d}.wav"
             if piece is not path:
@@ -63,6 +68,8 @@ def cut_takes(
             rows.append(
                 (piece.name, f"{strike / sr:.3f} s", f"{(stop - start) / sr:.3f} s", *_level(loudest[start:stop]))
             )
+    if picture is not None:
+        write_takes_picture(picture, drawn)
     return made, rows
 
 
