@@ -244,21 +244,21 @@ def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str
                 f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst. "
                 f"It is nearer than silence in {nearer} of {len(means)}."
             )
-    gains = [
-        (errors["before"]["holdout"], errors["after"]["holdout"])
-        for _, said in found
-        if said["diagnose"].get("effects") and (errors := said["diagnose"]["errors"])["after"]["holdout"] is not None
-    ]
-    lines.append(
-        f"`diagnose` names effects for {len(gains)} objects with takes held out; "
-        f"the error on these falls for {sum(after < before for before, after in gains)}."
-    )
     louder = [
         before - _mean(takes, "predicted_db")
         for _, said in found
         if (takes := _takes(said, "fit"))
         and (before := (said["diagnose"].get("errors") or {}).get("before", {}).get("holdout")) is not None
     ]
+    gains = [
+        (errors["before"]["holdout"], errors["after"]["holdout"])
+        for _, said in found
+        if said["diagnose"].get("effects") and (errors := said["diagnose"]["errors"])["after"]["holdout"] is not None
+    ]
+    lines.append(
+        f"`diagnose` names effects for {len(gains)} of {len(louder)} objects with takes held out; "
+        f"the error on these falls for {sum(after < before for before, after in gains)}."
+    )
     if louder:
         lines.append(
             f"What `diagnose` begins from is {np.median(louder):.1f} dB farther from these takes than what `fit` "
