@@ -232,33 +232,34 @@ def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str
         lines.append(f"Not run: {', '.join(not_run)}.")
     for what, command in (("As fitted", "fit"), ("With the residual", "residual")):
         means = [
-            [_mean(takes, name) for name in ("predicted_db", "other_take_db", "silence_db")]
+            [_mean(takes, name) for name in ("predicted_db", "other_take_db")]
             for _, said in found
             if (takes := _takes(said, command))
         ]
-        ratios = [mine / other for mine, other, _ in means if np.isfinite(mine / other)]
+        ratios = [mine / other for mine, other in means if np.isfinite(mine / other)]
         if ratios:
-            nearer = sum(mine < silence for mine, _, silence in means)
+            each = [t for _, said in found for t in _takes(said, command)]
+            nearer = sum(t["predicted_db"] < t["silence_db"] for t in each)
             lines.append(
                 f"{what}, a take held out is predicted at {np.median(ratios):.2f} times the distance to the nearest "
                 f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst. "
-                f"It is nearer than silence in {nearer} of {len(means)}."
+                f"It is nearer than silence in {nearer} of {len(each)} takes."
             )
-    gains = [
-        (errors["before"]["holdout"], errors["after"]["holdout"])
-        for _, said in found
-        if said["diagnose"].get("effects") and (errors := said["diagnose"]["errors"])["after"]["holdout"] is not None
-    ]
-    lines.append(
-        f"`diagnose` names effects for {len(gains)} objects with takes held out; "
-        f"the error on these falls for {sum(after < before for before, after in gains)}."
-    )
     louder = [
         before - _mean(takes, "predicted_db")
         for _, said in found
         if (takes := _takes(said, "fit"))
         and (before := (said["diagnose"].get("errors") or {}).get("before", {}).get("holdout")) is not None
     ]
+    gains = [
+        (errors["before"]["holdout"], errors["after"]["holdout"])
+        for _, said in found
+        if said["diagnose"].get("effects") and (errors := said["diagnose"]["errors"])["after"]["holdout"] is not None
+    ]
+    lines.append(
+        f"`diagnose` names effects for {len(gains)} of {len(louder)} objects with takes held out; "
+        f"the error on these falls for {sum(after < before for before, after in gains)}."
+    )
     if louder:
         lines.append(
             f"What `diagnose` begins from is {np.median(louder):.1f} dB farther from these takes than what `fit` "

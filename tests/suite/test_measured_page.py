@@ -61,8 +61,8 @@ def test_a_refusal_is_said_with_its_line_and_counted() -> None:
 def test_the_summary_counts_ratios_silence_and_what_effects_gain() -> None:
     text = " ".join(page([(_object("mug"), MUG), (_object("bell"), BELL), (_object("loud"), LOUD)]).split())
     assert "4.65 times the distance to the nearest other take at the median of 2 objects, 7.50 times at worst" in text
-    assert "3.60 times" in text and "It is nearer than silence in 1 of 2" in text
-    assert "names effects for 1 objects with takes held out; the error on these falls for 1" in text
+    assert "3.60 times" in text and "It is nearer than silence in 2 of 3 takes" in text
+    assert "names effects for 1 of 2 objects with takes held out; the error on these falls for 1" in text
     assert "0.0 dB farther" not in text and "-2.5 dB farther" in text
     assert "left: most of it in the first third warned: take2.wav: it clips" in text
     assert text.index("| mug |") < text.index("## No take held out") < text.index("| bell |")
