@@ -1,91 +1,321 @@
-"""Measured data: each set fitted on one part and judged on another, baseline against baseline + effect, a null
-of as many numbers beside it.
+"""Recordings by others through the commands a user has: `case new`, `fit`, `residual`, `diagnose`, with takes held out.
 
-    python benchmarks/measured.py --data ../shared/measured [--out docs/measured/recordings-by-others.md] [SET ...]
+    python -m benchmarks.measured --data ../shared/measured [--out PAGE] [--work FOLDER] [CASE ...]
 
-DATA/SET/case.json, dev/ -> measured_sets/ judge of that set, or plain.py's for a set of unknown kind, READINGS times
-(observed.py) -> OUT, and pictures/SET.png beside it What is missing or cannot be read gives one line that names it, and
-the count of it is printed. Features are kept in SONIC_BULLET_MEASURED_CACHE.
+DATA/SET/case.json -> takes cut out of the set's files (every second one held out, MOST at most)
+    -> `case new` -> case -> `fit`, `residual`, `diagnose` -> their JSON -> one row, and what is said of what is left
+    -> docs/measured/recordings-by-others.md
+
+Distances are those that the commands print: log-spectral, in the case's band, of takes that were not fitted, one gain
+fitted where no impulse is known. A case whose JSON stands in FOLDER is not run again. What cannot be run is named, and
+counted.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import shutil
+import subprocess
 import sys
-from dataclasses import replace
+import tempfile
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import numpy as np
 
-from benchmarks.measured_sets.observed import READINGS, reading
-from benchmarks.measured_sets.page import Page, written
-from benchmarks.measured_sets.table import JUDGES, PLAIN
-from benchmarks.measured_sets.values import Judge, Row
-from sonic_bullet.parallel import one_thread, parallel_map
+MOST = 4
+LEAD_S, LONGEST_S = 0.05, 2.5
+PAGE = Path("docs/measured/recordings-by-others.md")
+COMMANDS = ("fit", "residual", "diagnose")
+LIMIT_S = 600.0
+COLUMNS = (
+    "object",
+    "held out",
+    "silence",
+    "another take",
+    "fitted",
+    "with residual",
+    "`diagnose`, before",
+    "with effects",
+    "effects, or the verdict",
+)
+OWN_COLUMNS = ("object", "silence", "fitted", "with residual", "effects, or the verdict")
+HEAD = """# Recordings by others
+
+Written by `python -m benchmarks.measured --data ../shared/measured`. Each row is what `case new`, `fit`, `residual`
+and `diagnose` say of recordings that somebody else made.
+
+Every second take is held out, of at most {most} takes of an object. Distances are log-spectral, in dB, over what
+stands 10 dB above the noise in the case's band. They are means over the takes held out. *Silence* and *another take*
+(the nearest) stand beside them. *Fitted* and *with residual* are what `fit` and `residual` print: one gain a take where
+no impulse is known. *Before* and *with effects* are the errors that `diagnose` judges by on the takes held out. It fits
+no gain a take: compare them with each other alone. The eight takes of the bowl are microphones of one stroke.
+
+An untouched preset of the tables has no row, for no command says how far it is. Nor does `diagnose` say which one
+measurement would decide. Its warnings say what the recordings lack.
+"""
+Piece = tuple[Path, float, float]
+Said = dict[str, dict[str, Any]]
 
 
-def main(arguments: list[str] | None = None) -> int:
+@dataclass(frozen=True, slots=True)
+class Object:
+    """What was struck: takes as pieces (file, from, to in s) of its set's files, and what `case new` is told of it."""
+
+    name: str
+    set: str
+    takes: tuple[Piece, ...]
+    options: tuple[str, ...] = ()
+    ready: Path | None = None
+
+
+def objects(data: Path) -> Iterator[Object]:
+    """The objects of all sets that hold recordings."""
+    for name, of_file in (("diffimpact-hammer", "object"), ("wood-iet-timbr", "date")):
+        for entry in _read(data / name)["files"]:
+            hits = [hit["t_hit_s"] for hit in entry["hits"]]
+            ends = [*(h - LEAD_S for h in hits[1:]), hits[-1] + LONGEST_S]
+            takes = [
+                (data / name / entry["file"], h - LEAD_S, min(e, h + LONGEST_S))
+                for h, e in zip(hits, ends, strict=True)
+            ]
+            yield Object(f"{name}: {entry[of_file].split(' (')[0]}", name, tuple(takes[:MOST]))
+    robot: dict[str, list[Piece]] = {}
+    for entry in _read(data / "diffimpact-robot")["files"]:
+        piece = (data / "diffimpact-robot" / entry["file"], entry["t_hit_s"] - LEAD_S, entry["t_hit_s"] + 1.2)
+        robot.setdefault(f"{entry['object']}, {entry['tool']}", []).append(piece)
+    for what, takes in robot.items():
+        yield Object(f"diffimpact-robot: {what}", "diffimpact-robot", tuple(takes[:MOST]))
+    for name, pattern, what in (
+        ("agogo-forzee", "AgogoHigh*", "high bell"),
+        ("ride-bja", "BL_*", "bell"),
+        ("ride-bja", "RD_*", "bow"),
+    ):
+        yield Object(f"{name}: {what}", name, _whole(data / name / "dev", pattern))
+    yield Object("diffsound-bowl", "diffsound-bowl", (), ready=data / "diffsound-bowl")
+    bar = data / "pyrfda-steel-bar"
+    yield Object(
+        bar.name, bar.name, _whole(bar / "dev", "*"), ("--mesh", str(bar / "mesh" / "bar.obj"), "--material", "steel")
+    )
+    for name, folder in (("bell-sonicpi", "dev"), ("glockenspiel-fluidr3", "dev"), ("xylophone-vcsl", "dev")):
+        for path in sorted((data / name / folder).glob("*.flac"))[:1]:
+            yield Object(f"{name}: {path.stem}", name, ((path, 0.0, LONGEST_S),))
+    for path in sorted((data / "realimpact-clips").glob("*.flac")):
+        yield Object(f"realimpact-clips: {path.stem}", "realimpact-clips", ((path, 0.0, LONGEST_S),))
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "case.json").read_text())
+    return found
+
+
+def _whole(folder: Path, pattern: str) -> tuple[Piece, ...]:
+    return tuple((path, 0.0, LONGEST_S) for path in sorted(folder.glob(f"{pattern}.flac"))[:MOST])
+
+
+def made_case(thing: Object, folder: Path) -> Path:
+    """The case of an object: its takes as files of their own, every second one held out."""
+    import soundfile
+
+    if thing.ready is not None:
+        return thing.ready
+    folder.mkdir(parents=True)
+    for k, (path, start, stop) in enumerate(thing.takes):
+        sound, sr = soundfile.read(path, always_2d=True)
+        piece = sound[max(0, round(start * sr)) : round(stop * sr), 0]
+        soundfile.write(folder / f"take{k}.wav", piece, sr, subtype="FLOAT")
+    _command("case", "new", str(folder), *thing.options)
+    case = _read(folder)
+    for k, recording in enumerate(case["recordings"]):
+        recording["split"] = "fit" if k % 2 == 0 else "holdout"
+    (folder / "case.json").write_text(json.dumps(case, indent=1))
+    return folder
+
+
+def _command(*words: str) -> str:
+    """Run a command; the last line that it says on stderr."""
+    command = [sys.executable, "-m", "sonic_bullet", *words]
+    try:
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        return f"stopped after {LIMIT_S:.0f} s"
+    return (done.stderr.strip().splitlines() or ["no word"])[-1].removeprefix("sonic-bullet: ")
+
+
+def kept(thing: Object, work: Path) -> Path:
+    """Where what the commands said of an object stays."""
+    return work / "".join(c if c.isalnum() else "-" for c in thing.name) / "said.json"
+
+
+def run(thing: Object, work: Path) -> Said:
+    """What the commands say of an object: their JSON by name, or the line that they end with."""
+    stays = kept(thing, work)
+    folder = stays.parent
+    if stays.is_file():
+        return dict(json.loads(stays.read_text()))
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    case, said = made_case(thing, folder / "case"), {}
+    for name in COMMANDS:
+        to = folder / f"{name}.json"
+        last = _command(name, str(case), "-o", str(folder / f"{name}-preset.json"), "--json", str(to))
+        said[name] = json.loads(to.read_text()) if to.is_file() else {"error": last.replace(str(folder), "").strip()}
+    stays.write_text(json.dumps(said))
+    return said
+
+
+def _takes(said: Said, command: str, split: str = "holdout") -> list[dict[str, Any]]:
+    return [t for t in said[command].get("takes", []) if t["split"] == split]
+
+
+def _mean(takes: list[dict[str, Any]], name: str) -> float:
+    values = [t[name] for t in takes if t[name] is not None and np.isfinite(t[name])]
+    return float(np.mean(values)) if values else float("nan")
+
+
+def _shown(value: float | None) -> str:
+    return "-" if value is None or not np.isfinite(value) else f"{value:.1f}"
+
+
+def _ends(said: Said) -> str:
+    """The effects that are named, or the verdict, or that the command was refused."""
+    judged = said["diagnose"]
+    return ", ".join(f"`{e['id']}`" for e in judged.get("effects", [])) or judged.get("verdict") or "refused"
+
+
+def row(thing: Object, said: Said) -> list[str]:
+    """The cells of an object in the table of takes held out."""
+    fitted, beside = _takes(said, "fit"), _takes(said, "residual")
+    errors = said["diagnose"].get("errors") or {}
+    before, after = (errors.get(when, {}).get("holdout") for when in ("before", "after"))
+    values = (
+        _mean(fitted, "silence_db"),
+        _mean(fitted, "other_take_db"),
+        _mean(fitted, "predicted_db"),
+        _mean(beside, "predicted_db"),
+        before,
+        after if said["diagnose"].get("effects") else None,
+    )
+    return [thing.name, str(len(fitted)), *map(_shown, values), _ends(said)]
+
+
+def own_row(thing: Object, said: Said) -> list[str]:
+    """The cells of an object of which no take is held out: distances of the takes that it was fitted to."""
+    fitted, beside = _takes(said, "fit", "fit"), _takes(said, "residual", "fit")
+    values = (_mean(fitted, "silence_db"), _mean(fitted, "predicted_db"), _mean(beside, "predicted_db"))
+    return [thing.name, *map(_shown, values), _ends(said)]
+
+
+def words(thing: Object, said: Said) -> str:
+    """What the commands say of an object and of what is left, and the line of each that was refused."""
+    left = (said["diagnose"].get("unexplained") or {}).get("words", "")
+    lines = [
+        *(f"{name} refused: {said[name]['error']}" for name in COMMANDS if "error" in said[name]),
+        *(f"{name}: {said[name]['verdict']}" for name in COMMANDS if said[name].get("verdict")),
+        *([f"left: {left}"] if left else []),
+        *(f"warned: {one.split('/')[-1]}" for one in said["diagnose"].get("warnings", [])),
+    ]
+    return "\n".join([thing.name, *(_wrapped(f"  {line}", "    ") for line in lines)])
+
+
+def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str:
+    """How many objects, how many refusals, and how near predictions of takes held out come."""
+    refused = [f"{thing.name} (`{name}`)" for thing, said in found for name in COMMANDS if "error" in said[name]]
+    lines = [
+        f"{len(found)} objects; {len(refused)} commands were refused{': ' if refused else ''}{', '.join(refused)}."
+    ]
+    if not_run:
+        lines.append(f"Not run: {', '.join(not_run)}.")
+    for what, command in (("As fitted", "fit"), ("With the residual", "residual")):
+        means = [
+            [_mean(takes, name) for name in ("predicted_db", "other_take_db")]
+            for _, said in found
+            if (takes := _takes(said, command))
+        ]
+        ratios = [mine / other for mine, other in means if np.isfinite(mine / other)]
+        if ratios:
+            each = [t for _, said in found for t in _takes(said, command)]
+            nearer = sum(t["predicted_db"] < t["silence_db"] for t in each)
+            lines.append(
+                f"{what}, a take held out is predicted at {np.median(ratios):.2f} times the distance to the nearest "
+                f"other take at the median of {len(ratios)} objects, {max(ratios):.2f} times at worst. "
+                f"It is nearer than silence in {nearer} of {len(each)} takes."
+            )
+    louder = [
+        before - _mean(takes, "predicted_db")
+        for _, said in found
+        if (takes := _takes(said, "fit"))
+        and (before := (said["diagnose"].get("errors") or {}).get("before", {}).get("holdout")) is not None
+    ]
+    gains = [
+        (errors["before"]["holdout"], errors["after"]["holdout"])
+        for _, said in found
+        if said["diagnose"].get("effects") and (errors := said["diagnose"]["errors"])["after"]["holdout"] is not None
+    ]
+    lines.append(
+        f"`diagnose` names effects for {len(gains)} of {len(louder)} objects with takes held out; "
+        f"the error on these falls for {sum(after < before for before, after in gains)}."
+    )
+    if louder:
+        lines.append(
+            f"What `diagnose` begins from is {np.median(louder):.1f} dB farther from these takes than what `fit` "
+            "predicts (median)."
+        )
+    return "\n\n".join(map(_wrapped, lines))
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, 118, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+def page(found: Sequence[tuple[Object, Said]], not_run: Sequence[str] = ()) -> str:
+    """The page."""
+    held = [one for one in found if _takes(one[1], "fit")]
+    rest = [one for one in found if not _takes(one[1], "fit")]
+    parts = [
+        HEAD.format(most=MOST),
+        summary(found, not_run),
+        "## Takes that were held out",
+        _table(COLUMNS, [row(*one) for one in held]),
+        "## No take held out",
+        "Of these the distance is that to the takes that they were fitted to: how well they are described, "
+        "not how well\nothers are predicted.",
+        _table(OWN_COLUMNS, [own_row(*one) for one in rest]),
+        "## What is said of each",
+        "```text\n" + "\n\n".join(words(*one) for one in found) + "\n```",
+    ]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (columns, ["---"] * len(columns), *rows))
+
+
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--data", type=Path, required=True)
-    parser.add_argument("--out", type=Path, default=Path("docs/measured/recordings-by-others.md"))
-    parser.add_argument("sets", nargs="*", metavar="SET", help="these alone; the page then holds them alone")
-    asked = parser.parse_args(arguments)
-    if not asked.data.is_dir():
-        print(f"{asked.data}: no such folder; give the folder that holds the sets", file=sys.stderr)
-        return 2
-    known = asked.sets or sorted({p.name for p in asked.data.iterdir() if p.is_dir()} | set(JUDGES))
-    pages, skipped = [], []
-    for name in known:
-        print(f"{name} ...", flush=True)
-        page = judged(asked.data / name)
-        if isinstance(page, str):
-            skipped.append(f"{name}: {page}")
-            print(f"  skipped: {page}", flush=True)
-            continue
-        pages.append(page)
-        skipped += [f"{name}: {line}" for line in page.found.skipped]
-        for row in page.found.rows:
-            print(
-                f"  {row.what}: {row.before:.3g} -> {row.after:.3g} {row.unit} (null {row.null:.3g}) "
-                f"{row.effect}{' accepted' if row.accepted else ''}",
-                flush=True,
-            )
-    written(asked.out, pages, skipped)
-    for line in skipped:
-        print(f"skipped: {line}")
-    print(f"{len(pages)} sets judged, {len(skipped)} sets or files skipped: {asked.out}")
-    return 0
-
-
-def judged(folder: Path) -> Page | str:
-    """A set's page, or one line that says why there is none."""
-    if not folder.is_dir():
-        return "the folder is absent"
-    try:
-        text = (folder / "README.md").read_text() if (folder / "README.md").is_file() else ""
-        case = json.loads((folder / "case.json").read_text()) if (folder / "case.json").is_file() else {}
-        case.setdefault("set", folder.name)
-        judge = JUDGES.get(folder.name, PLAIN)
-        read = parallel_map(lambda number: _rows(judge, folder, case, number), range(READINGS))
-        with one_thread():
-            found = judge(folder, case)  # its lines are kept by now
-        return Page(folder.name, text, case, replace(found, rows=tuple(r.read_again(read[1:]) for r in found.rows)))
-    except Exception as error:  # a set fails alone
-        return f"{type(error).__name__}: {' '.join(str(error).split())}"
-
-
-def _rows(judge: Judge, folder: Path, case: dict[str, Any], number: int) -> tuple[Row, ...]:
-    """What one reading says; nothing where another than the first fails, so that nothing stands."""
-    with reading(number):
-        try:
-            return judge(folder, case).rows
-        except Exception:
-            if not number:
-                raise
-            return ()
+    parser.add_argument("--out", type=Path, default=PAGE)
+    parser.add_argument("--work", type=Path, help="where cases and what was said of them stay")
+    parser.add_argument("--kept", action="store_true", help="write the page of what stands in --work; name the rest")
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="objects whose name holds one of these alone")
+    asked = parser.parse_args()
+    wanted = [o for o in objects(asked.data) if not asked.cases or any(c in o.name for c in asked.cases)]
+    with tempfile.TemporaryDirectory() as folder:
+        work, found, not_run = asked.work or Path(folder), [], []
+        for thing in wanted:
+            if asked.kept and not kept(thing, work).is_file():
+                not_run.append(thing.name)
+                continue
+            said = run(thing, work)
+            found.append((thing, said))
+            print(" | ".join(row(thing, said)), flush=True)
+    asked.out.write_text(page(found, not_run))
+    print(f"{len(found)} objects, {len(not_run)} not run: {asked.out}")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

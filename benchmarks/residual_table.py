@@ -27,7 +27,7 @@ from sonic_bullet.estimator.fit.recorded import onset_sample
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.estimator.lines.log_spectral import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.estimator.residual.recorded_strikes import Strikes, case_strikes, strikes_of
-from sonic_bullet.files import read_audio
+from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
@@ -65,10 +65,10 @@ def of_case(folder: Path) -> Iterator[Row]:
             and recording.file is not None
             and recording.object == found.objects[0].evidence.thing.name
         ):
-            sound, sr = read_audio(recording.file)
+            sound, sr, _ = read_channel(recording.file, recording.channel)
             yield judged(
                 f"{folder.name} {recording.file.stem}",
-                sound[recording.channel],
+                sound,
                 sr,
                 strike_modes(found, recording, sr),
                 strikes,

@@ -247,7 +247,10 @@ def case() -> None:
     help="The strikes' recordings. [default: all in the folder]",
 )
 @click.option("--split", is_flag=True, help="Cut recordings of several strikes into takes of one each.")
+@click.option("--picture", metavar="NAME.png", help="With --split, also draw where each recording is cut.")
 @click.option("--hold-out", type=int, metavar="N", help="Hold every N-th take out of the fit, to judge it by.")
+@click.option("--force-channel", type=int, metavar="K", help="Channel, from 0, that is the hammer's force, not sound.")
+@click.option("--force-newton", type=float, metavar="N", help="Newton at its full scale, which gives impulses in N·s.")
 @click.option("--mesh", metavar="M", help="Mesh of what was struck.")
 @click.option("--units", type=click.Choice(["m", "cm", "mm"]), default="m", show_default=True, help="Of the mesh.")
 @click.option(

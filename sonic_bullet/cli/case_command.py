@@ -15,12 +15,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.output import table, warn
+from sonic_bullet.cli.hammer import FORCE_COLUMNS, StrikeFiles, part_force
+from sonic_bullet.cli.output import places, table, warn
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
-from sonic_bullet.files import read_audio, replacing
+from sonic_bullet.files import read_channel, replacing
 from sonic_bullet.files.case_schema import case_schema
-from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
-from sonic_bullet.files.recordings import channel_of, channel_words
+from sonic_bullet.files.cases import FORMAT, LARGEST, UNITS, Case, read_case
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.errors import FileError
@@ -35,7 +35,10 @@ def run_case_new(
     recordings: Sequence[str],
     *,
     split: bool,
+    picture: str | None,
     hold_out: int | None,
+    force_channel: int | None,
+    force_newton: float | None,
     mesh: str | None,
     units: str,
     material: str | None,
@@ -49,8 +52,11 @@ def run_case_new(
 
     Raises SonicBulletError.
     """
-    if hold_out is not None and hold_out < 2:
-        raise FileError(f"--hold-out is {hold_out}", "give 2 or more: some takes are to be fitted")
+    _check_options(hold_out, force_channel, force_newton, mesh, material, sensor, sensor_at or sensor_direction)
+    if picture is not None and not (split and picture.endswith((".png", ".pdf", ".svg"))):
+        wrong = "pictures are .png, .pdf or .svg" if split else "there is nothing to draw without --split"
+        raise FileError(f"cannot write {picture}: {wrong}", "end the name with .png, and give --split too")
+    (drawing,) = places(picture)
     place = Path(folder)
     if place.exists() and not place.is_dir():
         raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
@@ -59,15 +65,6 @@ def run_case_new(
     sounds = [Path(name) for name in recordings] or sorted(p for p in place.glob("*") if p.suffix.lower() in AUDIO)
     if not sounds:
         raise FileError(f"{folder} holds no recordings", "name them: --recordings a.wav b.wav")
-    if mesh is not None and material is None:
-        raise FileError(
-            "--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names"
-        )
-    if sensor != "velocity" and (sensor_at is not None or sensor_direction is not None):
-        raise FileError(
-            f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
-            "give --sensor velocity, or leave it out",
-        )
     if mesh is not None:
         from sonic_bullet.modal import read_mesh
 
@@ -75,22 +72,69 @@ def run_case_new(
     thing = _object(mesh, units, material)
     with temporary_folder() as takes:
         if split:
-            sounds, rows = cut_takes(sounds, takes)
+            sounds, rows = cut_takes(sounds, takes, force_channel, Path(drawing) if drawing else None)
             print(table(TAKE_COLUMNS, rows))
-        else:
+        struck: list[StrikeFiles] = []
+        if force_channel is not None:
+            struck, rows = part_force(sounds, force_channel, force_newton, takes)
+            sounds = [take.sound for take in struck]
+            print(table(FORCE_COLUMNS, rows))
+        elif not split:
             for sound in sounds:
-                read_audio(sound)
-        name_of = _names(place, [*sounds, *([Path(mesh)] if mesh is not None else [])])
+                warn(f"{sound}: {words}" for words in _doubts(sound))
+        forces = [take.force for take in struck]
+        name_of = _names(place, [*sounds, *forces, *([Path(mesh)] if mesh is not None else [])])
         if mesh is not None:
             thing["mesh"] = name_of[Path(mesh)]
         case = _described(
             place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium
         )
+        for recording, take in zip(case["recordings"], struck, strict=False):
+            force = {"file": name_of[take.force], "channel": 0, "newton_per_unit": force_newton}
+            recording["strike"] = recording["strike"] | {"impulse": take.impulse_n_s, "force": force}
         for recording in case["recordings"][hold_out - 1 :: hold_out] if hold_out is not None else []:
             recording["split"] = "holdout"
         _written(place, name_of, case)
     print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {thing['mesh']}"))
-    print("now say where and how hard each strike was: strike.position in m, strike.impulse in N·s, or null")
+    hard = "" if struck and force_newton is not None else " and how hard"
+    print(f"now say where{hard} each strike was: strike.position in m, strike.impulse in N·s, or null")
+
+
+def _check_options(
+    hold_out: int | None,
+    force_channel: int | None,
+    force_newton: float | None,
+    mesh: str | None,
+    material: str | None,
+    sensor: str,
+    sensor_point: Point | None,
+) -> None:
+    """Raise FileError where an option of `case new` is out of range or lacks another."""
+    if hold_out is not None and hold_out < 2:
+        raise FileError(f"--hold-out is {hold_out}", "give 2 or more: some takes are to be fitted")
+    if force_newton is not None and (force_channel is None or not 0 < force_newton <= LARGEST):
+        raise FileError(
+            f"--force-newton is {force_newton:g}" + " without --force-channel" * (force_channel is None),
+            f"name the force's channel, counted from 0, and newton at full scale, above 0, at most {LARGEST:g}",
+        )
+    if mesh is not None and material is None:
+        raise FileError(
+            "--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names"
+        )
+    if sensor != "velocity" and sensor_point is not None:
+        raise FileError(
+            f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
+            "give --sensor velocity, or leave it out",
+        )
+
+
+def _doubts(sound: Path) -> list[str]:
+    """What is odd about a recording. Raises FileError, AudioError."""
+    from sonic_bullet.estimator.lines.onset import clipped_samples
+
+    signal, _, which = read_channel(sound)
+    clipped = clipped_samples(signal)
+    return [which] * bool(which) + [f"{clipped} samples are clipped: 'fit' refuses that"] * bool(clipped)
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
@@ -182,6 +226,8 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 def run_case_check(folder: str) -> None:
     """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
+    from sonic_bullet.estimator.fit.recorded import refuse_clipped
+
     case = read_case(folder)
     warn(case.warnings)
     rows = [_object_row(case, name) for name in case.objects]
@@ -192,9 +238,9 @@ def run_case_check(folder: str) -> None:
         if not recording.file.is_file() and recording.split != "fit":
             missing += 1
             continue
-        sound, _ = read_audio(recording.file)
-        channel_of(sound, recording.channel, recording.file.name)
-        which = channel_words(len(sound), recording.channel if recording.channel_named else None)
+        sound, _, which = read_channel(recording.file, recording.channel)
+        if recording.split == "fit":
+            refuse_clipped(sound, recording.file.name)
         warn([f"{recording.file.name}: {which}"] if which else [])
     splits = [r.split for r in case.recordings]
     listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))

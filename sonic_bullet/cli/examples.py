@@ -50,6 +50,7 @@ CASE_EPILOG = """\b
 Examples:
   sonic-bullet case new my_case --mesh bar.obj --recordings taps/*.wav --material steel --sensor pressure
   sonic-bullet case new my_taps long_recording.wav --split --hold-out 3
+  sonic-bullet case new my_taps taps/*.wav --force-channel 1 --force-newton 2224
   sonic-bullet case check my_case
   sonic-bullet fit my_case -o preset.json"""
 

@@ -9,9 +9,9 @@ import numpy as np
 from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, write_csv
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.files import read_channel
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.errors import AudioError, FileError
 
 NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
 DECAYS = ("t60_s", "t60_sd_s", "loss_factor", "loss_factor_sd", "q", "q_sd")
@@ -31,22 +31,24 @@ def run_features(
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     picture, json_to, csv_to = places(picture, json_to, csv_to)
-    sound, sr = read_audio(recording)
-    observed, which = channel_of(sound, channel or 0, recording), channel_words(len(sound), channel)
+    observed, sr, which = read_channel(recording, channel)
     warn(f"{recording}: {words}" for words in [which] if words)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.lines.extraction import extract
 
         with status(recording) as progress:
             progress("looking for modes")
-            found = extract(observed, sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
+            try:
+                found = extract(observed, sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
+            except AudioError as error:
+                raise AudioError(f"{recording}: {error.what}", error.remedy) from error
         notes = "; ".join(filter(None, (which, found.note)))
         if picture is not None:
             _draw(picture, observed, sr, found)
         say(_summary(recording, found))
     warn(f"{recording}: {note}" for note in [found.note] if note)
     write_csv(csv_to, feature_rows(found), (*NUMBERS, *DECAYS))
-    write_json(json_to, described(found, notes, doubtful=bool(found.note) or (len(sound) > 1 and channel is None)))
+    write_json(json_to, described(found, notes, doubtful=bool(found.note) or (bool(which) and channel is None)))
 
 
 def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:

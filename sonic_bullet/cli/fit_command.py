@@ -118,10 +118,8 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     thing = CaseObject(
         "object", Path(one["mesh"]), 1.0 if one["scale"] is None else one["scale"], one["material"], fixed=one["fixed"]
     )
-    observed = one["channel"] or 0, None, one["channel"] is not None
-    recording = CaseRecording(
-        path, None, "object", "fit", one["strike"], _unit("direction", one), one["impulse"], *observed
-    )
+    struck = one["strike"], _unit("direction", one), one["impulse"]
+    recording = CaseRecording(path, None, "object", "fit", *struck, one["channel"])
     at = {"object": one["sensor_at"]} if one["sensor_at"] is not None else None
     along = _unit("sensor_direction", one)
     direction = None if along is None else {"object": along}

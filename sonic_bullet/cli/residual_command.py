@@ -11,9 +11,9 @@ import numpy as np
 from sonic_bullet.cli.fit_command import as_case
 from sonic_bullet.cli.line_table import take_tables
 from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
-from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.files import read_channel
 from sonic_bullet.records import Residual
-from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.records.errors import FileError
 
 UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
 
@@ -86,11 +86,8 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
         raise FileError(
             f"cannot read {source}: no such file or folder", "give a recording, or a folder with a case.json"
         )
-    sound, sr = read_audio(source)
-    if not sound.size:
-        raise AudioError(f"{source} is empty", "give a recording of an impact")
-    observed = channel_of(sound, one["channel"] or 0, source)
-    warn(f"{source}: {words}" for words in [channel_words(len(sound), one["channel"])] if words)
+    observed, sr, which = read_channel(source, one["channel"])
+    warn(f"{source}: {words}" for words in [which] if words)
     progress("looking for modes")
     strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
     return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes, ()

@@ -11,16 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.files import read_audio, write_audio
+from sonic_bullet.files import live_channel, read_audio, write_audio
+from sonic_bullet.plots.takes_plot import DrawnRecording, write_takes_picture
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import AudioError
 
 LEAD_S = 0.05
 """Of what precedes a strike, which tells the noise; less where the strike before it is nearer."""
 TAKE_COLUMNS = ("take", "at", "length", "peak", "")
 
 
-def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[str, ...]]]:
+def cut_takes(
+    sounds: Sequence[Path], to: Path, force_channel: int | None = None, picture: Path | None = None
+) -> tuple[list[Path], list[tuple[str, ...]]]:
     """Cut recordings into takes.
 
     Parameters
@@ -29,6 +31,10 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
         Recordings; one that holds a single strike stays as it is.
     to : Path
         Folder for the takes, `NAME-01.wav` and so on, every channel of them.
+    force_channel : int, optional
+        Not listened to.
+    picture : Path, optional
+        .png, .pdf or .svg to draw the recordings to, with where they are cut.
 
     Returns
     -------
@@ -40,16 +46,20 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
     Raises
     ------
     AudioError
-        A recording that is silent.
+        A recording that is silent, too short or not finite.
     """
     made: list[Path] = []
     rows: list[tuple[str, ...]] = []
+    drawn: list[DrawnRecording] = []
     for path in sounds:
         sound, sr = read_audio(path)
-        loudest = sound[int(np.argmax((sound**2).sum(axis=1)))]
+        if force_channel is not None:
+            live_channel(sound, force_channel, path)
+        others = sound if force_channel is None or len(sound) == 1 else np.delete(sound, force_channel, axis=0)
+        live_channel(others, None, path)
+        loudest = others[int(np.argmax(np.ptp(others, axis=1)))]
         bounds = take_bounds(loudest, sr)
-        if not bounds:
-            raise AudioError(f"{path} is silent", "leave it out")
+        drawn += [DrawnRecording(path.name, loudest, sr, bounds)] if picture is not None else []
         for k, (strike, start, stop) in enumerate(bounds, 1):
             piece = path if len(bounds) == 1 else to / f"{path.stem}-{k:02d}.wav"
             if piece is not path:
@@ -58,6 +68,8 @@ def cut_takes(sounds: Sequence[Path], to: Path) -> tuple[list[Path], list[tuple[
             rows.append(
                 (piece.name, f"{strike / sr:.3f} s", f"{(stop - start) / sr:.3f} s", *_level(loudest[start:stop]))
             )
+    if picture is not None:
+        write_takes_picture(picture, drawn)
     return made, rows
 
 
@@ -65,8 +77,6 @@ def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
     """Samples of each strike of a recording (n,), and of the start and the end of its take."""
     from sonic_bullet.estimator.lines.onset import span
 
-    if not np.any(signal):
-        return []
     found = span(signal, sr)
     strikes = np.array([found.start, *found.later])
     lead = round(LEAD_S * sr)

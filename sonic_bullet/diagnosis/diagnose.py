@@ -29,7 +29,7 @@ from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, until_it_breaks_off
-from sonic_bullet.files import channel_of, read_audio
+from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.machine.progress import says_so
@@ -164,8 +164,8 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
         for i, r in enumerate(body.recordings):
             if r.split != split or r.file is None or not r.file.is_file() or not takes:
                 continue
-            sample, sr = read_audio(r.file)
-            sound = until_it_breaks_off(channel_of(sample, r.channel, r.file), sr)
+            sample, sr, _ = read_channel(r.file, r.channel)
+            sound = until_it_breaks_off(sample, sr)
             start = round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr)
             found.append(Take(body, i, sound[start:], sr, takes[0].floor))
     return tuple(found)
@@ -182,7 +182,7 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
         for r in body.recorded.recordings
         if r.file
     ]
-    late = [onset_sample(channel_of(read_audio(file)[0], channel, file), sr) for file, channel in files]
+    late = [onset_sample(read_channel(file, channel)[0], sr) for file, channel in files]
     return int(np.median(late)) if late else 0
 
 

@@ -14,22 +14,22 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import check_levels, check_sr
 from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.models import read_model, write_model
-from sonic_bullet.files.recordings import channel_of, channel_words, read_audio, read_audio_scale
+from sonic_bullet.files.recordings import live_channel, read_audio, read_audio_scale, read_channel
 
 __all__ = [
     "AudioReport",
     "AudioWriter",
     "ContactLog",
     "cannot",
-    "channel_of",
-    "channel_words",
     "check_audio_output",
     "check_levels",
     "check_output",
     "check_sr",
     "kept_name",
+    "live_channel",
     "read_audio",
     "read_audio_scale",
+    "read_channel",
     "read_log",
     "read_model",
     "replacing",

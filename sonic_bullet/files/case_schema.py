@@ -38,7 +38,7 @@ ABOUT: dict[str, tuple[str, dict[str, str]]] = {
             "object": "name of a listed object; may be left out where there is one",
             "split": "`fit`, `holdout` or `transfer`; only `fit` is opened before a verdict stands",
             "strike": "where and how hard",
-            "channel": "of the file, from 0; absent: the first, and a line says so",
+            "channel": "of the file, from 0; absent: the first that is not dead, and a line says so",
         },
     ),
     "Line": (

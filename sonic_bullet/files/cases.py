@@ -132,7 +132,7 @@ class CaseRecording:
     """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where
     not declared.
 
-    channel: counted from 0; channel_named: whether the case says so, else it is the first.
+    channel: counted from 0; None: the first that is not dead.
     """
 
     file: Path | None
@@ -142,9 +142,8 @@ class CaseRecording:
     position_m: Vector | None = None
     direction: Vector | None = None
     impulse_n_s: float | None = None
-    channel: int = 0
+    channel: int | None = None
     force: tuple[Path, int, float | None] | None = None
-    channel_named: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,8 +291,8 @@ def _recording(
     force = strike.force
     kept = (inside(path.parent, force.file), force.channel, force.newton_per_unit) if force is not None else None
     file = inside(path.parent, entry.file) if entry.file is not None else None
-    observed = entry.channel or 0, kept, entry.channel is not None
-    return CaseRecording(file, entry.features, name, entry.split, strike.position, direction, strike.impulse, *observed)
+    struck = strike.position, direction, strike.impulse
+    return CaseRecording(file, entry.features, name, entry.split, *struck, entry.channel, kept)
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -19,13 +19,17 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
-from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.errors import AudioError, FileError
 
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
 # half a gibibyte as float64; or samples a byte of the file, which only packed silence passes
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
 BLOCK_SAMPLES = 1 << 18
+DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
+SHORTEST = 64  # samples: a millisecond at a usual rate
+# a range of full scale 1: below the one nothing is heard, below the other it is the last bits that toggle
+SILENT, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
 UNBROKEN = "give an unbroken audio file"
 T = TypeVar("T")
 
@@ -117,22 +121,70 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
     return samples
 
 
-def channel_of(samples: Array, channel: int, name: object) -> Array:
-    """One channel (n,) of samples (channels, n), counted from 0.
+def read_channel(path: str | os.PathLike[str], channel: int | None = None) -> tuple[Array, int, str]:
+    """Read the channel of a recording that is listened to.
 
-    Raises FileError where the file ``name`` has no such channel.
+    Parameters
+    ----------
+    path : path
+        Of the sound file.
+    channel : int, optional
+        Counted from 0; None: the first that is not dead.
+
+    Returns
+    -------
+    (n,) array
+        Its samples, as of `read_audio`.
+    int
+        The rate in Hz.
+    str
+        Which channel of how many it is; empty where there is but one.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read or has no such channel.
+    AudioError
+        The channel is silent, too short or not finite.
     """
-    if not 0 <= channel < len(samples):
-        known = "1 channel, 0" if len(samples) == 1 else f"{len(samples)} channels, 0 to {len(samples) - 1}"
+    samples, sr = read_audio(path)
+    observed, words = live_channel(samples, channel, path)
+    return observed, sr, words
+
+
+def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Array, str]:
+    """A channel (n,) of samples (channels, n) by its number or, None, the first that is not dead; which it is, in
+    words. Raises FileError, AudioError.
+    """
+    count, frames = samples.shape
+    if channel is not None and not 0 <= channel < count:
+        known = "1 channel, 0" if count == 1 else f"{count} channels, 0 to {count - 1}"
         raise FileError(f"{name} has no channel {channel}", f"it has {known}")
-    one: Array = samples[channel]
-    return one
+    if frames < SHORTEST:
+        raise AudioError(f"{name} holds {frames} samples", "give a recording of an impact, from before it to its decay")
+    level = np.ptp(np.nan_to_num(samples), axis=1)
+    live = level > DEAD * level.max()
+    used = int(np.argmax(live)) if channel is None else channel
+    observed: Array = samples[used]
+    if not np.isfinite(observed).all():
+        raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
+    others = f"{'channel' if live.sum() == 1 else 'channels'} {_listed(np.flatnonzero(live))}"
+    if level[used] < SILENT or (level[used] < QUIET and len(np.unique(observed)) < FEWEST_LEVELS):
+        if live[used] or not live.any():
+            raise AudioError(f"{name} is silent", "record an impact, or leave it out")
+        raise AudioError(f"channel {used} of {name} is silent", f"sound is in {others}")
+    if count == 1:
+        return observed, ""
+    words = f"{count} channels: "
+    if channel is not None:
+        return observed, f"{words}channel {channel} is used, counted from 0" + f", though sound is in {others}" * (
+            not live[used]
+        )
+    if used == 0:
+        return observed, f"{words}the first is used, channel 0"
+    dead = "channel 0 is" if used == 1 else f"channels {_listed(np.arange(used))} are"
+    return observed, f"{words}{dead} dead, channel {used} is used, counted from 0"
 
 
-def channel_words(count: int, channel: int | None) -> str:
-    """Which channel of a file of ``count`` is used, in words; empty where it has but one."""
-    if count < 2:
-        return ""
-    return f"{count} channels: " + (
-        "the first is used, channel 0" if channel is None else f"channel {channel} is used, counted from 0"
-    )
+def _listed(numbers: Array) -> str:
+    return ", ".join(str(k) for k in numbers)

@@ -245,7 +245,12 @@ def test_a_long_recording_is_cut_into_takes(place: Path, capfd: pytest.CaptureFi
         sound[start : start + len(one), 0] += (0.3 + 0.1 * k) * one
     sound += 1e-5 * np.random.default_rng(2).standard_normal(sound.shape)
     soundfile.write("long.wav", sound, sr, subtype="FLOAT")
-    assert run("case", "new", "mine", "long.wav", "--split", "--hold-out", "3") == 0
+    words = ("--split", "--hold-out", "3", "--picture", "takes.svg")
+    assert run("case", "new", "mine", "long.wav", *words) == 0
+    drawn = Path("takes.svg").read_text()
+    assert (
+        all(f"<!-- {text} -->" in drawn for text in ("long.wav", "1", "5", "time in s")) and "<!-- 6 -->" not in drawn
+    )
     said = capfd.readouterr().out
     case = json.loads((place / "mine" / "case.json").read_text())
     files = [r["file"] for r in case["recordings"]]
@@ -265,6 +270,9 @@ def test_what_cannot_be_cut_is_named_and_leaves_nothing(place: Path, capfd: pyte
     assert run("case", "new", "mine", "nothing.wav", "--split") == 2
     assert "nothing.wav is silent" in capfd.readouterr().err
     assert run("case", "new", "mine", "a.wav", "--hold-out", "1") == 2
+    for words in (("--picture", "takes.png"), ("--split", "--picture", "takes.txt")):
+        assert run("case", "new", "mine", "a.wav", *words) == 2
+        assert f"cannot write {words[-1]}" in capfd.readouterr().err
     assert not (place / "mine").exists()
     assert run("case", "new", "mine", "a.wav", "--split") == 0
     assert json.loads((place / "mine" / "case.json").read_text())["recordings"][0]["file"] == "a.wav"

@@ -362,7 +362,7 @@ def test_a_residual_without_a_recording_is_refused_at_once(
 ) -> None:
     """Before a recording is opened, whatever the case holds."""
     monkeypatch.setattr(
-        "sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read")
+        "sonic_bullet.estimator.fit.recorded.read_channel", lambda *_: pytest.fail("a recording was read")
     )
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     lines = [{"object": "box", "features": [{"freq_hz": 1000.0, "decay_per_s": 3.0}]}]
@@ -379,7 +379,7 @@ def test_a_mesh_that_is_not_there_is_said_at_once(
 ) -> None:
     """Also where it is the last object's, or one that a diagnosis is only held against."""
     monkeypatch.setattr(
-        "sonic_bullet.estimator.fit.recorded.read_audio", lambda *_: pytest.fail("a recording was read")
+        "sonic_bullet.estimator.fit.recorded.read_channel", lambda *_: pytest.fail("a recording was read")
     )
     case = json.loads((stereo(folder, tmp_path) / "case.json").read_text())
     case["objects"]["other"] = {**case["objects"]["box"], "mesh": "none.obj"}

@@ -54,7 +54,13 @@ def write_box(path: Path, size_m: tuple[float, float, float]) -> None:
 
 
 def sound(
-    model: ModalModel, decay: Array, points: tuple[int, int], directions: tuple[Array, Array], impulse: float, n: int
+    model: ModalModel,
+    decay: Array,
+    points: tuple[int, int],
+    directions: tuple[Array, Array],
+    impulse: float,
+    n: int,
+    sr: int = SR,
 ) -> Array:
     """gain 1 · J (φ(p)·e)(φ(q)·n) e^{−dt}(cos ωt − (d/ω) sin ωt)."""
     psi = (
@@ -62,7 +68,7 @@ def sound(
         * (directions[1] @ model.shape[points[1]].astype(float))
         * impulse
     )
-    t = np.arange(n) / SR
+    t = np.arange(n) / sr
     omega = 2 * np.pi * model.freq_hz
     made = np.zeros(n)
     for a, w, d in zip(psi, omega, decay, strict=True):

@@ -49,8 +49,7 @@ def finished(
     _elastic(covariance, information, unsaid, bool(objects))
     if np.isfinite(gain[0]):
         covariance[3, 3] = (gain[1] / gain[0]) ** 2
-        unsaid_gain = [e for e in evidence if e.seen is not None and not e.seen.level.all()]
-        if unsaid_gain:
+        if not any(e.seen is not None and (e.seen.level & e.seen.known).any() for e in evidence):
             unsaid.append("sigma (no impulse declared: it stands for gain times impulse)")
     else:
         unsaid.append("sigma (no strike of known place)")

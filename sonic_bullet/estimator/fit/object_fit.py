@@ -79,11 +79,15 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
     ψ, the shapes' own error.
     """
     observed, turned, predicted, loose = [], [], [], []
+    # a strike without an impulse counts as 1 N·s: it tells no gain beside those that have one
+    levelled = any(
+        o.evidence.seen is not None and (o.evidence.seen.level & o.evidence.seen.known).any() for o in objects
+    )
     for o in objects:
         e, mode = o.evidence, np.flatnonzero(o.line >= 0)
         line = o.line[mode]
         use = (
-            e.seen.known & np.isfinite(e.lines.amplitude[:, line]).all(axis=1)
+            e.seen.known & (e.seen.level | (not levelled)) & np.isfinite(e.lines.amplitude[:, line]).all(axis=1)
             if e.seen is not None
             else np.zeros(1, bool)
         )

@@ -16,8 +16,9 @@ from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
 from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
-from sonic_bullet.estimator.lines.onset import span, until_next_hit
-from sonic_bullet.files import channel_of, channel_words, read_audio
+from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
+from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
+from sonic_bullet.files import read_channel
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
@@ -122,11 +123,11 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks = sounds
+            signals, sr, remarks, hum = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
-            still = without_hum(signals, noise_rms(signals, sr), sr)
+            still = without_hum(signals - hum, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             notes = (*(f"{g} is missing" for g in gone), *remarks)
             found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
@@ -199,30 +200,35 @@ def observed(
 
 
 def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]) -> tuple[list[Array], int]:
-    """Each take (n,) of an object from its onset to its own end, and their rate. Raises FileError, AudioError."""
+    """Each take (n,) of an object from its onset to its own end, less its hum, and their rate.
+
+    Raises FileError, AudioError.
+    """
     found = [_sounds(case, thing, (r,), True) for r in recordings]
-    return [signals[0] for signals, _, _ in found], found[0][1]
+    return [signals[0] - hum[0] for signals, _, _, hum in found], found[0][1]
 
 
 def _sounds(
     case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool
-) -> tuple[Array, int, list[str]]:
-    """Signals (s, n) of an object's strikes, each from its onset, their rate, and what is odd about them.
+) -> tuple[Array, int, list[str], Array]:
+    """Signals (s, n) of an object's strikes, each from its onset, their rate, what is odd about them, and the hum
+    (s, n) that stands in each.
 
     Raises FileError, AudioError.
     """
-    sounds, limited, rates, remarks = [], [], [], []
+    sounds, limited, rates, remarks, hums = [], [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
-        sound, sr = read_audio(r.file or "")
-        sounds.append(until_it_breaks_off(_checked(channel_of(sound, r.channel, r.file), str(r.file), clipped), sr))
-        if len(sounds[-1]) < sound.shape[1]:
+        sound, sr, which = read_channel(r.file or "", r.channel)
+        if not clipped:
+            refuse_clipped(sound, r.file)
+        sounds.append(until_it_breaks_off(sound, sr))
+        if len(sounds[-1]) < len(sound):
             remarks.append(
                 f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no "
                 "decay, and is left out"
             )
         rates.append(sr)
-        several.setdefault(channel_words(len(sound), r.channel if r.channel_named else None), []).append(str(r.file))
         limited.append(sounds[-1])
         if case.band_hz[0] > LOWEST_HZ:
             limited[-1] = limit_band(sounds[-1], sr, case.band_hz)
@@ -234,10 +240,14 @@ def _sounds(
             remarks.append(f"{r.file} holds {one.describe_hits(sr)}{used}")
             if known is None:
                 sounds[-1], limited[-1] = sounds[-1][: one.stop], limited[-1][: one.stop]
+        hum, hum_hz = find_standing_hum(limited[-1], sr, one.start)
+        hums.append(hum)
+        limited[-1] = limited[-1] - hum
+        doubts, _ = describe_doubts(limited[-1][one.start :], sr)
+        for words in filter(None, (which, describe_hum(hum_hz), *doubts)):
+            several.setdefault(words, []).append(str(r.file))
     remarks += [
-        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}"
-        for words, names in several.items()
-        if words
+        f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items()
     ]
     if len(set(rates)) > 1:
         raise AudioError(f"recordings of {thing.name} have rates {sorted(set(rates))} Hz", "give files of one rate")
@@ -252,25 +262,23 @@ def _sounds(
         )
     if length < SHORTER * np.median(lengths):
         remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
-    return np.stack([sound[start : start + length] for sound, start in zip(sounds, starts, strict=True)]), sr, remarks
+    signals, steady = (
+        np.stack([x[start : start + length] for x, start in zip(each, starts, strict=True)]) for each in (sounds, hums)
+    )
+    return signals, sr, remarks, steady
 
 
-def _checked(sound: Array, name: str, clipped: bool = False) -> Array:
-    """A channel that can be fitted: finite, not silent, not clipped. Raises AudioError."""
-    if not np.isfinite(sound).all():
-        raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
-    peak = float(np.abs(sound).max(initial=0))
-    if not peak > 1e-7:
-        raise AudioError(f"{name} is silent", "leave it out")
+def refuse_clipped(sound: Array, name: object) -> None:
+    """Raise AudioError where a channel stands at its peak."""
+    peak = float(np.abs(sound).max())
     runs = np.convolve(np.abs(sound) >= 0.9999 * peak, np.ones(CLIPPED), "valid")
     rows = np.convolve(np.abs(sound) >= (1 - 1e-6) * peak, np.ones(3), "valid") > 2.5
     flat = int((np.diff(rows.astype(np.int8), prepend=0) > 0).sum())
-    if not clipped and ((len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS):
+    if (len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS:
         raise AudioError(
             f"{name} is clipped: rows of samples stand at its peak",
-            "record at a lower level; a fit of it would be of the limiter",
+            "leave it out, or record at a lower level; a fit of it would be of the limiter",
         )
-    return sound
 
 
 def until_it_breaks_off(sound: Array, sr: int) -> Array:

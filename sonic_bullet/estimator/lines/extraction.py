@@ -27,6 +27,7 @@ from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
+from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -46,8 +47,6 @@ FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
 # shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
 EXPLAINED, TRUSTED = 0.8, 0.5
 FRONT, FRONT_SHARE = 0.3, 0.75
-SWELLS = 3.0  # times its first 50 ms: two modes that start against one another do not come to that
-SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
@@ -81,6 +80,8 @@ def extract(
     part = (
         onset.span(limited, sr) if onset_s is None else onset.until_next_hit(limited, sr, max(0, round(onset_s * sr)))
     )
+    hum, hum_hz = find_standing_hum(limited, sr, part.start)
+    signal, limited = signal - hum, limited - hum
     quiet = limited[: part.start]
     steady_above = len(quiet) > 0 and _rms(signal[: part.start] - quiet) > _rms(quiet)
     if steady_above:
@@ -88,7 +89,12 @@ def extract(
     x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
-    notes, hopeless = _doubts(x, part.describe_hits(sr), clipped, sr)
+    doubts, hopeless = onset.describe_doubts(x, sr)
+    hits = part.describe_hits(sr)
+    notes = [f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used"] if hits else []
+    if clipped:
+        notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
+    notes += [*filter(None, [describe_hum(hum_hz)]), *doubts]
     modes, noise = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
@@ -109,30 +115,6 @@ def extract(
         modes = _moved(x, modes, noise, (low, high), start - part.start)
     banded = limited[start : start + len(x)]
     return _features(x, banded, modes, noise, (low, high), start, notes, whole=band_hz is None)
-
-
-def _doubts(x: Array, hits: str, clipped: int, sr: int) -> tuple[list[str], bool]:
-    """What can be said against a recording before any mode is looked for, and whether that is enough not to look."""
-    notes, hopeless = [], False
-    if hits:
-        notes.append(f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used")
-    if clipped:
-        notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
-    if len(x) < SHORT_S * sr:
-        notes.append(
-            f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz "
-            "may pass for one line"
-        )
-    if sr < LOW_RATE:
-        notes.append(f"{sr} samples a second: nothing above {0.49 * sr:.0f} Hz is seen")
-    if len(x) > GROWS_S * sr:
-        level = np.sqrt((x[: len(x) // (sr // 20) * (sr // 20)].reshape(-1, sr // 20) ** 2).mean(axis=1))
-        if level[3:].max() > 1.5 * level[0]:
-            notes.append(
-                f"the sound grows until {np.argmax(level) / 20:.2g} s after its onset: one impact alone does not"
-            )
-            hopeless = bool(level[3:].max() > SWELLS * level[0])
-    return notes, hopeless
 
 
 def _rms(signal: Array) -> float:

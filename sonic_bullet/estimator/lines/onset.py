@@ -22,6 +22,10 @@ HUM, STEADY = 0.5, 1.2  # power before a strike over that after it; of its first
 CLIPPED_RUN = 3
 SHOWN = 6  # hits whose times are said
 REACH = 64  # samples that the first guess may be off
+SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
+# times its first 50 ms: beyond the one it is said; beyond the other, to which two modes that start against one another
+# do not come, no mode is looked for
+GROWS, SWELLS = 1.5, 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,3 +119,23 @@ def clipped_samples(signal: Array) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], top, [False]]).astype(np.int8)))
     run = edges[1::2] - edges[::2]
     return int(run[run >= CLIPPED_RUN].sum())
+
+
+def describe_doubts(x: Array, sr: int) -> tuple[list[str], bool]:
+    """Say what speaks against a recording (n,) from its onset on; whether that is enough not to look for modes."""
+    notes, hopeless = [], False
+    if len(x) < SHORT_S * sr:
+        notes.append(
+            f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz "
+            "may pass for one line"
+        )
+    if sr < LOW_RATE:
+        notes.append(f"{sr} samples a second: nothing above {0.49 * sr:.0f} Hz is seen")
+    if len(x) > GROWS_S * sr:
+        level = np.sqrt((x[: len(x) // (sr // 20) * (sr // 20)].reshape(-1, sr // 20) ** 2).mean(axis=1))
+        if level[3:].max() > GROWS * level[0]:
+            notes.append(
+                f"the sound grows until {np.argmax(level) / 20:.2g} s after its onset: one impact alone does not"
+            )
+            hopeless = bool(level[3:].max() > SWELLS * level[0])
+    return notes, hopeless
