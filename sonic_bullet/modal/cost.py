@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.modal.sectors import Wanted
 
-MOST_WORK = 25e6
+MOST_WORK = 30e6
 START = 75.0
 FULL = {(2, True): 900.0, (3, True): 590.0, (2, False): 300.0, (3, False): 200.0}
 """By degree, and of thin bodies or lumps, whose factor is fuller."""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.modal import cost, eigen, fem, lagrange
-from sonic_bullet.modal.meshing.filling import LATTICE, Way
+from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
@@ -39,7 +39,7 @@ MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 15 s of processor and 1.2 GB at most. An edge_m allows more."""
 LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
 TRIES = 2
-WITH_LESS: tuple[Way, ...] = ("simple", "lattice")  # what is tried where a surface has too much detail
+WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # what is tried where a surface has too much detail
 OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
@@ -61,7 +61,7 @@ class Elements:
     degree: int
     thin: bool
     edge_m: float
-    at_size: Callable[[float, Way], Filled] | None
+    at_size: Callable[[float, Filler], Filled] | None
     modes: int = MOST_MODES
     spare: float = cost.MOST_WORK
     simple: bool = False
@@ -199,13 +199,13 @@ class Elements:
             return cost.most_unknowns(self.spare, self.modes, degree, self.thin, coarse(self.thin))
 
         made = self.within(most(3))
-        for way in WITH_LESS:  # its surface has so much detail
+        for filler in WITH_LESS:  # its surface has so much detail
             if made._unknowns <= most(3) or made._lattice or self.at_size is None:
                 break
-            if way == "simple" and self.simple:
+            if filler == "simple" and self.simple:
                 continue
             with suppress(MeshError):
-                other = replace(self, body=self.at_size(self.edge_m, way), simple=way == "simple").within(most(3))
+                other = replace(self, body=self.at_size(self.edge_m, filler), simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
         if made._unknowns > min(LIMIT, most(3)):
             made = replace(made, degree=2)
@@ -283,8 +283,8 @@ class Elements:
 
     def _of_size(self, edge_m: float, *, fallback: bool = True) -> Elements:
         assert self.at_size is not None
-        way: Way = "lattice" if self._lattice else "simple" if self.simple else "any" if fallback else "netgen"
-        return replace(self, body=self.at_size(edge_m, way), edge_m=edge_m, coarser=None, known={})
+        filler: Filler = "lattice" if self._lattice else "simple" if self.simple else "any" if fallback else "netgen"
+        return replace(self, body=self.at_size(edge_m, filler), edge_m=edge_m, coarser=None, known={})
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""

@@ -17,7 +17,7 @@ from sonic_bullet.modal import cost, lagrange, polynomials
 from sonic_bullet.modal.elements import LIMIT, MOST_UNKNOWNS, UNKNOWNS_PER_TET, Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.meshing.filling import WHOLE_FACES, Way
+from sonic_bullet.modal.meshing.filling import Filler, has_detail
 from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.surfaces import prepared
@@ -48,10 +48,10 @@ def filled(
     """
     given, thickness_m = sizes
 
-    def at_size(edge_m: float, way: Way) -> Filled:
+    def at_size(edge_m: float, filler: Filler) -> Filled:
         cache, name = kept
-        name = key("solid", name, edge_m, way if way == "simple" else way == "lattice")
-        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, way=way)
+        name = key("solid", name, edge_m, filler if filler == "simple" else filler == "lattice")
+        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, filler=filler)
 
     # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
     first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
@@ -98,4 +98,4 @@ def _first(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
             f"{most} unknowns: larger ones are used, unless edge_m gives their size"
         )
-    return wall * length_m, max(edge, least) * length_m, modes, len(skin.face) > WHOLE_FACES
+    return wall * length_m, max(edge, least) * length_m, modes, has_detail(skin)

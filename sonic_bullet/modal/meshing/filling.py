@@ -2,7 +2,7 @@
 
 a box or an extruded outline  -> by rule (prisms.py): thin plates need flat elements
 any other closed surface      -> Netgen (tetrahedra.py), the middles of its edges put on the surface (on_surface.py)
-what Netgen refuses           -> simplified below an element (Manifold), and again
+what Netgen refuses, lumps of many triangles -> simplified below an element (Manifold), and again
 one that is not closed, or that Netgen still refuses: it passes through itself   -> a lattice (stuffing.py)
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing import named_shapes, prisms
 from sonic_bullet.modal.meshing.on_surface import fitted
-from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, curved_sizes, dof_budget, edge_within_m
+from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, chunkiness, curved_sizes, dof_budget, edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
 from sonic_bullet.modal.meshing.surfaces import Skin
@@ -24,7 +24,7 @@ from sonic_bullet.modal.meshing.tetrahedra import EndlessError, TooLargeError, t
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-Way = Literal["any", "netgen", "simple", "lattice"]
+Filler = Literal["any", "netgen", "simple", "lattice"]
 """How what no rule fits is filled: by Netgen or what stands for it, by Netgen or not at all, its detail left out, by
 a lattice of this edge or not at all."""
 LATTICE = "lattice"  # how the note of a solid filled by one begins
@@ -39,7 +39,7 @@ FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch whe
 SIMPLER, SLIVER = 0.05, 0.01
 """Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
 slivers of unions, on which it takes ten times as long."""
-WHOLE_FACES = 4000  # a surface of more is simplified first: Netgen takes a second for 400
+WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes a second for 400
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
 LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
@@ -66,10 +66,8 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, way: Way = "any") -> Solid:
-    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. way: the lattice where Netgen has
-    refused the surface before. Raises MeshError.
-    """
+def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, filler: Filler = "any") -> Solid:
+    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. Raises MeshError."""
     made = by_rule(skin, edge_m)
     if made is not None:
         return made
@@ -77,14 +75,14 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, way:
     volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
     tets = dof_budget(thickness, diagonal) / DOF_PER_TET
     edge = edge_m or edge_within_m(volume, thickness, tets)
-    if way == "lattice":
+    if filler == "lattice":
         return _of_lattice(skin, edge, edge, say, "as before")
     of_lattice = edge_m or min((LATTICE_VOLUME * volume / tets) ** (1 / 3), LATTICE_WALL * thickness)
     finest = LATTICE_LEAST * thickness
     if not geometry.is_closed(skin.face):
         return _of_lattice(skin, of_lattice, finest, say, "its surface is open")
     whole, simple = skin, simplified(skin, SIMPLER * edge)
-    detailed = way == "simple" or len(whole.face) > WHOLE_FACES or _slivers(whole, edge)
+    detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
     attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
     for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
@@ -98,7 +96,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, way:
         except MeshError as error:
             refused = error
     assert refused is not None
-    if way != "any":
+    if filler != "any":
         raise refused
     return _of_lattice(skin, of_lattice, finest, say, refused.what)
 
@@ -114,6 +112,11 @@ def simplified(skin: Skin, tolerance_m: float) -> Skin:
         return skin
     corner, triangle = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts).astype(np.int64)
     return Skin(corner, triangle, skin.thickness_m, skin.note)
+
+
+def has_detail(skin: Skin) -> bool:
+    """Whether a surface is simplified before anything else is tried."""
+    return len(skin.face) > WHOLE_FACES and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
 
 
 def thick_enough_m(skin: Skin) -> float:
