@@ -181,6 +181,10 @@ def _shown(value: float | None) -> str:
     return "-" if value is None or not np.isfinite(value) else f"{value:.1f}"
 
 
+def _number(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
 def _ends(said: Said) -> str:
     """The effects that are named, or the verdict, or that the command was refused."""
     judged = said["diagnose"]
@@ -216,6 +220,10 @@ def words(thing: Object, said: Said) -> str:
     lines = [
         *(f"{name} refused: {said[name]['error']}" for name in COMMANDS if "error" in said[name]),
         *(f"{name}: {said[name]['verdict']}" for name in COMMANDS if said[name].get("verdict")),
+        *(
+            f"effect: {e['id']}, {', '.join(f'{k} {_number(v)}' for k, v in e.get('parameters', {}).items())}"
+            for e in said["diagnose"].get("effects", [])
+        ),
         *([f"left: {left}"] if left else []),
         *(f"warned: {one.split('/')[-1]}" for one in said["diagnose"].get("warnings", [])),
     ]

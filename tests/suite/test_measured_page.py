@@ -23,7 +23,7 @@ MUG = {
     "residual": {"takes": [_take("holdout", 5.0), _take("holdout", 7.0, 24.0, 6.0)]},
     "diagnose": {
         "verdict": "explained",
-        "effects": [{"id": "damping-law"}],
+        "effects": [{"id": "damping-law", "parameters": {"law": "constant", "eta": 0.012345}}],
         "errors": {"before": {"holdout": 9.0}, "after": {"holdout": 6.5}, "floor": 1.0},
         "unexplained": {"words": "most of it in the first third"},
         "warnings": ["case/take2.wav: it clips"],
@@ -64,6 +64,7 @@ def test_the_summary_counts_ratios_silence_and_what_effects_gain() -> None:
     assert "3.60 times" in text and "It is nearer than silence in 2 of 3 takes" in text
     assert "names effects for 1 of 2 objects with takes held out; the error on these falls for 1" in text
     assert "0.0 dB farther" not in text and "-2.5 dB farther" in text
+    assert "effect: damping-law, law constant, eta 0.0123" in text
     assert "left: most of it in the first third warned: take2.wav: it clips" in text
     assert text.index("| mug |") < text.index("## No take held out") < text.index("| bell |")
 
