@@ -11,31 +11,23 @@ two sizes tell is taken off [Richardson 1911]:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet import geometry
-from sonic_bullet.files import cache as store
-from sonic_bullet.modal import eigen, fem, lagrange, polynomials
-from sonic_bullet.modal.kept_solids import kept_or_filled
-from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.meshing.filling import LATTICE
-from sonic_bullet.modal.meshing.named_shapes import soup
-from sonic_bullet.modal.meshing.sizes import edge_within_m
+from sonic_bullet.modal import cost, eigen, fem, lagrange
+from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
-from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
-from sonic_bullet.records import Array, Shape
+from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
-PER_WAVE = 0.2
-"""First edge over the shortest wave."""
 ORDERS = {2: (2.0, 3.0, 4.0), 3: (2.0, 2.5, 3.5)}
 """Of frequencies in h, by degree: least, middle and most. Smooth lumps have 4 [Strang & Fix 1973, ch. 6.3]; less is
 measured where walls are an element thick, and along creases, where stress is singular."""
@@ -47,10 +39,9 @@ MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 15 s of processor and 1.2 GB at most. An edge_m allows more."""
 LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
 TRIES = 2
+WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # what is tried where a surface has too much detail
 OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
-WIDE = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
-LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
 
 
@@ -59,9 +50,9 @@ class Elements:
     """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field.
     thin: elements are wider than the wall: one layer of them.
 
-    at_size: the body filled anew by an edge, by the lattice or not, by Netgen or not at all; None where the user gave
-    the edge. coarser: the
-    size before. known: λ (m,) found, by tensor.
+    at_size: the body filled anew by an edge, and how; None where the user gave the edge. modes: about how many are
+    wanted, and spare: the work (cost.py) left for them. simple: its detail left out. coarser: the size before. known:
+    λ (m,) found, by tensor.
     """
 
     body: Filled
@@ -70,7 +61,10 @@ class Elements:
     degree: int
     thin: bool
     edge_m: float
-    at_size: Callable[[float, bool, bool], Filled] | None
+    at_size: Callable[[float, Filler], Filled] | None
+    modes: int = MOST_MODES
+    spare: float = cost.MOST_WORK
+    simple: bool = False
     coarser: Elements | None = None
     known: dict[bytes, Array] = field(default_factory=dict)
 
@@ -182,28 +176,66 @@ class Elements:
         left = sectors[0].place[2]
         return float(np.abs(left[max(0, top[1] + 1 - TOGETHER) : top[1] + 1]).mean())
 
-    def within(self, unknowns: float) -> Elements:
-        """The same with larger elements where there are by far more unknowns."""
-        made = self
+    def within(self, most: float) -> Elements:
+        """The same with larger elements where there are by far more unknowns than ``MOST_UNKNOWNS``, or more than
+        ``most``, which is what its work allows.
+        """
+        made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
         for _ in range(TRIES):
-            if made._unknowns < OVER * unknowns:
+            if made._unknowns < min(OVER * MOST_UNKNOWNS[self.thin], most):
                 break
-            made = made._of_size(made.edge_m * (made._unknowns / unknowns) ** (1 / made._growth))
+            try:
+                made = made._of_size(made.edge_m * (made._unknowns / aim) ** (1 / made._growth), fallback=False)
+            except MeshError:
+                break
+        return made
+
+    def bounded(self) -> Elements:
+        """The same with no more unknowns than its work allows: larger elements, less detail, a lattice, or degree 2.
+        Raises MeshError where none of it is enough.
+        """
+
+        def most(degree: int) -> float:
+            return cost.most_unknowns(self.spare, self.modes, degree, self.thin, coarse(self.thin))
+
+        made = self.within(most(3))
+        for filler in WITH_LESS:  # its surface has so much detail
+            if made._unknowns <= most(3) or made._lattice or self.at_size is None:
+                break
+            if filler == "simple" and self.simple:
+                continue
+            with suppress(MeshError):
+                other = replace(self, body=self.at_size(self.edge_m, filler), simple=filler == "simple").within(most(3))
+                made = min(made, other, key=lambda one: one._unknowns)
+        if made._unknowns > min(LIMIT, most(3)):
+            made = replace(made, degree=2)
+        if made._unknowns > most(2):
+            raise MeshError(
+                f"its surface has so much detail that it needs {made._unknowns:.2g} unknowns, more than {most(2):.2g}",
+                "give a simpler mesh, or edge_m, which may cost more",
+            )
         return made
 
     def finer(self) -> Elements | None:
-        """The same with edges `FINER` as long, or as `MOST_UNKNOWNS` allows; None where that is too much alike, or
-        where a clamp would hold other nodes.
+        """The same with edges `FINER` as long, or as `MOST_UNKNOWNS` and the work left allow; None where that is too
+        much alike, or where a clamp would hold other nodes.
         """
-        most = MOST_UNKNOWNS[self.thin]
-        least = (self._unknowns / most) ** (1 / self._growth)
         if self.at_size is None or len(self.clamp):
             return None
+        modes = max([len(value) for value in self.known.values()], default=self.modes)
+        known = cost.work(self._unknowns, modes, self.degree, self.thin)
+        spare = self.spare - known
+        if self.known and self.coarser is None:
+            spare -= cost.work(coarse(self.thin) * self._unknowns, modes, self.degree, self.thin)
+        most = cost.most_unknowns(spare, modes, self.degree, self.thin)
+        least = (self._unknowns / min(MOST_UNKNOWNS[self.thin], most)) ** (1 / self._growth)
         if least * ALIKE <= 1:
             made = self._of_size(self.edge_m * max(FINER, least)).within(most)
-            if made._unknowns <= OVER * most and made._smaller_than(self) >= ALIKE:
-                return replace(made, coarser=self)
-        return replace(self, degree=2, coarser=None, known={}).finer() if self.degree == 3 else None
+            if made._unknowns <= min(OVER * MOST_UNKNOWNS[self.thin], most) and made._smaller_than(self) >= ALIKE:
+                return replace(made, coarser=self, spare=spare)
+        if self.degree == 2:
+            return None
+        return replace(self, degree=2, coarser=None, known={}, modes=modes, spare=spare).finer()
 
     def _smaller_than(self, other: Elements) -> float:
         """How many times smaller its elements are."""
@@ -217,11 +249,11 @@ class Elements:
         for _ in range(LARGER):
             if self.coarser is None and self.at_size is None:
                 break
-            try:  # what only tells the error of Netgen's elements is not filled by what stands for Netgen
-                made = self.coarser or self._of_size(self.edge_m * times, netgen=not self._lattice)
+            try:
+                made = self.coarser or self._of_size(self.edge_m * times, fallback=False)
             except MeshError:
                 break
-            if made._lattice != self._lattice:
+            if made._lattice != self._lattice:  # kept from when any way would do
                 break
             larger = self._smaller_than(made)
             if larger > ALIKE:
@@ -249,9 +281,10 @@ class Elements:
     def _unknowns(self) -> float:
         return UNKNOWNS_PER_TET[self.degree] * len(self.body.solid.tet)
 
-    def _of_size(self, edge_m: float, *, netgen: bool = False) -> Elements:
+    def _of_size(self, edge_m: float, *, fallback: bool = True) -> Elements:
         assert self.at_size is not None
-        return replace(self, body=self.at_size(edge_m, self._lattice, netgen), edge_m=edge_m, coarser=None, known={})
+        filler: Filler = "lattice" if self._lattice else "simple" if self.simple else "any" if fallback else "netgen"
+        return replace(self, body=self.at_size(edge_m, filler), edge_m=edge_m, coarser=None, known={})
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""
@@ -261,69 +294,11 @@ class Elements:
         return f"{self.body.solid.note}; degree {self.degree}, {len(free)} unknowns{clamped}"
 
 
+def coarse(thin: bool) -> float:
+    """About what fraction of its unknowns a coarser body has."""
+    return float(FINER ** (2 if thin else 3))
+
+
 def _as_long(values: Array, count: int) -> Array:
     """values (m,), cut or the last repeated."""
     return np.asarray(values[np.minimum(np.arange(count), len(values) - 1)]) if len(values) else np.zeros(count)
-
-
-def filled(
-    shapes: tuple[Shape, ...],
-    length_m: float,
-    tensor: Array,
-    wanted: Wanted,
-    clamp: Array,
-    sizes: tuple[float | None, float | None],
-    kept: tuple[store.Place, str],
-    say: Callable[[str], None],
-) -> Elements:
-    """The method of any body, clamped where clamp (k, 4) reaches, its first size from what is wanted of a material of
-    stiffness (6, 6). sizes: edge_m, None for that, and thickness_m. Raises MeshError, ModalError.
-    """
-    given, thickness_m = sizes
-
-    def at_size(edge_m: float, lattice: bool, netgen: bool) -> Filled:
-        cache, name = kept
-        name = key("solid", name, edge_m, lattice)
-        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, lattice=lattice, netgen=netgen)
-
-    # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
-    first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
-    wall_m, edge_m = _first(shapes, thickness_m, length_m, tensor, first, say)
-    edge = given or edge_m
-    thin = edge > wall_m
-    degree = 2 if given and given < WIDE * wall_m else 3
-    made = Elements(at_size(edge, False, False), length_m, clamp, degree, thin, edge, None if given else at_size)
-    if given is None:
-        made = made.within(MOST_UNKNOWNS[thin])
-    if made.degree == 3 and made._unknowns > LIMIT:  # the surface's detail, or a lattice's, wants so many elements
-        made = replace(made, degree=2)
-    made.held(lagrange.field(made.solid, 2))
-    return made
-
-
-def _first(
-    shapes: tuple[Shape, ...],
-    thickness_m: float | None,
-    length_m: float,
-    tensor: Array,
-    wanted: Wanted,
-    say: Callable[[str], None],
-) -> tuple[float, float]:
-    """The wall and the edge to begin with, in m: for the shortest wave of a plate as thick as the body is, at the
-    highest λ wanted or the wave of as many modes as are wanted, and no more unknowns than may be.
-    """
-    skin = prepared(*soup(shapes), thickness_m)
-    area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
-    wall = skin.thickness_m / length_m
-    flat = np.sqrt(4 * np.pi * (wanted.most + 8) / (area / 2))
-    bulk = (3 * np.pi**2 * (wanted.most + 8) / (area * wall / 2)) ** (1 / 3)  # two shear waves fill a lump
-    wave = 2 * np.pi / min(float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor)), max(flat, bulk))
-    edge = min(PER_WAVE * wave, LARGEST)
-    most = MOST_UNKNOWNS[edge > wall]
-    least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_PER_TET[3])
-    if edge < least:
-        say(
-            f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
-            f"{most} unknowns: larger ones are used, unless edge_m gives their size"
-        )
-    return wall * length_m, max(edge, least) * length_m

@@ -12,6 +12,7 @@ from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.records import Shape
 
 if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.filling import Filler
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 SOLID = {
@@ -30,8 +31,7 @@ def kept_or_filled(
     kept: tuple[store.Place, str],
     say: Callable[[str], None],
     *,
-    lattice: bool,
-    netgen: bool,
+    filler: Filler,
 ) -> Filled:
     """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m. Raises MeshError."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
@@ -43,7 +43,7 @@ def kept_or_filled(
         return Filled(
             Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
         )
-    body = fill(shapes, *sizes, say, lattice=lattice, netgen=netgen)
+    body = fill(shapes, *sizes, say, filler=filler)
     solid, skin = body.solid, body.skin
     arrays = {
         "node": solid.node_m,

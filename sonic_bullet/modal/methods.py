@@ -2,7 +2,7 @@
 
 a free box, its material's axes its own  -> polynomials (polynomials.py)
 a free isotropic body of revolution      -> a Fourier series around its axis (revolution/)
-everything else                          -> tetrahedra (elements.py)
+everything else                          -> tetrahedra (first_elements.py, elements.py)
 
 and one way from there to modes as accurate as asked (`converged`).
 """
@@ -36,7 +36,7 @@ def chosen(
     kept: cache and name of the body filled with elements. Raises MeshError.
     """
     from sonic_bullet.modal import polynomials
-    from sonic_bullet.modal.elements import filled
+    from sonic_bullet.modal.first_elements import filled
     from sonic_bullet.modal.meshing.shape_meshes import check_fillable
     from sonic_bullet.modal.revolution import fourier
 

@@ -230,6 +230,8 @@ def _solve(
             note += (
                 f", more than the {100 * asked.accuracy:g} % asked for: finer elements need more unknowns than allowed"
             )
+    elif found.method.meshed and len(found.value):
+        note += "; error not known: no coarser elements tell it"
     return _Unit(
         found.value,
         np.ascontiguousarray(shown.shape[:, :, found.order]),

@@ -2,27 +2,31 @@
 
 a box or an extruded outline  -> by rule (prisms.py): thin plates need flat elements
 any other closed surface      -> Netgen (tetrahedra.py), the middles of its edges put on the surface (on_surface.py)
-what Netgen refuses           -> simplified below an element (Manifold), and again
+what Netgen refuses, lumps of many triangles -> simplified below an element (Manifold), and again
 one that is not closed, or that Netgen still refuses: it passes through itself   -> a lattice (stuffing.py)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing import named_shapes, prisms
 from sonic_bullet.modal.meshing.on_surface import fitted
-from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, curved_sizes, dof_budget, edge_within_m
+from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, chunkiness, curved_sizes, dof_budget, edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
 from sonic_bullet.modal.meshing.surfaces import Skin
-from sonic_bullet.modal.meshing.tetrahedra import EndlessError, tetrahedra
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError, TooLargeError, tetrahedra
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
+Filler = Literal["any", "netgen", "simple", "lattice"]
+"""How what no rule fits is filled: by Netgen or what stands for it, by Netgen or not at all, its detail left out, by
+a lattice of this edge or not at all."""
 LATTICE = "lattice"  # how the note of a solid filled by one begins
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
@@ -35,9 +39,17 @@ FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch whe
 SIMPLER, SLIVER = 0.05, 0.01
 """Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
 slivers of unions, on which it takes ten times as long."""
+WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes a second for 400
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
 LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
+LATTICE_TETS, LATTICE_MORE = 8000, 1.25
+"""What a lattice may have, or as many as are asked for; how many more there are than its volume tells."""
+WALL_TETS = 20.0  # a wall as wide as an edge and a bit: elements in a square of its width
+
+
+class TooThinError(MeshError):
+    """Walls so thin that elements for them are more than allowed."""
 
 
 def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
@@ -54,12 +66,8 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(
-    skin: Skin, edge_m: float | None, say: Callable[[str], None], *, lattice: bool = False, netgen: bool = False
-) -> Solid:
-    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. lattice: Netgen has refused it
-    before. netgen: nothing stands for it where it refuses. Raises MeshError.
-    """
+def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, filler: Filler = "any") -> Solid:
+    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. Raises MeshError."""
     made = by_rule(skin, edge_m)
     if made is not None:
         return made
@@ -67,23 +75,30 @@ def filled(
     volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
     tets = dof_budget(thickness, diagonal) / DOF_PER_TET
     edge = edge_m or edge_within_m(volume, thickness, tets)
-    if lattice or not geometry.is_closed(skin.face):
-        return _of_lattice(skin, edge_m, volume, tets, say, "as before" if lattice else "its surface is open")
+    if filler == "lattice":
+        return _of_lattice(skin, edge, edge, say, "as before")
+    of_lattice = edge_m or min((LATTICE_VOLUME * volume / tets) ** (1 / 3), LATTICE_WALL * thickness)
+    finest = LATTICE_LEAST * thickness
+    if not geometry.is_closed(skin.face):
+        return _of_lattice(skin, of_lattice, finest, say, "its surface is open")
     whole, simple = skin, simplified(skin, SIMPLER * edge)
-    attempts = [(whole, edge)] if not _slivers(whole, edge) else []
+    detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
+    attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
     for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
         try:
             return _by_netgen(skin, tried, size, say)
-        except EndlessError as error:
+        except EndlessError:
+            raise
+        except TooLargeError as error:
             refused = error
             break
         except MeshError as error:
             refused = error
     assert refused is not None
-    if netgen:
+    if filler != "any":
         raise refused
-    return _of_lattice(skin, edge_m, volume, tets, say, refused.what)
+    return _of_lattice(skin, of_lattice, finest, say, refused.what)
 
 
 def simplified(skin: Skin, tolerance_m: float) -> Skin:
@@ -97,6 +112,16 @@ def simplified(skin: Skin, tolerance_m: float) -> Skin:
         return skin
     corner, triangle = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts).astype(np.int64)
     return Skin(corner, triangle, skin.thickness_m, skin.note)
+
+
+def has_detail(skin: Skin) -> bool:
+    """Whether a surface is simplified before anything else is tried."""
+    return len(skin.face) > WHOLE_FACES and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
+
+
+def thick_enough_m(skin: Skin) -> float:
+    """The wall of an open surface that a lattice can fill."""
+    return float(np.sqrt(WALL_TETS * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
 
 
 def _slivers(skin: Skin, edge_m: float) -> bool:
@@ -116,20 +141,24 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
-def _of_lattice(
-    skin: Skin, edge_m: float | None, volume_m3: float, tets: float, say: Callable[[str], None], why: str
-) -> Solid:
-    edge = edge_m or min((LATTICE_VOLUME * volume_m3 / tets) ** (1 / 3), LATTICE_WALL * skin.thickness_m)
+def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str], None], why: str) -> Solid:
+    """Solid by a lattice, its edge from edge_m on until it holds the walls, finest_m or `LATTICE_TETS` at the end."""
+    filled_m3 = LATTICE_MORE * LATTICE_VOLUME * abs(geometry.volume_m3(skin.vertex_m, skin.face))
+    edge, least = max(edge_m, (filled_m3 / MOST_TETS) ** (1 / 3)), max(finest_m, (filled_m3 / LATTICE_TETS) ** (1 / 3))
     while True:
         say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
         try:
             corner, tet = stuffed(skin.vertex_m, skin.face, edge)
             _check_filled(skin, corner, tet)
             break
-        except MeshError:  # some of its walls are thinner than it is on the whole, and than an edge
-            if edge < LATTICE_LEAST * skin.thickness_m:
-                raise
-            edge *= FINER
+        except MeshError as error:  # some of its walls are thinner than it is on the whole, and than an edge
+            if edge <= least:
+                raise TooThinError(
+                    f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE_TETS} tetrahedra for its walls"
+                    f" ({skin.thickness_m:.2g} m on the mean)",
+                    "repair the mesh, or give thicker walls",
+                ) from error
+            edge = max(FINER * edge, least)
     tet, said = _largest(corner, tet)
     note = f"{LATTICE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)

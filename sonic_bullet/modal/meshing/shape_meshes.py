@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.meshing.filling import filled
+from sonic_bullet.modal.meshing.filling import LATTICE_WALL, WHOLE_FACES, Filler, TooThinError, filled, thick_enough_m
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
@@ -52,11 +52,9 @@ def fill(
     thickness_m: float | None,
     say: Callable[[str], None],
     *,
-    lattice: bool = False,
-    netgen: bool = False,
+    filler: Filler = "any",
 ) -> Filled:
-    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. lattice, netgen: as
-    `filled`.
+    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. filler: as `filled`.
 
     Raises MeshError.
     """
@@ -69,8 +67,16 @@ def fill(
         made = Solid(placed(one, made.node_m), made.tet, made.affine, made.note)
     else:
         skin_given = prepared(*soup(shapes), thickness_m)
+        try:
+            made = filled(_united(skin_given), edge_m, say, filler=filler)
+        except TooThinError:
+            if not skin_given.guessed or len(skin_given.face) > WHOLE_FACES:
+                raise
+            wall_m = thick_enough_m(skin_given)
+            skin_given = prepared(*soup(shapes), wall_m)
+            first = min(edge_m or np.inf, LATTICE_WALL * wall_m)
+            made = filled(_united(skin_given), edge_m if filler == "lattice" else first, say, filler="lattice")
         vertex, face = skin_given.vertex_m, skin_given.face
-        made = filled(_united(skin_given), edge_m, say, lattice=lattice, netgen=netgen)
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))

@@ -3,7 +3,7 @@
 Choices, each told in the model's note:
     closed surface: the solid inside; turned inside out where it looks inward; with thickness_m a hollow body, its wall
         inward
-    small holes (caps under `CAP_PART` of the area): filled, as if capped
+    small holes, seams that do not meet (from outside, `OPEN_PART` of a turn around a point): filled
     open surface: a wall of thickness_m, half on either side, `SHEET_PART` of the diagonal by default; flat sheets need
         thickness_m
     open pieces beside a solid that is most of the area: left out
@@ -17,10 +17,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.modal.meshing.stuffing import winding_number
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 CAP_PART = 0.05
+"""Of a piece's area: flat caps on its holes, below which it encloses a volume."""
+OPEN_PART = 0.025
+"""Winding number just outside, on the mean: a ball with a hole of 5 % of its area has it."""
+SAMPLES = 2000  # faces outside which it is asked for
 SHEET_PART = 0.02
 FLAT_PART = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
 SIZE_M = (1e-5, 1e4)
@@ -29,13 +34,14 @@ SIZE_M = (1e-5, 1e4)
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
     """A surface that means a solid: vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the
-    choices.
+    choices. guessed: nobody told how thick its wall is.
     """
 
     vertex_m: Array
     face: Array
     thickness_m: float
     note: str = ""
+    guessed: bool = False
 
 
 def _flips(face: Array) -> Array:
@@ -152,6 +158,17 @@ def _solid_pieces(vertex_m: Array, face: Array) -> Array:
     return solid
 
 
+def _openness(vertex_m: Array, face: Array) -> float:
+    """Mean over the area of how much of a turn the surface makes around points just outside: 0 of a closed one, whether
+    its pieces share their edges or not.
+    """
+    shown = face[:: -(-len(face) // SAMPLES)]
+    area, normal = geometry.face_areas_m2(vertex_m, shown), geometry.outward_normals(vertex_m, shown)
+    outside = vertex_m[shown].mean(axis=1) + FLAT_PART * np.linalg.norm(np.ptp(vertex_m, axis=0)) * normal
+    near = geometry.surface_index(vertex_m, face).order
+    return float(np.average(np.abs(winding_number(vertex_m[face[near]], outside)), weights=area))
+
+
 def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     """The surface that is to be filled.
 
@@ -180,9 +197,9 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
         face, area = face[solid], area[solid]
     total = float(area.sum())
     volume = geometry.volume_m3(vertex_m, face)
-    cap = _cap_area_m2(vertex_m, _boundary(face))
-    if cap < CAP_PART * total and 2 * volume / total > FLAT_PART * diagonal_m:
-        if not geometry.is_closed(face):
+    closed = geometry.is_closed(face)
+    if 2 * volume / total > FLAT_PART * diagonal_m and (closed or _openness(vertex_m, face) < OPEN_PART):
+        if not closed:
             note += "; holes filled"
         if thickness_m is None:
             return Skin(vertex_m, face, 2 * volume / total, note)
@@ -200,7 +217,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     )
     if thickness_m is None and flat:
         raise MeshError("mesh is a flat sheet without volume", "give thickness_m to make it solid")
-    if geometry.is_closed(face):  # two coincident sides: one of them is the sheet
+    if closed:  # two coincident sides: one of them is the sheet
         _, first = np.unique(np.sort(face, axis=1), axis=0, return_index=True)
         if len(first) == len(face) or thickness_m is None:
             raise MeshError(
@@ -209,4 +226,5 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
             )
         face = face[np.sort(first)]
     vertex_m, face = _walled(vertex_m, face, wall_m / 2, wall_m / 2)
-    return Skin(vertex_m, face, wall_m, f"{note}; open surface given a wall of {wall_m:.3g} m")
+    note += f"; open surface given a wall of {wall_m:.3g} m"
+    return Skin(vertex_m, face, wall_m, note, guessed=thickness_m is None)

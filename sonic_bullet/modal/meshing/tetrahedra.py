@@ -16,8 +16,9 @@ from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-GUARD_S, GUARD_S_PER_TET = 20, 0.01
-"""Of processor time, after which a child counts as hung: thirty times what meshes take."""
+GUARD_S, GUARD_S_PER_TET = 20, 0.002
+"""Of processor time, after which a child counts as hung: ten times what meshes take. That is an error, and nothing else
+is tried: a clock decides no result."""
 BUSY = 20.0
 """Wall time per processor time that a child may take on a busy machine before it counts as hung."""
 MEMORY_LIMIT_BYTES = 2 * 1024**3
@@ -26,7 +27,11 @@ ACROSS = 100.0  # the diagonal as Netgen sees it: its tolerances then fit metres
 
 
 class EndlessError(MeshError):
-    """A child that did not come to an end, or outgrew its memory: smaller elements would not either."""
+    """A child that did not come to an end."""
+
+
+class TooLargeError(MeshError):
+    """A child that outgrew its memory: smaller elements would too."""
 
 
 def tetrahedra(
@@ -82,7 +87,7 @@ def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Ar
             raise EndlessError(f"{name} did not come to an end on the mesh", "repair the mesh, or give a simpler one")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]
-            raise (EndlessError if "MemoryError" in said else MeshError)(
+            raise (TooLargeError if "MemoryError" in said else MeshError)(
                 f"{name} failed on the mesh (exit {ended.returncode}: {said[:200]})",
                 "repair the mesh, or give a simpler one",
             )

@@ -1,0 +1,101 @@
+"""The elements that a body is solved with first: their size and degree, from what is wanted and what may be spent.
+
+mesh, wall, shortest wave, count of modes -> edge -> filled -> larger, less detail or degree 2 where it is too much
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet import geometry
+from sonic_bullet.files import cache as store
+from sonic_bullet.modal import cost, lagrange, polynomials
+from sonic_bullet.modal.elements import LIMIT, MOST_UNKNOWNS, UNKNOWNS_PER_TET, Elements, coarse
+from sonic_bullet.modal.kept_solids import kept_or_filled
+from sonic_bullet.modal.keys import key
+from sonic_bullet.modal.meshing.filling import Filler, has_detail
+from sonic_bullet.modal.meshing.named_shapes import soup
+from sonic_bullet.modal.meshing.sizes import edge_within_m
+from sonic_bullet.modal.meshing.surfaces import prepared
+from sonic_bullet.modal.sectors import MOST_MODES, Wanted
+from sonic_bullet.records import Array, Shape
+
+if TYPE_CHECKING:
+    from sonic_bullet.modal.meshing.shape_meshes import Filled
+
+PER_WAVE = 0.2
+"""First edge over the shortest wave."""
+WIDE = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
+LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
+
+
+def filled(
+    shapes: tuple[Shape, ...],
+    length_m: float,
+    tensor: Array,
+    wanted: Wanted,
+    clamp: Array,
+    sizes: tuple[float | None, float | None],
+    kept: tuple[store.Place, str],
+    say: Callable[[str], None],
+) -> Elements:
+    """The method of any body, clamped where clamp (k, 4) reaches, its first size from what is wanted of a material of
+    stiffness (6, 6). sizes: edge_m, None for that, and thickness_m. Raises MeshError, ModalError.
+    """
+    given, thickness_m = sizes
+
+    def at_size(edge_m: float, filler: Filler) -> Filled:
+        cache, name = kept
+        name = key("solid", name, edge_m, filler if filler == "simple" else filler == "lattice")
+        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, filler=filler)
+
+    # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
+    first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
+    wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first, say)
+    edge = given or edge_m
+    thin = edge > wall_m
+    degree = 2 if given and given < WIDE * wall_m else 3
+    anew = None if given else at_size
+    made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
+    if given is None:
+        made = made.bounded()
+    elif made.degree == 3 and made._unknowns > LIMIT:
+        made = replace(made, degree=2)
+    made.held(lagrange.field(made.solid, 2))
+    return made
+
+
+def _first(
+    shapes: tuple[Shape, ...],
+    thickness_m: float | None,
+    length_m: float,
+    tensor: Array,
+    wanted: Wanted,
+    say: Callable[[str], None],
+) -> tuple[float, float, int, bool]:
+    """The wall and the edge to begin with, in m, about how many modes there will be, and whether detail is left out.
+
+    The edge is for the shortest wave of a plate as thick as the body is, at the highest λ wanted or the wave of as many
+    modes as are wanted, and no more unknowns than their work allows.
+    """
+    skin = prepared(*soup(shapes), thickness_m)
+    area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
+    wall = skin.thickness_m / length_m
+    flat = np.sqrt(4 * np.pi * (wanted.most + 8) / (area / 2))
+    bulk = (3 * np.pi**2 * (wanted.most + 8) / (area * wall / 2)) ** (1 / 3)  # two shear waves fill a lump
+    number = float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor))
+    modes = cost.modes_below(number, area, wall, wanted)
+    edge = min(PER_WAVE * 2 * np.pi / min(number, max(flat, bulk)), LARGEST)
+    thin = edge > wall
+    most = min(MOST_UNKNOWNS[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin))))
+    least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_PER_TET[3])
+    if edge < least:
+        say(
+            f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
+            f"{most} unknowns: larger ones are used, unless edge_m gives their size"
+        )
+    return wall * length_m, max(edge, least) * length_m, modes, has_detail(skin)
