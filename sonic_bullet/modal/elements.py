@@ -200,15 +200,15 @@ class Elements:
 
         made = self.within(most(3))
         for filler in WITH_LESS:  # its surface has so much detail
-            if made._unknowns <= most(3) or made._lattice or self.at_size is None:
-                break
-            if filler == "simple" and self.simple:
+            if made._lattice or self.at_size is None or (filler == "simple" and self.simple):
                 continue
+            if made._unknowns <= most(3) or (filler == "lattice" and made._with_degree(2)._unknowns <= most(2)):
+                break
             with suppress(MeshError):
                 other = replace(self, body=self.at_size(self.edge_m, filler), simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
         if made._unknowns > min(LIMIT, most(3)):
-            made = replace(made, degree=2)
+            made = made._with_degree(2)
         if made._unknowns > most(2):
             raise MeshError(
                 f"its surface has so much detail that it needs {made._unknowns:.2g} unknowns, more than {most(2):.2g}",
@@ -280,6 +280,9 @@ class Elements:
     @property
     def _unknowns(self) -> float:
         return UNKNOWNS_PER_TET[self.degree] * len(self.body.solid.tet)
+
+    def _with_degree(self, degree: int) -> Elements:
+        return replace(self, degree=degree, known={})
 
     def _of_size(self, edge_m: float, *, fallback: bool = True) -> Elements:
         assert self.at_size is not None

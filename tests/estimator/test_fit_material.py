@@ -141,7 +141,7 @@ def test_clamped_body_is_fitted_clamped(tmp_path: Path) -> None:
         (
             lambda c: c.update(recordings=[{"file": "short.wav", "object": "box"}]),
             AudioError,
-            "short.wav holds 1 ms after the onset",
+            "short.wav holds 50 samples",
         ),
         (lambda c: c.update(recordings=[{"file": "noise.wav", "object": "box"}]), AudioError, "no damped sinusoid"),
         (lambda c: c.update(recordings=[{"file": "text.wav", "object": "box"}]), FileError, "cannot read"),

@@ -16,7 +16,7 @@ from sonic_bullet.records import Array
 PART = 0.1  # of the peak: what exceeds it is contact; two such stretches further apart than GAP_S are two hits
 GAP_S = 2e-4
 ABOVE_NOISE = 8.0  # times its rms, which noise alone does not reach in 10¹⁴ samples
-FLAT, FLAT_PART = 3, 0.05  # samples at the ceiling; of the contact: in 16 bits a half-sine's top is flat for 0.02
+FLAT, FLAT_PART = 3, 0.05  # samples at the ceiling; of the contact: 0.02 of a half-sine in 16 bits is its flat top
 
 
 @dataclass(frozen=True, slots=True)

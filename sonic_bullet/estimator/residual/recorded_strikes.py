@@ -117,12 +117,12 @@ def strikes_of(
 
 
 def case_strikes(found: CaseFit) -> Strikes:
-    """The residual of a fitted case, of the object with the most strikes: beside its modes, or, where no mode of a
-    shape is known, beside the lines that its preset plays.
+    """The residual of a fitted case, of the object with the most strikes: beside what a fit plays of them, which is the
+    modes of a shape struck at known places, or else the lines.
 
     Raises AudioError where no recording can be used.
     """
-    shaped = {o.evidence.thing.name: o for o in found.objects if len(o.freq_hz)}
+    shaped = {o.evidence.thing.name: o for o in found.objects if np.isfinite(o.pattern).any()}
     recorded = [e for e in found.evidence if e.signals is not None and (e.thing.name in shaped or len(e.lines.freq_hz))]
     if not recorded:
         raise AudioError(
