@@ -138,7 +138,7 @@ def test_hum_is_no_mode_and_a_second_hit_ends_the_first() -> None:
     x[SR // 4 : SR // 4 + SR] += hit
     found = extract(x, SR)
     assert found.onset_s == pytest.approx(0.25, abs=1e-3)
-    assert "do not decay" in found.note and found.freq_hz.min() > 50.0
+    assert "hum at 50 Hz" in found.note and found.freq_hz.min() > 50.0
     x[SR : 2 * SR] += 2 * hit
     twice = extract(x, SR)
     assert "2 hits" in twice.note
