@@ -11,7 +11,6 @@ two sizes tell is taken off [Richardson 1911]:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,7 @@ import numpy as np
 from sonic_bullet.modal import cost, eigen, fem, lagrange
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array
@@ -184,10 +184,10 @@ class Elements:
         for _ in range(TRIES):
             if made._unknowns < min(OVER * MOST_UNKNOWNS[self.thin], most):
                 break
-            try:
-                made = made._of_size(made.edge_m * (made._unknowns / aim) ** (1 / made._growth), fallback=False)
-            except MeshError:
+            larger = made._refilled(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
+            if larger is None:
                 break
+            made = larger
         return made
 
     def bounded(self) -> Elements:
@@ -204,8 +204,9 @@ class Elements:
                 continue
             if made._unknowns <= most(3) or (filler == "lattice" and made._with_degree(2)._unknowns <= most(2)):
                 break
-            with suppress(MeshError):
-                other = replace(self, body=self.at_size(self.edge_m, filler), simple=filler == "simple").within(most(3))
+            other = self._refilled(self.edge_m, filler)
+            if other is not None:
+                other = replace(other, simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
         if made._unknowns > min(LIMIT, most(3)):
             made = made._with_degree(2)
@@ -227,10 +228,12 @@ class Elements:
         spare = self.spare - known
         if self.known and self.coarser is None:
             spare -= cost.work(coarse(self.thin) * self._unknowns, modes, self.degree, self.thin)
+        if spare <= 0:
+            return None
         most = cost.most_unknowns(spare, modes, self.degree, self.thin)
         least = (self._unknowns / min(MOST_UNKNOWNS[self.thin], most)) ** (1 / self._growth)
         if least * ALIKE <= 1:
-            made = self._of_size(self.edge_m * max(FINER, least)).within(most)
+            made = self._of_size(self.edge_m * max(FINER, least), self._filler("any")).within(most)
             if made._unknowns <= min(OVER * MOST_UNKNOWNS[self.thin], most) and made._smaller_than(self) >= ALIKE:
                 return replace(made, coarser=self, spare=spare)
         if self.degree == 2:
@@ -249,11 +252,8 @@ class Elements:
         for _ in range(LARGER):
             if self.coarser is None and self.at_size is None:
                 break
-            try:
-                made = self.coarser or self._of_size(self.edge_m * times, fallback=False)
-            except MeshError:
-                break
-            if made._lattice != self._lattice:  # kept from when any way would do
+            made = self.coarser or self._refilled(self.edge_m * times)
+            if made is None or made._lattice != self._lattice:  # kept from when any way would do
                 break
             larger = self._smaller_than(made)
             if larger > ALIKE:
@@ -284,10 +284,23 @@ class Elements:
     def _with_degree(self, degree: int) -> Elements:
         return replace(self, degree=degree, known={})
 
-    def _of_size(self, edge_m: float, *, fallback: bool = True) -> Elements:
+    def _filler(self, otherwise: Filler) -> Filler:
+        return "lattice" if self._lattice else "simple" if self.simple else otherwise
+
+    def _of_size(self, edge_m: float, filler: Filler) -> Elements:
         assert self.at_size is not None
-        filler: Filler = "lattice" if self._lattice else "simple" if self.simple else "any" if fallback else "netgen"
         return replace(self, body=self.at_size(edge_m, filler), edge_m=edge_m, coarser=None, known={})
+
+    def _refilled(self, edge_m: float, filler: Filler | None = None) -> Elements | None:
+        """The same of another size, filled as it is or by ``filler``; None where that cannot be. Raises EndlessError:
+        what a clock ended is an error and decides nothing.
+        """
+        try:
+            return self._of_size(edge_m, filler or self._filler("netgen"))
+        except EndlessError:
+            raise
+        except MeshError:
+            return None
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """How it was done."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,12 +13,14 @@ import sonic_bullet as sb
 from sonic_bullet.modal import cost
 from sonic_bullet.modal.elements import Elements
 from sonic_bullet.modal.first_elements import filled
-from sonic_bullet.modal.meshing.filling import LATTICE_TETS, TooThinError
-from sonic_bullet.modal.meshing.shape_meshes import fill
+from sonic_bullet.modal.meshing.filling import LATTICE_TETS, Filler, TooThinError
+from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
 from sonic_bullet.modal.meshing.surfaces import prepared
+from sonic_bullet.modal.meshing.tetrahedra import EndlessError
 from sonic_bullet.modal.model import _unit_of
 from sonic_bullet.modal.sectors import Wanted
 from sonic_bullet.records import Shape
+from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 
 
@@ -117,3 +120,22 @@ def test_a_hole_of_more_than_a_twentieth_makes_a_shell(height: float, *, solid: 
     kept = mesh.faces[mesh.triangles_center[:, 2] < 0.1 * height]
     skin = prepared(np.array(mesh.vertices), np.array(kept), None)
     assert (skin.note == "; holes filled") == solid and skin.guessed != solid
+
+
+def test_what_a_clock_ended_is_an_error_and_chooses_nothing() -> None:
+    one = elements(crossing(), "wood")
+
+    def ended(edge_m: float, filler: Filler) -> Filled:
+        raise EndlessError("Netgen did not come to an end", "give a simpler mesh")
+
+    def refused(edge_m: float, filler: Filler) -> Filled:
+        raise MeshError("Netgen failed", "give a simpler mesh")
+
+    with pytest.raises(EndlessError):
+        replace(one, at_size=ended).within(1.0)
+    assert replace(one, at_size=refused).within(1.0).body is one.body
+
+
+@pytest.mark.parametrize("spare", [-1.0, 0.0, 1e-9, 1.0])
+def test_nothing_finer_is_made_of_no_work(spare: float) -> None:
+    assert replace(elements(crossing(), "wood"), spare=spare).finer() is None

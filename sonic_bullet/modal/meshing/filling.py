@@ -39,7 +39,7 @@ FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch whe
 SIMPLER, SLIVER = 0.05, 0.01
 """Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
 slivers of unions, on which it takes ten times as long."""
-WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes a second for 400
+WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
 LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
