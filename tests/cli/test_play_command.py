@@ -135,13 +135,13 @@ def test_a_card_that_is_pulled_ends_it_with_what_was_played(
 ) -> None:
     library = StandInLibrary(sr=16_000)
     monkeypatch.setitem(sys.modules, "sounddevice", library)  # type: ignore[arg-type]
-    monkeypatch.setattr(playback, "STALLED_S", 0.1)
     pulled: list[bool] = []
     real = playback.Playback.push
 
     def push(self: Any, frame: Any, returned_s: float) -> None:
         if self.report.seconds > 0.1 and not pulled:
             pulled.append(True)
+            monkeypatch.setattr(playback, "STALLED_S", 0.1)  # not before: a busy machine may take as long for a block
             library.streams[0].pull(said=False)
         real(self, frame, returned_s)
 

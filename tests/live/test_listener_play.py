@@ -102,11 +102,11 @@ def test_a_card_pulled_in_mid_stream_loses_nothing(
 ) -> None:
     library = StandInLibrary()
     monkeypatch.setitem(sys.modules, "sounddevice", library)  # type: ignore[arg-type]
-    monkeypatch.setattr(playback, "STALLED_S", 0.1)
     client, listener = world
     listener.play()
     for _ in range(30):
         client.stepSimulation()
+    monkeypatch.setattr(playback, "STALLED_S", 0.1)  # not before: a busy machine may take as long for a block
     library.streams[0].pull(said=said)
     with pytest.warns(PlaybackWarning, match="card 0 takes no more sound") as caught:
         for _ in range(90):
