@@ -19,6 +19,7 @@ from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.pole_selection import apart, selected
 from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
+from sonic_bullet.estimator.lines.ringing import ringing_lines
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -32,6 +33,7 @@ CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at t
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
+EXPLAINED = 10**0.5  # rms over the noise of what lines from the onset on leave, at most: 10 dB
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -64,7 +66,11 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     try:
-        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        found = _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        if np.median(found.noise / noise) < EXPLAINED:
+            return found
+        after = ringing_lines(signals, sr, (low, high), signed=signed)
+        return after if len(after.freq_hz) else found
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
