@@ -1,7 +1,7 @@
 """Lines of what rings after the attack, for recordings that no sum of damped sinusoids explains from the onset on: the
 first milliseconds of a real take hold the striker, slaps and a room, and its modes are not exactly exponential.
 
-    signals (s, n) -> bands of BAND_HZ about their centre, decimated, where the band's filter is full: the attack is over
+    signals (s, n) -> bands of BAND_HZ about their centre, decimated, once the band's filter is full: after the attack
     -> poles of a band, of all recordings at once (ESPRIT)           [Roy & Kailath 1989, eq. 3.12-3.17]
     -> the one that takes most, of what is left the next           [Pati, Rezaiifar & Krishnaprasad 1993], while it
          has OWN of its energy apart from those picked: what cancels is no line
@@ -81,7 +81,7 @@ def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]
     """The bands of signals (s, n), each from the sample on at which its filter is full."""
     from scipy.signal import firwin, kaiser_beta
 
-    s, n = signals.shape
+    n = signals.shape[1]
     whole = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.fft(signals, whole, axis=1)
     step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
