@@ -22,11 +22,11 @@ from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-ATTACK_S = 0.003  # before a band's filter, which holds as long again and more
+ATTACK_S = 0.005  # and a band's filter, 16 ms: together twice what it lasts in real takes
 SECONDS = 2.0
-BAND_HZ, PASSED, STOPPED, OVERSAMPLED = 400.0, 0.5, 0.8, 1.6  # of a band's width from its centre; rate over width
-STOP_DB = 60.0
-ROWS, COLUMNS, MOST = 200, 800, 40  # of a band's data matrix; poles looked for
+BAND_HZ, PASSED, STOPPED, OVERSAMPLED = 400.0, 0.5, 1.5, 2.0  # of a band's width from its centre; rate over width
+STOP_DB = 100.0
+ROWS, COLUMNS, MOST = 240, 800, 40  # of a band's data matrix; poles looked for
 OWN = 0.5
 BESIDE = np.concatenate([-np.arange(2.0, 8.0), np.arange(2.0, 8.0)])  # widths from a line
 FALSE_ALARMS = 0.05  # of a recording of noise alone
@@ -105,9 +105,8 @@ def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]
 def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, Array, Array]:
     """Poles (k,) in 1/s, amplitudes (s, k) and their spreads, spreads (k,), energies (k,) of a band's lines."""
     y, pole = band.series, _candidates(band.series)
-    # about the band, per sample
-    pole = pole[(pole.real < 0) & (np.abs(pole.imag) < 2 * np.pi * PASSED * 1.5 * BAND_HZ * band.step / sr)]
-    pole = pole[_picked(y, pole, least)]
+    pole = pole[pole.real < 0]
+    pole = pole[_picked(y, pole, least)]  # about the band, per sample; its neighbours' too
     for _ in range(3):
         pole = _polished(y, pole)
         size = len(pole)
@@ -157,31 +156,60 @@ def _picked(y: Array, pole: Array, least: float) -> Array:
     if not len(pole):
         return np.zeros(0, int)
     ring = np.exp(np.outer(np.arange(y.shape[1]), pole))
-    alive = np.abs(ring) ** 2
-    alive /= alive.sum(axis=0)
-    apart, own, left, found = ring.copy(), (np.abs(ring) ** 2).sum(axis=0), y, list[int]()
-    open_ = np.ones(len(pole), bool)
-    while open_.any():
-        new = (np.abs(apart) ** 2).sum(axis=0)
-        open_ &= new > OWN * own
-        taken = np.abs(left @ apart.conj()) ** 2 / np.maximum(new, 1e-300)  # (s, k)
-        k = int(np.where(open_, taken.sum(axis=0), -1.0).argmax())
-        if not open_[k] or taken[:, k].sum() < least:
+    whole, moment = ring.conj().T @ ring, y @ ring.conj()
+    own = np.diag(whole).real
+    free, found = np.ones(len(pole), bool), list[int]()
+
+    def strongest(gram: Array, seen: Array, among: Array) -> tuple[int, Array, Array, Array]:
+        """Its number or -1, what it takes (s,); Gram matrix and moments without it. All are apart from those picked."""
+        new = np.diag(gram).real
+        taken = np.abs(seen) ** 2 / np.maximum(new, 1e-300)
+        worth = np.where(among & (new > OWN * own), taken.sum(axis=0), -1.0)
+        k = int(worth.argmax())
+        if worth[k] < least:
+            return -1, taken[:, k], gram, seen
+        turned = gram[:, k] / np.sqrt(new[k])
+        less = seen - np.outer(seen[:, k], turned) / np.sqrt(new[k])
+        return k, taken[:, k], gram - np.outer(turned, turned.conj()), less
+
+    def stands(k: int, taken: Array, left: Array) -> bool:
+        alive = np.abs(ring[:, k]) ** 2 / own[k]
+        level = np.maximum(np.abs(left) ** 2 @ alive, _left_beside(left, ring[:, k], pole[k]))
+        return bool((taken / level).sum() >= least)
+
+    def without(picked: list[int]) -> Array:
+        return np.asarray(y - (ring[:, picked] @ np.linalg.solve(whole[np.ix_(picked, picked)], moment[:, picked].T)).T)
+
+    gram, seen = whole, moment
+    while free.any():
+        k, taken, *rest = strongest(gram, seen, free)
+        if k < 0:
             break
-        direction = apart[:, k] / np.sqrt(new[k])
-        less = left - np.outer(left @ direction.conj(), direction)
-        level = np.maximum(np.abs(less) ** 2 @ alive[:, k], _left_beside(less, ring[:, k], pole[k]))
-        open_[k] = False
-        if (taken[:, k] / level).sum() >= least:
-            found.append(k)
-            left, apart = less, apart - np.outer(direction, direction.conj() @ apart)
+        free[k] = False
+        picked = [k]
+        if not stands(k, taken, without([*found, k])):  # with its twin it may: each stands beside the other
+            near = free & (np.abs(pole.imag - pole[k].imag) < BESIDE[-1] * _width(pole[k], len(ring)))
+            twin, more, *rest = strongest(rest[0], rest[1], near)
+            if twin < 0:
+                continue
+            picked.append(twin)
+            left = without([*found, *picked])
+            if not stands(k, taken, left) or not stands(twin, more, left):
+                continue
+            free[twin] = False
+        found += picked
+        gram, seen = rest
     return np.array(found, int)
+
+
+def _width(pole: complex, samples: int) -> float:
+    """Of a line in the spectrum of so many samples, in radians a sample."""
+    return float(np.hypot(-pole.real, np.pi / samples))
 
 
 def _left_beside(left: Array, ring: Array, pole: complex) -> Array:
     """Power (s,) of what is left beside a line's frequency while it rings, as its energy's square root's variance."""
-    width = np.hypot(-pole.real, np.pi / len(ring))
-    other = ring[:, None] * np.exp(1j * np.outer(np.arange(len(ring)), width * BESIDE))
+    other = ring[:, None] * np.exp(1j * np.outer(np.arange(len(ring)), _width(pole, len(ring)) * BESIDE))
     power = np.abs(left @ other.conj()) ** 2 / (np.abs(ring) ** 2).sum()
     return np.asarray(np.median(power, axis=1) / np.log(2))  # of an exponential law
 
