@@ -3,6 +3,7 @@ own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
     start:   shared_poles.py
+    ringing.py, where these leave far more than the noise: a real take's attack is no sum of lines
     refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
         [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
@@ -33,7 +34,7 @@ CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at t
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
-EXPLAINED = 10**0.5  # rms over the noise of what lines from the onset on leave, at most: 10 dB
+EXPLAINED = 10.0  # rms over the noise of what poles from the onset on leave of what is a sum of lines, at most: 20 dB
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -66,11 +67,10 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     try:
-        found = _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
-        if np.median(found.noise / noise) < EXPLAINED:
-            return found
-        after = ringing_lines(signals, sr, (low, high), signed=signed)
-        return after if len(after.freq_hz) else found
+        start = apart(start_poles(signals / noise[:, None], sr, low, high))
+        if np.median(amplitudes_at(signals, noise, start, sr)[3] / noise) > EXPLAINED:
+            return ringing_lines(signals, sr, (low, high), signed=signed)
+        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
