@@ -64,6 +64,8 @@ def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequenc
 
 def take_tables(takes: Any) -> list[str]:
     """How far the prediction of each take is, in a table; nothing where no take could be compared."""
+    from sonic_bullet.estimator.fit.case_fit import NO_GAIN
+
     if not takes:
         return []
 
@@ -78,7 +80,7 @@ def take_tables(takes: Any) -> list[str]:
             shown(t.predicted_db),
             shown(t.silence_db),
             shown(t.other_take_db),
-            "fitted" if t.free_gain else "known",
+            ("fitted" if t.gain else NO_GAIN) if t.free_gain else "known",
         )
         for t in takes
     ]

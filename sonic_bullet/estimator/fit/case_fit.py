@@ -21,6 +21,7 @@ RadiationIn = Literal["nothing", "apart", "damping"]
 """Where a fit has what the air takes: nowhere, as nothing is lost to a medium; apart from the material's α and β; or in
 them, where the two cannot be separated.
 """
+NO_GAIN = "no gain makes it nearer than silence"
 POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
 
 
@@ -55,7 +56,8 @@ class TakeDistance:
     """One take's log-spectral distances in dB: of the fit's prediction, of silence, of the nearest other take; NaN
     where nothing of it stands above its noise, or where there is no other take.
 
-    free_gain: whether the prediction's gain was fitted to this take, its impulse or place being unknown.
+    free_gain: whether the prediction's gain was fitted to this take, its impulse or place being unknown. gain: that
+    gain, 0 where none makes it nearer than silence; else 1.
     """
 
     file: str
@@ -64,6 +66,7 @@ class TakeDistance:
     silence_db: float
     other_take_db: float
     free_gain: bool
+    gain: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,19 +18,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
-from sonic_bullet.estimator.fit.case_fit import TakeDistance
+from sonic_bullet.estimator.fit.best_gain import BestGain, distance_at, find_best_gain
+from sonic_bullet.estimator.fit.case_fit import NO_GAIN, TakeDistance
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_modes
 from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
 from sonic_bullet.estimator.fit.typical_strike import typical_strike
-from sonic_bullet.estimator.lines.log_spectral import (
-    Floor,
-    floor_between,
-    noise_spectra,
-    power_spectra,
-    spectra_distance_db,
-)
+from sonic_bullet.estimator.lines.log_spectral import floor_between, power_spectra
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
@@ -40,8 +34,6 @@ if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.case_fit import CaseFit
 
 WORSE_THAN_SILENCE = "worse-than-silence"
-GAIN_REACH_DB = 40.0
-"""The best gain is looked for this far about equal energy."""
 
 
 def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
@@ -56,10 +48,9 @@ def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = Non
         return judged
     predicted = float(np.nanmean([t.predicted_db for t in takes]))
     silent = float(np.nanmean([t.silence_db for t in takes]))
-    verdict = (
-        f"{WORSE_THAN_SILENCE}: what is fitted is {predicted:.1f} dB from the takes, silence {silent:.1f} dB; "
-        f"{found.fit.verdict}"
-    )
+    lost = all(t.gain == 0 for t in takes)
+    why = f"what is fitted is {predicted:.1f} dB from the takes, silence {silent:.1f} dB"
+    verdict = f"{WORSE_THAN_SILENCE}: {NO_GAIN if lost else why}; {found.fit.verdict}"
     return replace(judged, fit=replace(found.fit, verdict=verdict))
 
 
@@ -108,14 +99,17 @@ def _distances(
     floor, power = floor_between([signal]).within(sr, found.case.band_hz), power_spectra(signal)
     made, free = predicted_take(found, e, recording, len(signal), sr, residual)
     modelled = power_spectra(made)
-    nearest = [_distance_at_best_gain(power, other, floor, noisy=False) for other in others]
+    nearest = [find_best_gain(power, other, floor, recorded=True).distance_db for other in others]
+    silence = distance_at(power, modelled, floor, 0.0)
+    best = find_best_gain(power, modelled, floor) if free else BestGain(1.0, distance_at(power, modelled, floor, 1.0))
     return TakeDistance(
         recording.file.name if recording.file is not None else "",
         recording.split,
-        _distance_at_best_gain(power, modelled, floor) if free else _distance(power, modelled, floor, 1.0),
-        _distance(power, modelled, floor, 0.0),
+        best.distance_db,
+        silence,
         float(np.nanmin(nearest)) if np.isfinite(nearest).any() else float("nan"),
         free,
+        best.gain,
     )
 
 
@@ -135,36 +129,3 @@ def predicted_take(
     if residual is not None:
         sound = sound + residual_sound(residual, *modes, n, sr)
     return sound, free
-
-
-def _distance(
-    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, gain: float, *, noisy: bool = True
-) -> float:
-    """D of a take's power spectra and those of a sound at a gain, with the noise's power added where it has none."""
-    noise = noise_spectra(floor, power) if noisy else tuple(np.zeros(1) for _ in power)
-    both = []
-    for p, m, cell in zip(power, made, noise, strict=False):
-        count = min(len(p), len(m))
-        both.append((p[:count], gain**2 * m[:count] + cell))
-    return spectra_distance_db(tuple(a for a, _ in both), tuple(b for _, b in both), floor)
-
-
-def _distance_at_best_gain(
-    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, noisy: bool = True
-) -> float:
-    """The least D over the gain of a sound."""
-    total = sum(float(m.sum()) for m in made)
-    if not total > 0:
-        return _distance(power, made, floor, 0.0)
-    start = 10 * np.log10(sum(float(p.sum()) for p in power) / total)
-
-    def cost(gain_db: float) -> float:
-        return _distance(power, made, floor, 10 ** (gain_db / 20), noisy=noisy)
-
-    steps = start + np.arange(-GAIN_REACH_DB, GAIN_REACH_DB + 1, 8.0)
-    costs = np.array([cost(g) for g in steps])
-    if not np.isfinite(costs).any():
-        return float("nan")
-    at = float(steps[int(np.nanargmin(costs))])
-    best = minimize_scalar(cost, bounds=(at - 8, at + 8), method="bounded", options={"xatol": 0.1})
-    return float(min(best.fun, np.nanmin(costs)))

@@ -1,0 +1,151 @@
+"""The gain by which a sound is nearest to a recording, where nobody says how hard was struck.
+
+    ĝ = argmin over g ≥ 0 of D(r, g·p + noise)              D: lines/log_spectral.py, from powers
+        noise: N to a sound that has none, (1 − g²)₊ N to one that was recorded with as much
+
+Which cells stand above the noise goes with g, so D has several minima: all of a grid from nothing upwards are looked
+at, by a part of the cells, and the lowest few refined by all of them. g = 0 is silence, so no best gain is farther.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from sonic_bullet.estimator.lines.log_spectral import (
+    ABOVE,
+    FEWEST_CELLS,
+    HIDING,
+    Floor,
+    noise_spectra,
+    spectra_distance_db,
+)
+from sonic_bullet.records import Array
+
+STEP_DB, WITHIN_DB = 1.0, 2.0
+BELOW_DB, OVER_DB = 10.0, 40.0
+"""The grid begins where the loudest cell is that far below its noise, and ends that far over equal energy."""
+NEARER_DB = 0.05
+"""Than silence: what is printed as the same is the same."""
+CELLS = 6000
+"""Of a window and of a kind that the grid is searched by, at most: D to some 0.1 dB."""
+LOWEST = 2
+"""Minima of the grid that are refined."""
+
+
+@dataclass(frozen=True, slots=True)
+class BestGain:
+    """A gain and the distance in dB there. 0: no gain makes the sound nearer than silence."""
+
+    gain: float
+    distance_db: float
+
+
+def distance_at(
+    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, gain: float, *, recorded: bool = False
+) -> float:
+    """D in dB of a recording and a sound at a gain, by power spectra; recorded: the sound has its own noise."""
+    noise = noise_spectra(floor, power)
+    added = max(0.0, 1 - gain**2) if recorded else 1.0
+    counts = [min(len(p), len(m)) for p, m in zip(power, made, strict=False)]
+    one = tuple(p[:n] for p, n in zip(power, counts, strict=False))
+    other = tuple(gain**2 * m[:n] + added * cell for m, n, cell in zip(made, counts, noise, strict=False))
+    return spectra_distance_db(one, other, floor)
+
+
+def find_best_gain(
+    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, recorded: bool = False
+) -> BestGain:
+    """Find the gain of least distance.
+
+    Parameters
+    ----------
+    power, made : tuple of (frames, bins) arrays
+        Powers of the recording and of the sound under each window.
+    floor : Floor
+        The recording's noise.
+    recorded : bool
+        Whether the sound has a noise of its own, as another take has.
+
+    Returns
+    -------
+    BestGain
+        Distance NaN where nothing stands above the noise at any gain.
+    """
+    silence = BestGain(0.0, distance_at(power, made, floor, 0.0))
+    grid = _grid(power, made, floor)
+    if not len(grid):
+        return silence
+    few = _few_cells(power, made, floor, added=not recorded)
+    costs = np.nan_to_num(_distances_of_few(few, grid), nan=np.inf, posinf=np.inf)
+    padded = np.concatenate([[np.inf], costs, [np.inf]])
+    minima = np.flatnonzero((costs <= padded[:-2]) & (costs < padded[2:]))
+    found: list[BestGain] = []
+
+    def cost(db: float) -> float:
+        return distance_at(power, made, floor, 10 ** (db / 20), recorded=recorded)
+
+    for at in minima[np.argsort(costs[minima], kind="stable")][:LOWEST]:
+        level = 20 * np.log10(grid[at])
+        near = (level - WITHIN_DB, level + WITHIN_DB)
+        best = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.1})
+        found += [BestGain(float(10 ** (best.x / 20)), float(best.fun))] if np.isfinite(best.fun) else []
+    nearest = min(found, key=lambda one: one.distance_db, default=silence)
+    return silence if nearest.distance_db > silence.distance_db - NEARER_DB else nearest
+
+
+def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Array:
+    """Gains from where a sound is lost in the noise up to where it is OVER_DB louder than the recording; none of a
+    sound that is nothing in the band.
+    """
+    over, level = 0.0, np.zeros(2)
+    for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
+        over = max(over, float((m / cell).max()))
+        inside = cell[0] < HIDING
+        level += np.array([p[:, inside].sum(), m[:, inside].sum()])
+    if not (over > 0 and level[1] > 0 and np.isfinite(level).all()):
+        return np.zeros(0)
+    top = 10 * np.log10(max(level[0], 1e-300) / level[1]) + OVER_DB
+    bottom = min(-10 * np.log10(over) - BELOW_DB, top)
+    return np.asarray(10 ** (np.arange(bottom, top + STEP_DB, STEP_DB) / 20))
+
+
+def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, added: bool) -> list[Array]:
+    """Of every window some cells (5, c): powers of recording and sound, the noise, whether the sound gets it in full,
+    how many cells each stands for. Cells that count at any gain are drawn apart from those that may not.
+    """
+    found = []
+    for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
+        count = min(len(p), len(m))
+        inside = np.flatnonzero(cell[0] < HIDING)
+        noise = np.broadcast_to(cell, p.shape)[:count, inside].ravel()
+        ours, theirs = p[:count, inside].ravel(), m[:count, inside].ravel()
+        always = ours > 2 * ABOVE * noise
+        loud = np.argsort(-theirs / noise, kind="stable")  # those that come to count first, whole; evenly from there
+        loud = loud[: int((theirs > 0).sum())]
+        rows = []
+        for which in (np.flatnonzero(always), *np.split(loud[~always[loud]], [CELLS])):
+            some = which[np.linspace(0, len(which) - 1, min(CELLS, len(which))).round().astype(int)]
+            weight = np.full(len(some), len(which) / max(len(some), 1))
+            rows.append(np.stack([ours[some], theirs[some], noise[some], np.full(len(some), float(added)), weight]))
+        found.append(np.concatenate(rows, axis=1))
+    return found
+
+
+def _distances_of_few(few: list[Array], gain: Array) -> Array:
+    """D (g,) by some cells of every window at gains (g,)."""
+    rows, counts = [], []
+    for ours, theirs, noise, added, weight in few:
+        share = np.maximum(added, np.maximum(0.0, 1 - gain[:, None] ** 2))
+        played = gain[:, None] ** 2 * theirs + share * noise
+        counted = weight * ((ours + played) / 2 > ABOVE * noise)
+        off = (10 * np.log10((ours + 1e-3 * noise) / (played + 1e-3 * noise))) ** 2
+        count = counted.sum(axis=1)
+        rows.append(np.sqrt((counted * off).sum(axis=1) / np.maximum(count, 1e-300)))
+        counts.append(count)
+    count, row = np.array(counts), np.array(rows)
+    use = np.where((count >= FEWEST_CELLS).any(axis=0), count >= FEWEST_CELLS, count > 0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(use.any(axis=0), (use * row).sum(axis=0) / np.maximum(use.sum(axis=0), 1), np.nan))
