@@ -98,6 +98,12 @@ class CaseFit:
     evidence: tuple[RecordedObject, ...] = ()
     takes: tuple[TakeDistance, ...] = ()
 
+    def plays_modes(self, e: RecordedObject) -> bool:
+        """Whether an object's strikes at known places are played by the modes of its shape: where their gain is known
+        and the lines are modes, not by chance. Else by its lines, as struck on average.
+        """
+        return e.family is not None and bool(np.isfinite(self.gain_sd) and np.isfinite(self.fit.covariance[2, 2]))
+
     @property
     def worse_than_silence(self) -> bool:
         """Whether what is played is on average at least as far from the takes as silence is."""

@@ -23,7 +23,7 @@ from sonic_bullet.estimator.fit.best_gain import BestGain, distance_at, find_bes
 from sonic_bullet.estimator.fit.case_fit import NO_GAIN, TakeDistance
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_modes
 from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
-from sonic_bullet.estimator.fit.typical_strike import typical_strike
+from sonic_bullet.estimator.fit.typical_strike import strike_lines
 from sonic_bullet.estimator.lines.log_spectral import floor_between, power_spectra
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array, Residual
@@ -120,9 +120,10 @@ def predicted_take(
 
     A strike of known place on a mesh is played by its modes; any other by the lines as they were struck on average.
     """
-    typical = typical_strike(e.lines)
-    modes, free = (typical.freq_hz, typical.decay_per_s, typical.amplitude), True
-    if e.family is not None and recording.position_m is not None and np.isfinite(found.gain_sd):
+    typical, known = strike_lines(e, recording)
+    impulse = recording.impulse_n_s if known and recording.impulse_n_s is not None else 1.0
+    modes, free = (typical.freq_hz, typical.decay_per_s, impulse * typical.amplitude), not known
+    if recording.position_m is not None and found.plays_modes(e):
         with suppress(SonicBulletError):
             modes, free = strike_modes(found, recording, sr), recording.impulse_n_s is None
     sound = damped_sum(*modes, n, sr)

@@ -124,10 +124,11 @@ def gather(
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
         if sounds is not None:
             signals, sr, remarks, hum = sounds
+            signals = signals - hum
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
-            still = without_hum(signals - hum, noise_rms(signals, sr), sr)
+            still = without_hum(signals, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             notes = (*(f"{g} is missing" for g in gone), *remarks)
             found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
