@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.baseline import baseline
+from sonic_bullet.diagnosis.next_measurement import next_measurement
 from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
 from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
@@ -242,14 +243,15 @@ def described(d: Diagnosis) -> dict[str, Any]:
         "errors_sone": d.errors_sone,
         **({"errors_lines": d.errors_lines} if d.errors_lines else {}),
         "unexplained": d.unexplained,
+        "next_measurement": next_measurement(d.found, d.closed, d.unexplained),
         "not_compared": [
             {"split": split, "name": one.name, "why": one.why} for split, left in d.not_compared.items() for one in left
         ],
         "baseline": {
             "alpha_per_s": d.closed.before.alpha_per_s,
             "beta_s": d.closed.before.beta_s,
-            "gamma_m2_s2": d.found.fit.gamma_m2_s2,
-            "poisson_ratio": d.found.fit.poisson_ratio,
+            "gamma_m2_s2": d.found.fit.gamma_m2_s2 if d.found.has_material else None,
+            "poisson_ratio": d.found.fit.poisson_ratio if d.found.has_material else None,
             "gain": d.closed.before.gain,
             "correction_rms": {
                 b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0
