@@ -178,7 +178,7 @@ def as_seconds(seconds: object, name: str) -> float:
 
 @dataclass(slots=True)
 class _Stage:
-    """A scene being run: its file, and the listener once there is one."""
+    """A scene being run: its file, and the listener once there is one. adds: a script chose whom its own listens to."""
 
     path: Path
     sr: int
@@ -189,6 +189,7 @@ class _Stage:
     supports: bool = True
     begin: Callable[[Listener], object] | None = None
     listener: Listener | None = None
+    adds: bool = False
     client: Any = None
     folder: str | None = None
     clients: ExitStack = field(default_factory=ExitStack)
@@ -216,9 +217,8 @@ class _Stage:
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """A listener that keeps its run, unless somebody hears it at once."""
-        keeps = self.begin is None
-        how: dict[str, Any] = {"sr": self.sr, "seed": self.seed, "keep_log": keeps, "keep_sound": keeps}
-        return attach(client, microphone=microphones, **how, supports=self.supports)
+        how: dict[str, Any] = dict.fromkeys(("keep_log", "keep_sound"), self.begin is None)
+        return attach(client, sr=self.sr, seed=self.seed, microphone=microphones, **how, supports=self.supports)
 
     def ready(self) -> None:
         """The listener knows its bodies: say so, once."""
@@ -237,6 +237,8 @@ class _Stage:
             world = self.need_listener().world
             here = world.record_names([(*who, None) for who in world.all_links()])
             self.choice.check_names([*here, *(body.name for body in world.bodies)], f"scene '{self.path.name}'")
+            if self.adds:
+                self.choice.check_added([body.name for body in world.bodies if body.material], self.path.name)
 
     def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()
@@ -315,6 +317,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
             run_script(stage.path, (look, None), total, names=names, progress=progress)
         finally:  # where it breaks, what was heard so far is kept too
             stage.listener = _listener_in(names)
+        stage.adds = True
         if stage.listener is None:
             what = f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name"
             raise SceneError(what, "write listener = sonic_bullet.attach(...)")

@@ -249,7 +249,7 @@ def modes(
     from scipy.sparse import coo_array
 
     from sonic_bullet.modal import eigen
-    from sonic_bullet.modal.ordering import dissection
+    from sonic_bullet.modal.sparse.ordering import dissection
 
     pascal = float(np.abs(stiffness_pa).max())
     k_matrix, m_matrix = matrices(body, stiffness_pa / pascal, 1.0, softer, mass_points=mass_points)

@@ -6,8 +6,7 @@
     A V_j = V_{j-1} B_jᵀ + V_j A_j + V_{j+1} B_{j+1},  VᵀMV = 1                   [Grimes, Lewis, Simon 1994, eq. 3.1]
 
 The basis is kept orthogonal in full, so that degenerate modes of a symmetric body are found as such, and grows until
-the last mode asked for has converged: no restart. The factor is SuperLU's in symmetric mode; the start block is seeded:
-same body, same bits.
+the last mode asked for has converged: no restart. The start block is seeded: same body, same bits.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.modal.sparse.factor import factorise
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import ModalError
 
@@ -35,20 +35,6 @@ class Modes:
     lambda_per_s2: Array
     vector: Array
     rigid_per_s2: Array
-
-
-def factorised(matrix: Any) -> Any:
-    """SuperLU factor of a symmetric positive definite matrix in the order it comes in (ordering.py), pivots on the
-    diagonal.
-    """
-    from scipy.sparse.linalg import splu
-
-    try:
-        return splu(matrix.tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except (RuntimeError, MemoryError) as error:
-        raise ModalError(
-            f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a simpler mesh"
-        ) from error
 
 
 def _orthonormal(block: Array, mass: Any) -> tuple[Array, Array, Array]:
@@ -82,7 +68,7 @@ def solve(
     Raises ModalError where it has another number, or where the iteration does not converge.
     """
     size = stiffness.shape[0]
-    factor = factorised(stiffness - shift * mass)
+    factor = factorise(stiffness - shift * mass)
     block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(BLOCK, size))), mass)
     width = block.shape[1]
     longest = min(size // width * width, 4 * (most + rigid) + 64 * width)

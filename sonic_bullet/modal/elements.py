@@ -20,8 +20,8 @@ from sonic_bullet.modal import cost, eigen, fem, lagrange
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.ordering import dissection
 from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
+from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
 
@@ -36,7 +36,7 @@ ALIKE, LARGER = 1.2, 3
 """Edges of a coarser body over a finer one's, below which both are too much alike to tell anything; how often a coarser
 one is tried: creases keep elements small."""
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
-"""Of thin bodies and of lumps, whose factor is full: 15 s of processor and 1.2 GB at most. An edge_m allows more."""
+"""Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
 LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
 TRIES = 2
 WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # what is tried where a surface has too much detail

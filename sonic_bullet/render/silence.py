@@ -69,7 +69,8 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     """
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
-    alone = [log.bodies[i] for i in added if i not in touched]
+    # a partner that never moves makes no sound in any case
+    alone = [b for i in added if i not in touched and ((b := log.bodies[i]).model is not None or b.mass_kg > 0)]
     models = [(log.bodies[i], model) for i in added if (model := log.bodies[i].model) is not None and len(model.face)]
     dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
     notes = []

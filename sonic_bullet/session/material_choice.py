@@ -64,6 +64,13 @@ class MaterialChoice:
                 listed = ", ".join(known[:LISTED_NAMES]) + more
                 raise SceneError(f"no body of {where} is called {shown(one)}", f"its bodies are: {listed or 'none'}")
 
+    def check_added(self, added: Collection[str], scene: str) -> None:
+        """Raise SceneError where a name that was given a material is nobody's whom a scene's own listener added."""
+        for one in self.named:
+            if not any(matched(name, (one,)) for name in added):
+                what = f"{shown(one)} is given a material, but scene '{scene}' never adds it to its listener"
+                raise SceneError(what, f"add it there, or name who is added: {', '.join(added) or 'nobody'}")
+
 
 def as_choice(
     material: str | Path | Material | None = None,

@@ -170,6 +170,33 @@ def test_a_script_with_a_listener_of_its_own_is_overridden() -> None:
     assert made_of()["beam"] == "steel" and sorted(map(str, made_of().values())) == ["steel", "wood"]
 
 
+OWN = """
+import sonic_bullet as sb
+listener = sb.attach(p, microphone=(0, -1, 0.5))
+{add}
+for _ in range(20):
+    p.stepSimulation()
+    listener.step()
+"""
+
+
+@pytest.mark.parametrize(
+    ("add", "options", "asked", "added"),
+    [
+        ('listener.add(1, material="wood", name="beam")', ("--material", "body 0=steel"), "body 0", "beam"),
+        ('listener.add(0, material="wood")', ("--material", "bar=steel", "--silent", "body 0"), "bar", "body 0"),
+        ("", ("--material", "bar=steel"), "bar", "nobody"),
+    ],
+)
+def test_a_name_that_the_scripts_own_listener_never_adds_is_said(
+    add: str, options: tuple[str, ...], asked: str, added: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    Path("never.py").write_text(SCRIPT.partition("for _ in")[0] + OWN.format(add=add))
+    said = error_of(capfd, "render", "never.py", "-o", "no.wav", *options)
+    assert f"'{asked}' is given a material, but scene 'never.py' never adds it to its listener" in said
+    assert f"add it there, or name who is added: {added}" in said
+
+
 @pytest.mark.parametrize("silent", ["bar", "ball"])
 def test_a_silent_body_is_left_out_of_the_sound_alone(silent: str) -> None:
     """Scene and log give the same bytes, and what is missing of the mix is that body's stem."""

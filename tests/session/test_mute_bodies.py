@@ -83,3 +83,22 @@ def test_the_listener_names_them_too() -> None:
         notes = listener.notes
     assert len(notes) == 2 and "far" in notes[0] and "crumb" in notes[1]
     assert not any("bell" in note for note in notes)
+
+
+def test_ground_that_nobody_reaches_is_not_missed(tmp_path: Path) -> None:
+    """It is a silent partner in any case, and named as ground, once."""
+    (tmp_path / "script.py").write_text("""
+import pybullet as p, pybullet_data
+p.connect(p.DIRECT)
+p.setAdditionalSearchPath(pybullet_data.getDataPath())
+p.setGravity(0, 0, -9.81)
+p.loadURDF("plane.urdf", [0, 0, -9])
+for z in (0, 0.055):
+    p.loadURDF("cube_small.urdf", [0, 0, z])
+p.resetBaseVelocity(2, [0, 0, -1])
+for _ in range(24):
+    p.stepSimulation()
+""")
+    notes = render_scene(tmp_path / "script.py", sr=8000).notes
+    assert [note for note in notes if "plane" in note] == [note for note in notes if "is ground" in note]
+    assert not any("touched by nobody" in note for note in notes)

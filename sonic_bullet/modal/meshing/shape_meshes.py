@@ -16,7 +16,7 @@ from sonic_bullet.modal.meshing.filling import LATTICE_WALL, WHOLE_FACES, Filler
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
-from sonic_bullet.modal.ordering import dissection
+from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 

@@ -60,7 +60,7 @@ def series(section: Section, tensors: list[Array]) -> Series:
     """The problems on a section for isotropic tensors (6, 6) in order rr zz θθ zθ rθ rz, at density one."""
     from scipy.sparse import csr_array
 
-    from sonic_bullet.modal.ordering import dissection
+    from sonic_bullet.modal.sparse.ordering import dissection
 
     basis = section.basis
     r = np.asarray(basis.global_coordinates())[0]  # (t, q)
