@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.next_measurement import next_measurement as of_fit
 
@@ -30,7 +31,7 @@ def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
     slope = left["slope_against_impulse"]
     if len(end.judged) == 1:
         yield "strike the same place again, three times or more: no effect can be told by one strike"
-    if any(c.id == "room" and c.mean_db > 0 for c in end.tried) and most != "first":
+    if any(isinstance(c.effect, Dereverberates) and c.mean_db > 0 for c in end.tried) and most != "first":
         yield "record at half the distance and at twice it: what the room adds stays, what the body radiates does not"
     if slope is not None and abs(slope) > SLOPE:
         yield "strike one place at five strengths from soft to hard, force recorded: what is left goes with strength"
