@@ -78,7 +78,7 @@ def _predicted(found: Any, folder: str) -> int:
 
 def _summary(found: Any) -> str:
     """For people."""
-    from sonic_bullet.diagnosis.next_measurement import next_measurement
+    from sonic_bullet.diagnosis.deciding_measurement import next_measurement
     from sonic_bullet.diagnosis.remainder import NOTHING
     from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 

@@ -150,7 +150,7 @@ def _unit(name: str, one: dict[str, Any]) -> Point | None:
 
 def described(found: Any) -> dict[str, Any]:
     """What --json writes: the fit, no NaN (None where not identifiable)."""
-    from sonic_bullet.estimator.fit.next_measurement import next_measurement
+    from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
     fit = found.fit
     return {
@@ -198,7 +198,7 @@ def line_rows(found: Any) -> list[dict[str, Any]]:
 
 
 def _summary(found: Any) -> str:
-    from sonic_bullet.estimator.fit.next_measurement import next_measurement
+    from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
     fit = found.fit
     sd = np.sqrt(np.diag(fit.covariance))

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.diagnosis.deciding_measurement import next_measurement
 from sonic_bullet.diagnosis.evidence.baseline import baseline
-from sonic_bullet.diagnosis.next_measurement import next_measurement
 from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
 from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each

@@ -12,8 +12,8 @@ import pytest
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import fit_case
-from sonic_bullet.estimator.fit.next_measurement import next_measurement
-from sonic_bullet.estimator.fit.plausible_preset import with_shipped_damping
+from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
+from sonic_bullet.estimator.fit.takes.plausible_preset import with_shipped_damping
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array, Material

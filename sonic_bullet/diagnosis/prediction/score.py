@@ -1,6 +1,6 @@
 """How far what is played is from what was recorded, over the recording's noise: the distance that `fit` prints.
 
-D(recorded, g·played + noise's power), D of a noisy take of what is played        (estimator.fit.best_gain)
+D(recorded, g·played + noise's power), D of a noisy take of what is played        (estimator.fit.takes.best_gain)
     g: 1 where the impulse is known, else the best
 
 comparable(takes, made) is the one door: what has no distance stays outside, by name and with its reason, and what is
@@ -22,8 +22,8 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.estimator.fit.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.estimator.lines.log_spectral import (
     ABOVE,
     WINDOWS,

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.estimator.fit.case_fit import NO_GAIN, TakeDistance
-from sonic_bullet.estimator.fit.plausible_preset import plausible_sound
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_modes
 from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
+from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain
+from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.estimator.fit.typical_strike import strike_lines
 from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, power_spectra
 from sonic_bullet.files.cases import CaseRecording

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.effects.common.hum import without_hum
-from sonic_bullet.estimator.fit.impact_check import describe_no_impacts
 from sonic_bullet.estimator.fit.observation import Observation, observation
+from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit

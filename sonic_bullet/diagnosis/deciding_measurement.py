@@ -10,7 +10,7 @@ from typing import Any
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
 from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.next_measurement import next_measurement as of_fit
+from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement as of_fit
 
 DIFFERS = 0.5
 """Standard deviation of ln of what is left, over strikes: more goes with the place or the strike."""
