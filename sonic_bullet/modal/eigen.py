@@ -108,6 +108,6 @@ def _checked(value: Array, vector: Array, rigid: int) -> Modes:
         shown = ", ".join(f"{v:.3g}" for v in value[: rigid + 2])
         raise ModalError(
             f"body has not {rigid} rigid modes: eigenvalues start {shown}",
-            "its parts must hang together: repair the mesh",
+            "its parts must hang together, its walls be thicker than a 700th of its length: repair the mesh",
         )
     return Modes(np.array(elastic), vector[:, rigid:], np.array(value[:rigid]))

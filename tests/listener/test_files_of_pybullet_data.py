@@ -10,18 +10,21 @@ import pytest
 
 from tests.made.robots import CANNOT_BE_LOADED, ONE_A_KIND, STEPS, all_files
 
-BOUND_S = 240
+BOUND_S, CODE_S, BOUND_MB = 60, 120, 2000
+"""Of processor and memory, a body; for machine code and what is not a body's: once a process."""
+LONGEST_S = 3600
 
 
 def heard(name: str, *how: str) -> None:
     command = [sys.executable, "-m", "tests.made.robots", name, *how]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=BOUND_S, errors="replace", check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, errors="replace", check=False)
     assert "Traceback" not in done.stderr, done.stderr[-2000:]
     assert done.returncode == CANNOT_BE_LOADED.get(name, 0), done.stderr[-2000:]
     if not done.returncode:
         told = json.loads(done.stdout.splitlines()[-1])
         assert told["steps"] == STEPS
         assert all("silent partner" in note for note in told["notes"])
+        assert told["processor_s"] <= BOUND_S * told["links"] + CODE_S and told["memory_mb"] <= BOUND_MB
 
 
 @pytest.mark.parametrize("name", ONE_A_KIND)

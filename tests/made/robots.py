@@ -1,12 +1,13 @@
 """A file of pybullet_data in a world of its own, heard for 100 steps as `render` would hear it: one a process.
 
-python -m tests.made.robots FILE [sound]     -> a line of JSON: links, notes, steps
+python -m tests.made.robots FILE [sound]     -> a line of JSON: links, notes, steps, processor_s, memory_mb
 """
 
 from __future__ import annotations
 
 import json
 import random
+import resource
 import sys
 import warnings
 from functools import partial
@@ -67,7 +68,14 @@ def listen(name: str, *, sound: bool) -> dict[str, object]:
         client.stepSimulation()
     if sound:
         assert np.isfinite(listener.sound()).all()
-    return {"links": len(links), "notes": notes, "steps": len(listener.contacts.steps)}
+    own, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return {
+        "links": len(links),
+        "notes": notes,
+        "steps": len(listener.contacts.steps),
+        "processor_s": sum(use.ru_utime + use.ru_stime for use in (own, others)),
+        "memory_mb": max(own.ru_maxrss, others.ru_maxrss) / (1 << 20 if sys.platform == "darwin" else 1 << 10),
+    }
 
 
 if __name__ == "__main__":
