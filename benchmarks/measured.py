@@ -37,6 +37,7 @@ COLUMNS = (
     "held out",
     "silence",
     "another take",
+    "guessed material",
     "fitted",
     "with residual",
     "`diagnose`, before",
@@ -52,11 +53,9 @@ and `diagnose` say of recordings that somebody else made.
 Every second take is held out, of at most {most} takes of an object. Distances are log-spectral, in dB, over what
 stands 10 dB above the noise in the case's band. They are means over the takes held out. *Silence* and *another take*
 (the nearest) stand beside them. *Fitted* and *with residual* are what `fit` and `residual` print: one gain a take where
-no impulse is known. *Before* and *with effects* are the errors that `diagnose` judges by on the takes held out. It fits
-no gain a take: compare them with each other alone. The eight takes of the bowl are microphones of one stroke.
-
-An untouched preset of the tables has no row, for no command says how far it is. Nor does `diagnose` say which one
-measurement would decide. Its warnings say what the recordings lack.
+no impulse is known. *Guessed material* is the shipped preset that was guessed, on the object's mesh where there is one,
+at its best gain. *Before* and *with effects* are the errors of `diagnose` on the takes held out, by the same measure.
+The eight takes of the bowl are microphones of one stroke. Under *next* stands the one measurement that would decide.
 """
 Piece = tuple[Path, float, float]
 Said = dict[str, dict[str, Any]]
@@ -173,7 +172,7 @@ def _takes(said: Said, command: str, split: str = "holdout") -> list[dict[str, A
 
 
 def _mean(takes: list[dict[str, Any]], name: str) -> float:
-    values = [t[name] for t in takes if t[name] is not None and np.isfinite(t[name])]
+    values = [t[name] for t in takes if t.get(name) is not None and np.isfinite(t[name])]
     return float(np.mean(values)) if values else float("nan")
 
 
@@ -199,6 +198,7 @@ def row(thing: Object, said: Said) -> list[str]:
     values = (
         _mean(fitted, "silence_db"),
         _mean(fitted, "other_take_db"),
+        _mean(fitted, "plausible_db"),
         _mean(fitted, "predicted_db"),
         _mean(beside, "predicted_db"),
         before,
@@ -216,6 +216,7 @@ def own_row(thing: Object, said: Said) -> list[str]:
 
 def words(thing: Object, said: Said) -> str:
     """What the commands say of an object and of what is left, and the line of each that was refused."""
+    following = said["diagnose"].get("next_measurement") or said["fit"].get("next_measurement")
     left = (said["diagnose"].get("unexplained") or {}).get("words", "")
     lines = [
         *(f"{name} refused: {said[name]['error']}" for name in COMMANDS if "error" in said[name]),
@@ -225,6 +226,7 @@ def words(thing: Object, said: Said) -> str:
             for e in said["diagnose"].get("effects", [])
         ),
         *([f"left: {left}"] if left else []),
+        *([f"next: {following}"] if following else []),
         *(f"warned: {one.split('/')[-1]}" for one in said["diagnose"].get("warnings", [])),
     ]
     return "\n".join([thing.name, *(_wrapped(f"  {line}", "    ") for line in lines)])

@@ -78,6 +78,7 @@ def _predicted(found: Any, folder: str) -> int:
 
 def _summary(found: Any) -> str:
     """For people."""
+    from sonic_bullet.diagnosis.deciding_measurement import next_measurement
     from sonic_bullet.diagnosis.remainder import NOTHING
     from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 
@@ -121,6 +122,8 @@ def _summary(found: Any) -> str:
         )
     if found.unexplained:
         text.append(f"left: {found.unexplained['words']}")
+    if said := next_measurement(found.found, found.closed, found.unexplained):
+        text.append(f"next: {said}")
     return "\n".join(text)
 
 

@@ -150,18 +150,21 @@ def _unit(name: str, one: dict[str, Any]) -> Point | None:
 
 def described(found: Any) -> dict[str, Any]:
     """What --json writes: the fit, no NaN (None where not identifiable)."""
+    from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
+
     fit = found.fit
     return {
         "alpha_per_s": fit.alpha_per_s,
         "beta_s": fit.beta_s,
-        "gamma_m2_s2": fit.gamma_m2_s2,
+        "gamma_m2_s2": fit.gamma_m2_s2 if found.has_material else None,
         "sigma": fit.sigma,
-        "poisson_ratio": fit.poisson_ratio,
+        "poisson_ratio": fit.poisson_ratio if found.has_material else None,
         "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
         "verdict": fit.verdict,
         "metric": fit.metric if fit.metric >= 0 else None,
         "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
         "takes": [asdict(take) for take in found.takes],
+        "next_measurement": next_measurement(found),
         "modes": [
             {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
             for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
@@ -195,6 +198,8 @@ def line_rows(found: Any) -> list[dict[str, Any]]:
 
 
 def _summary(found: Any) -> str:
+    from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
+
     fit = found.fit
     sd = np.sqrt(np.diag(fit.covariance))
 
@@ -203,15 +208,14 @@ def _summary(found: Any) -> str:
             spread
         ) else "not identifiable"
 
-    rows = [
-        ("alpha in 1/s", *shown(fit.alpha_per_s, sd[0])),
-        ("beta in s", *shown(fit.beta_s, sd[1])),
+    rows = [("alpha in 1/s", *shown(fit.alpha_per_s, sd[0])), ("beta in s", *shown(fit.beta_s, sd[1]))]
+    rows += [
         ("E/density in m²/s²", *shown(fit.gamma_m2_s2, sd[2])),
         ("E in Pa", *shown(found.youngs_pa, sd[2])),
         ("density in kg/m³", f"{found.density_kg_m3:.6g}", "the guess's"),
         ("Poisson's ratio", *shown(fit.poisson_ratio, sd[4], False)),
         ("sigma", *shown(fit.sigma, sd[3])),
-    ]
+    ] * found.has_material
     paired = sum(int((o.line >= 0).sum()) for o in found.objects)
     lines = sum(len(e.lines.freq_hz) for e in found.evidence)
     correction: Array = (
@@ -241,4 +245,6 @@ def _summary(found: Any) -> str:
     if found.log_spectral_db >= 0:
         text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
     text += take_tables(found.takes)
+    if said := next_measurement(found):
+        text.append(f"next: {said}")
     return "\n".join(text)

@@ -74,14 +74,17 @@ def take_tables(takes: Any) -> list[str]:
 
     held = all(t.split == "holdout" for t in takes)
     head = "takes that were not fitted" if held else "takes, as none is held out"
+    guessed = any(math.isfinite(t.plausible_db) for t in takes)
+    columns = ("predicted", "silence", "nearest other take", *(["the guessed material"] if guessed else []), "gain")
     rows = [
         (
             t.file,
             shown(t.predicted_db),
             shown(t.silence_db),
             shown(t.other_take_db),
+            *([shown(t.plausible_db)] if guessed else []),
             ("fitted" if t.gain else NO_GAIN) if t.free_gain else "known",
         )
         for t in takes
     ]
-    return [table((head, "predicted", "silence", "nearest other take", "gain"), rows)]
+    return [table((head, *columns), rows)]

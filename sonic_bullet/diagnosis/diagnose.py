@@ -3,8 +3,8 @@
     read the 'fit' strikes -> fit the baseline (baseline.py) -> select effects (stepwise.py) -> verdict, errors on all
         splits, predictions
 
-Nothing of 'holdout' and 'transfer' is opened before the selection has ended; where their audio is there, it is compared
-at the very end and changes nothing.
+Of 'holdout' the baseline is asked whether it is nearer than silence, as `fit` asks: else there is nothing to select
+from. Apart from that nothing of 'holdout' and 'transfer' changes anything; they are compared at the very end.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.diagnosis.deciding_measurement import next_measurement
 from sonic_bullet.diagnosis.evidence.baseline import baseline
 from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
 from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
-from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db
+from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db, take_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import listing, remainder
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, until_it_breaks_off
+from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, recorded_signals
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
@@ -89,9 +90,18 @@ def diagnose(
     recorded = gather(case, cache=cache, progress=progress, clipped=True)
     start = baseline(case, recorded, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes
-    end = closed(start.hypothesis, bodies, takes or listed(bodies), effects, case.band_hz, seed=seed, progress=progress)
-    say("comparing with what was not fitted")
     every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
+    end = closed(
+        start.hypothesis,
+        bodies,
+        takes or listed(bodies),
+        effects,
+        case.band_hz,
+        seed=seed,
+        progress=progress,
+        against_silence=[t for t in every["holdout"] if t.body.recorded is not None],
+    )
+    say("comparing with what was not fitted")
     errors: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     sone: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     out: dict[str, tuple[LeftOut, ...]] = {"fit": end.left_out} if end.left_out else {}
@@ -160,14 +170,12 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
 def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], split: str) -> tuple[Take, ...]:
     """Strikes of another split whose audio is there."""
     found = []
-    for body in bodies:
+    for body in bodies if takes else ():
+        thing = body.recorded.thing if body.recorded is not None else case.objects[body.name]
         for i, r in enumerate(body.recordings):
-            if r.split != split or r.file is None or not r.file.is_file() or not takes:
-                continue
-            sample, sr, _ = read_channel(r.file, r.channel)
-            sound = until_it_breaks_off(sample, sr)
-            start = round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr)
-            found.append(Take(body, i, sound[start:], sr, takes[0].floor))
+            if r.split == split and r.file is not None and r.file.is_file():
+                (signal,), sr = recorded_signals(case, thing, (r,))
+                found.append(take_of(body, i, signal, sr))
     return tuple(found)
 
 
@@ -235,14 +243,15 @@ def described(d: Diagnosis) -> dict[str, Any]:
         "errors_sone": d.errors_sone,
         **({"errors_lines": d.errors_lines} if d.errors_lines else {}),
         "unexplained": d.unexplained,
+        "next_measurement": next_measurement(d.found, d.closed, d.unexplained),
         "not_compared": [
             {"split": split, "name": one.name, "why": one.why} for split, left in d.not_compared.items() for one in left
         ],
         "baseline": {
             "alpha_per_s": d.closed.before.alpha_per_s,
             "beta_s": d.closed.before.beta_s,
-            "gamma_m2_s2": d.found.fit.gamma_m2_s2,
-            "poisson_ratio": d.found.fit.poisson_ratio,
+            "gamma_m2_s2": d.found.fit.gamma_m2_s2 if d.found.has_material else None,
+            "poisson_ratio": d.found.fit.poisson_ratio if d.found.has_material else None,
             "gain": d.closed.before.gain,
             "correction_rms": {
                 b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0

@@ -138,8 +138,7 @@ def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Arr
         floor = np.array([noise[bins == i].sum() for i in range(len(edges) - 1)])
         clear = own > 4 * floor
         rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))
-        j = take.body.impulse_n_s[take.strike]
-        level.append(float(j) if np.isfinite(j) else 1.0)
+        level.append(float(take.body.level_n_s[take.strike]))
     if not rows:
         return np.zeros((1, 3, len(edges) - 1)), edges, np.ones(1)
     return np.array(rows), edges, np.array(level)

@@ -27,6 +27,7 @@ KEYS = {
     "metric",
     "log_spectral_db",
     "takes",
+    "next_measurement",
     "modes",
     "lines",
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.fit.best_gain import distance_at, find_best_gain
+from sonic_bullet.estimator.fit.takes.best_gain import distance_at, find_best_gain
 from sonic_bullet.estimator.lines.log_spectral import power_spectra, white
 from sonic_bullet.records import Array
 

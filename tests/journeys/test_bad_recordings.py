@@ -193,3 +193,16 @@ def test_any_rate_gives_the_same_modes(sr: int, said: str, capfd: pytest.Capture
     assert [row["freq_hz"] for row in rows] == pytest.approx([f for f, _, _ in MODES], rel=1e-5)
     assert [row["decay_per_s"] for row in rows] == pytest.approx([d for _, d, _ in MODES], rel=0.01)
     assert said in check_fit(capfd)[1]
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [speech(120, 1), speech(210, 2), speech(110, 9), speech(230, 7), rain(700, 5)],
+    ids=["speech", "high speech", "last syllable", "higher speech", "rain"],
+)
+def test_fit_of_what_is_no_impact_writes_no_preset(sound: Array, capfd: pytest.CaptureFixture[str]) -> None:
+    soundfile.write("x.wav", sound, SR, subtype="FLOAT")
+    status, said = check_fit(capfd)
+    assert status == 2 and "no impact found: " in said and "record one impact" in said
+    assert not Path("fit.json").exists()
+    assert run("diagnose", "mine") == 2

@@ -44,11 +44,11 @@ LOUD = {
 
 def test_a_row_holds_the_means_over_takes_held_out_alone() -> None:
     cells = row(_object("mug"), MUG)
-    assert cells == ["mug", "2", "22.0", "5.0", "9.0", "6.0", "9.0", "6.5", "`damping-law`"]
+    assert cells == ["mug", "2", "22.0", "5.0", "-", "9.0", "6.0", "9.0", "6.5", "`damping-law`"]
     assert row(_object("bell"), BELL)[1:4] == ["0", "-", "-"]
     assert own_row(_object("bell"), BELL) == ["bell", "30.0", "3.0", "-", "none"]
     assert row(_object("cup"), CUP)[-1] == "refused"
-    assert row(_object("loud"), LOUD)[6:] == ["25.0", "-", "unexplained"], "no error with effects where none is named"
+    assert row(_object("loud"), LOUD)[7:] == ["25.0", "-", "unexplained"], "no error with effects where none is named"
 
 
 def test_a_refusal_is_said_with_its_line_and_counted() -> None:

@@ -17,10 +17,11 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.degenerate_pairs import separated
 from sonic_bullet.diagnosis.evidence.recording_chain import LINKS, share, unchained
 from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.evidence.strike_levels import with_levels
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db, predict_takes
+from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db, predict_takes, take_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.effects.measurement_chain import limit_of
@@ -28,7 +29,6 @@ from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import fit_evidence
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
-from sonic_bullet.estimator.lines.log_spectral import floor_between, white
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
@@ -140,21 +140,23 @@ def _off_db(b: Baseline) -> float:
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
     found = fit_evidence(case, recorded, total=True, progress=progress)
-    bodies = (
-        struck_bodies(found, cache=cache, progress=progress)
-        if found.objects and not all(_unplaced(one) for one in recorded)
-        else tuple(shapeless(found, g) for g in recorded)
-    )
-    bodies = with_elastic(found, tuple(separated(body) for body in bodies), cache=cache, progress=progress)
+    lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g)}
+    shaped = struck_bodies(found, cache=cache, progress=progress) if len(lines) < len(recorded) else ()
+    bodies = (*(body for body in shaped if body.name not in lines), *lines.values())
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
+    bodies = tuple(with_levels(separated(body), gain) for body in bodies)
+    bodies = with_elastic(found, bodies, cache=cache, progress=progress)
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
     bodies = settled(refitted(base, bodies), bodies)
     return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
 
 
-def _unplaced(one: Recorded) -> bool:
-    """Whether an object was recorded, and nobody says where it was struck: its modes' levels are then unknown."""
-    return one.signals is not None and all(r.position_m is None for r in one.recordings)
+def _shaped(found: CaseFit, one: Recorded) -> bool:
+    """Whether an object is played by the modes of its shape, as `fit` plays it; of a list of lines, whether it has one:
+    frequencies tell of stiffness.
+    """
+    placed = any(r.position_m is not None for r in one.recordings)
+    return one.family is not None and (one.signals is None or (placed and found.plays_modes(one)))
 
 
 def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
@@ -163,10 +165,8 @@ def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
     for body in bodies:
         if body.recorded is None or body.recorded.signals is None:
             continue
-        finite = [signal for signal in body.recorded.signals if np.isfinite(signal).all()]
-        floor = floor_between(finite) if finite else white(np.inf)  # over which nothing stands
         takes += [
-            Take(body, i, sample, body.recorded.sr, floor)
+            take_of(body, i, sample, body.recorded.sr)
             for i, sample in zip(body.fitted, body.recorded.signals, strict=True)
         ]
     return tuple(takes)

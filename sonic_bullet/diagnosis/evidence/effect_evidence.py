@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import fallen
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
-from sonic_bullet.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted, start
+from sonic_bullet.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
@@ -49,7 +49,7 @@ def object_evidence(
     line, mode = paired(p, anew=anew)
     mine = body.fitted[: len(lines.amplitude)]
     rows = p.pattern()[mine]
-    push = rows * start(body.kind, model) * in_band(body, model)
+    push = rows * p.start(mine) * in_band(body, model)
     direct = path_response(h, model.freq_hz, recorded.sr) if recorded.signals is not None else np.ones(model.mode_count)
     pressed = np.stack([p.impact(i).spectrum(model.freq_hz) for i in mine])
     spectrum = pressed * direct
@@ -63,13 +63,14 @@ def object_evidence(
     own_hz = dict(zip(plain.order.tolist(), plain.model.freq_hz, strict=True))
     model_hz = np.array([np.mean([own_hz.get(int(p.order[k]), model.freq_hz[k]) for k in m]) for m in mode])
     gone = named(h, lines) & sounds  # else they are in the recordings, and neighbours
-    rest = np.setdiff1d(np.flatnonzero(~gone), line)
+    # beside lines that stand for modes there is only the attack
+    rest = np.setdiff1d(np.flatnonzero(~gone), line) if body.family is not None else np.zeros(0, int)
     predicted = own = None
     if sounds and recorded.signals is not None:
         predicted, own = _played(p, mine, recorded.signals)
     count = body.surface_count(model)
     observed = ObjectEvidence(
-        impulse_n_s=body.impulse_n_s[mine],
+        impulse_n_s=body.level_n_s[mine],
         freq_hz=lines.freq_hz[line],
         decay_per_s=lines.decay_per_s[line],
         freq_sd_hz=lines.freq_sd_hz[line],

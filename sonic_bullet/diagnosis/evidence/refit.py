@@ -254,7 +254,8 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     modeled, seen, spread = [], [], []
     others = bool(h.at(Stage.MODES)) and not moves(h)  # participations than the evidence's own
     for one in observed:
-        if not len(one.freq_hz) or one.signal is None:
+        lines_play = _whose(one, bodies).own_decay_per_s is not None and not h.effects  # as loud as `fit` plays them
+        if not len(one.freq_hz) or one.signal is None or lines_play:
             continue
         p = predict(h, _whose(one, bodies)) if others or bends(h) else None
         direct = np.abs(path_response(h, one.freq_hz, one.sr))

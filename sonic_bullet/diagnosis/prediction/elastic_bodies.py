@@ -54,6 +54,7 @@ def with_elastic(
                     found.case,
                     body.name,
                     body.recordings,
+                    body.level_n_s,
                     material,
                     count,
                     cache=cache,
@@ -68,6 +69,7 @@ def elastic_of(
     case: Case,
     name: str,
     recordings: tuple[CaseRecording, ...],
+    level_n_s: Array,
     material: Material,
     count: int,
     *,
@@ -76,7 +78,8 @@ def elastic_of(
 ) -> Elastic:
     """An object's.
 
-    material: isotropic, as fitted; count: of modes wanted. Raises nothing now; SonicBulletError when first asked.
+    level_n_s (s,): impulses, see `Struck`; material: isotropic, as fitted; count: of modes wanted. Raises nothing now;
+    SonicBulletError when first asked.
     """
     thing = case.objects[name]
 
@@ -99,9 +102,7 @@ def elastic_of(
         for i, r in enumerate(recordings):
             if r.position_m is not None:
                 direction = np.array(r.direction, float) if r.direction is not None else inward(body, r.position_m)
-                strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * (
-                    1.0 if r.impulse_n_s is None else r.impulse_n_s
-                )
+                strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * level_n_s[i]
         at, along = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
         if case.sensor != "velocity" or at is None:
             return strike, None

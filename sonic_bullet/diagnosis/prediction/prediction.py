@@ -64,9 +64,16 @@ class Prediction:
         """J ψ (s, m) of its modes; see the function."""
         return pattern(self.body, self.model)
 
+    def start(self, strikes: list[int]) -> Array:
+        """Complex factors (s, m) of the amplitudes of some strikes: the phases that modes start with."""
+        own = self.body.own_phase
+        if own is None:
+            return np.tile(start(self.body.kind, self.model), (len(strikes), 1))
+        return np.asarray(own[strikes][:, self.order])
+
     def impact(self, strike: int) -> Impact:
         """What the strike is."""
-        return impact_of(float(self.body.impulse_n_s[strike]), self.acting(Stage.FORCE))
+        return impact_of(float(self.body.level_n_s[strike]), self.acting(Stage.FORCE))
 
     def ring(self, strike: int) -> Ring:
         """The modes as a strike starts them, before its pulse's spectrum; those outside the band are silent."""
@@ -81,7 +88,7 @@ class Prediction:
         ring = Ring(
             model.freq_hz,
             model.decay_per_s,
-            self.hypothesis.gain * row * start(body.kind, model),
+            self.hypothesis.gain * row * self.start([strike])[0],
             np.abs(impact.impulse_n_s * push) * most,
             none,
             none,
@@ -133,7 +140,7 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
         correction = none
     last = mixes(h)
     lam = (2 * np.pi * base.freq_hz * (1 + (none if last else correction)) * np.exp(h.stretch)) ** 2
-    decay = (h.alpha_per_s + h.beta_s * lam) / 2
+    decay = (h.alpha_per_s + h.beta_s * lam) / 2 if body.own_decay_per_s is None else body.own_decay_per_s
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
     for effect in sorted(
         h.at(Stage.MODES, fitted=fitted), key=lambda e: e.owner is not Owner.MATERIAL
@@ -150,8 +157,8 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
 
 
 def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:
-    """A strike under the effects on its force; impulse_n_s: NaN where unknown."""
-    impact = Impact(impulse_n_s if np.isfinite(impulse_n_s) else 1.0, np.zeros(1), np.ones(1))
+    """A strike under the effects on its force."""
+    impact = Impact(impulse_n_s, np.zeros(1), np.ones(1))
     for effect in effects:
         impact = effect.apply(impact)
     return impact
@@ -188,11 +195,10 @@ def came_from(old: ModalModel, new: ModalModel) -> Array:
 
 
 def pattern(body: Struck, model: ModalModel) -> Array:
-    """J ψ (s, m), real, of the body's strikes at the sensor; J = 1 where it is not known."""
+    """J ψ (s, m), real, of the body's strikes at the sensor; J about 1 where it is not known."""
     at = model.shape[body.surface_count(model) :].astype(float)
     row = np.einsum("sxm,sx->sm", at, body.direction)
-    level = np.where(np.isfinite(body.impulse_n_s), body.impulse_n_s, 1.0)
-    return np.asarray(level[:, None] * row[:-1] * row[-1])
+    return np.asarray(body.level_n_s[:, None] * row[:-1] * row[-1])
 
 
 def in_band(body: Struck, model: ModalModel) -> Array:

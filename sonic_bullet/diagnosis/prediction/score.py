@@ -1,6 +1,7 @@
-"""How far what is played is from what was recorded, over the noise that all recordings of a case share.
+"""How far what is played is from what was recorded, over the recording's noise: the distance that `fit` prints.
 
-D(recorded, played + noise), D of two noisy takes of what is played                       (estimator.lines.log_spectral)
+D(recorded, g·played + noise's power), D of a noisy take of what is played        (estimator.fit.takes.best_gain)
+    g: 1 where the impulse is known, else the best
 
 comparable(takes, made) is the one door: what has no distance stays outside, by name and with its reason, and what is
 let in has one from what any hypothesis predicts, a plain float:
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NewType, Protocol
 
 import numpy as np
@@ -21,19 +23,21 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
+from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.estimator.lines.log_spectral import (
     ABOVE,
     WINDOWS,
     Floor,
-    log_spectral_db,
-    matching_gain,
-    noise_floor_db,
+    floor_between,
+    power_spectra,
+    white,
     with_noise,
 )
 from sonic_bullet.records import Array
 
-# rms of two noisy takes of a cell with power over noise ABOVE: each is off by 20/ln 10/√(2 ABOVE)
-EDGE_DB = float(20 / np.log(10) / np.sqrt(ABOVE))
+# rms of a noisy take of a cell with power over noise ABOVE
+EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * ABOVE))
+KEPT = 24  # takes whose spectra are kept
 
 
 class Judged(Protocol):
@@ -125,7 +129,7 @@ class Score:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
-    """A recorded strike: which of which body, its samples (n,) from the onset on, and the case's noise."""
+    """A recorded strike: which of which body, its samples (n,) from the onset on, and its noise."""
 
     body: Struck
     strike: int
@@ -150,7 +154,11 @@ class Take:
         return file.name if file is not None else f"{self.body.name}, strike {self.strike + 1}"
 
     def played(self, p: Prediction) -> Array:
-        """What is predicted of it (n,)."""
+        """What is predicted of it (n,), at the best gain where the impulse is not known."""
+        made = self._made(p)
+        return self._best(power_spectra(made)).gain * made if np.isfinite(made).all() else made
+
+    def _made(self, p: Prediction) -> Array:
         return p.sound(self.strike, len(self.sample), self.sr)
 
     def hindrance(self, p: Prediction) -> str:
@@ -159,7 +167,7 @@ class Take:
             return f"holds {wrong} samples that are no numbers"
         if len(self.sample) < min(WINDOWS):
             return f"holds {len(self.sample)} samples after the onset, and {min(WINDOWS)} are needed"
-        made = self.played(p)
+        made = self._made(p)
         if not np.isfinite(made).all():
             return "is played by the model with samples that are no numbers"
         if not np.isfinite(self._apart(made)):
@@ -171,28 +179,41 @@ class Take:
 
     def distance(self, p: Prediction) -> float:
         """D in dB of the recording and what is predicted; see the module's head."""
-        return self.apart_db(self.played(p))
+        return self.apart_db(self._made(p))
 
     def apart_db(self, made: Array) -> float:
         """D in dB of the recording and whatever is played in its place (n,)."""
         return _stated(self._apart(made)) if np.isfinite(made).all() else np.inf
 
     def _apart(self, made: Array) -> float:
-        noisy = with_noise(self._gain(made) * made, self.floor, self.strike)
-        return log_spectral_db(self.sample, noisy, self.floor)
+        return self._best(power_spectra(made)).distance_db
 
-    def _gain(self, made: Array) -> float:
-        """1 where the strike's impulse is known; else that which makes the mean level of both the same, in dB over
-        what stands above the noise: near the one of least D.
-        """
-        if np.isfinite(self.body.impulse_n_s[self.strike]) or not made.any():
-            return 1.0
-        return matching_gain(self.sample, made, self.floor)
+    def _best(self, power: tuple[Array, ...]) -> BestGain:
+        """The gain of what is played, by its powers, and D there: 1 where the strike's impulse is known."""
+        recorded, floor = _spectra(self)
+        if np.isfinite(self.body.impulse_n_s[self.strike]):
+            return BestGain(1.0, distance_at(recorded, power, floor, 1.0))
+        return find_best_gain(recorded, power, floor)
 
     def least(self, p: Prediction) -> float:
-        """D of two noisy takes of what is predicted."""
-        made = self.played(p)
-        return _stated(noise_floor_db(self._gain(made) * made, self.floor))
+        """D of a noisy take of what is predicted."""
+        made = self._made(p)
+        power = power_spectra(made)
+        gain = self._best(power).gain
+        again = power_spectra(with_noise(gain * made, self.floor, self.strike))
+        return _stated(distance_at(again, power, _spectra(self)[1], gain))
+
+
+@lru_cache(maxsize=KEPT)
+def _spectra(take: Take) -> tuple[tuple[Array, ...], Floor]:
+    """Powers of a take, and its noise in the band that is recorded."""
+    return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)
+
+
+def take_of(body: Struck, strike: int, sample: Array, sr: int) -> Take:
+    """A recorded strike with the noise that its own end tells."""
+    finite = bool(np.isfinite(sample).all()) and len(sample) >= min(WINDOWS)
+    return Take(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
 
 
 def _stated(db: float) -> float:

@@ -4,8 +4,8 @@
         ModalModel
 
 An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain
-sum) is a last vertex whose x component is each mode's weight. Without a mesh the modes are the lines themselves, places
-as loud as they were recorded.
+sum) is a last vertex whose x component is each mode's weight. Without a mesh, or without a place, the modes are the
+lines that `fit` plays, with their own decays and phases.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from sonic_bullet.estimator.fit.case_fit import POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.radiation_share import into_air
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.recorded import body_family, guess_of
+from sonic_bullet.estimator.fit.typical_strike import ringing, strike_lines
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.isotropic_family import Family
@@ -37,7 +38,9 @@ class Struck:
     frequency, learnt on its fitted strikes, else 0. line (m,): the fitted line a mode was paired with, or -1. recorded:
     its fitted lines and sounds, None for an object nobody fitted. elastic: for tensors, see elastic_bodies.py. band_hz:
     nothing outside it is recorded, though its modes are in the model: a mesh may have put them there. other: ν -> the
-    model there, of as many modes. poisson: the same, cheap, for a search.
+    model there, of as many modes. poisson: the same, cheap, for a search. own_decay_per_s (m,): in place of a law of
+    the material; own_phase (s, m): that modes start with, of magnitude 1; None where the model says both. relative
+    (s,): impulses that are not known, over the mean of those; else 1.
     """
 
     name: str
@@ -54,6 +57,15 @@ class Struck:
     band_hz: tuple[float, float] = (0.0, float("inf"))
     other: Callable[[float], ModalModel] | None = None
     poisson: Poisson | None = None
+    own_decay_per_s: Array | None = None
+    own_phase: Array | None = None
+    relative: Array | None = None
+
+    @property
+    def level_n_s(self) -> Array:
+        """Impulses (s,); of strikes without one how they compare, about 1."""
+        rest = np.ones(self.strikes) if self.relative is None else self.relative
+        return np.where(np.isfinite(self.impulse_n_s), self.impulse_n_s, rest)
 
     @property
     def strikes(self) -> int:
@@ -205,35 +217,33 @@ def inward(family: Family, position: tuple[float, float, float]) -> Array:
 
 
 def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
-    """An object without a mesh: its lines are its modes.
+    """An object whose shape, or whose strikes' places, nobody knows: the lines that `fit` plays are its modes, as loud
+    and in the phases in which they were struck at each place on average; see `strike_lines`.
 
-    Strikes at one place, or at unknown places, share the amplitudes per N·s (rms over them); each other place has its
-    own.
-
-    What goes with the place is then nobody's to explain; a strike at a place that no fitted one was at is played as the
-    rms over all.
+    What goes with the place is then nobody's to explain. Of a list of lines all are modes, of unknown phase.
     """
-    lines = recorded.lines
+    lines, listed = recorded.lines, recorded.signals is None
     mine = tuple(r for r in found.case.recordings if r.object == recorded.recordings[0].object)
-    impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
-    weight = amplitude_per_impulse(recorded)
-    shape = np.zeros((len(mine) + 1, 3, len(lines.freq_hz)), np.float32)
-    shape[:, 0] = 1.0
-    shape[-1, 0] = weight
-    for place in {(r.position_m, r.direction) for r in recorded.recordings if r.position_m is not None}:
-        here = np.array([(r.position_m, r.direction) == place for r in recorded.recordings])
-        own = amplitude_per_impulse(recorded, here) * np.where(np.nansum(lines.amplitude[here].real, axis=0) < 0, -1, 1)
-        shape[[i for i, r in enumerate(mine) if (r.position_m, r.direction) == place], 0] = np.nan_to_num(
-            own / np.maximum(weight, 1e-300)
-        )
-    direction = np.tile([1.0, 0, 0], (len(mine) + 1, 1))
+    line = np.arange(len(lines.freq_hz)) if listed else ringing(lines)
     undamped = np.hypot(2 * np.pi * lines.freq_hz, np.nan_to_num(lines.decay_per_s)) / (2 * np.pi)
-    order = np.argsort(undamped)
+    line = line[np.argsort(undamped[line], kind="stable")]
+    place = np.argsort(np.argsort(lines.freq_hz[line], kind="stable"))  # of a line among those by frequency
+    amplitude, known = np.ones((len(mine), len(line)), complex), np.zeros(len(mine), bool)
+    for i, r in enumerate(mine):
+        if listed:
+            amplitude[i] = np.sqrt(np.nanmean(np.abs(lines.amplitude[:, line]) ** 2, axis=0))
+        else:
+            typical, known[i] = strike_lines(recorded, r)
+            amplitude[i] = typical.amplitude[place]
+    weight = np.sqrt((np.abs(amplitude) ** 2).mean(axis=0))
+    shape = np.zeros((len(mine) + 1, 3, len(line)), np.float32)
+    shape[:-1, 0] = np.nan_to_num(np.abs(amplitude) / np.maximum(weight, 1e-300))
+    shape[-1, 0] = weight
     empty = np.zeros((0, 3))
     model = ModalModel(
-        undamped[order],
-        np.zeros(len(order)),
-        shape[:, :, order],
+        undamped[line],
+        np.zeros(len(line)),
+        shape,
         np.zeros((len(shape), 3)),
         empty,
         np.zeros(0),
@@ -242,12 +252,17 @@ def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
         note="no mesh",
     )
     return Struck(
-        recorded.thing.name, mine, model, direction, impulse, "lines", None, np.zeros(len(order)), order, recorded
+        recorded.thing.name,
+        mine,
+        model,
+        np.tile([1.0, 0, 0], (len(mine) + 1, 1)),
+        np.array([r.impulse_n_s if k and r.impulse_n_s else np.nan for r, k in zip(mine, known, strict=True)]),
+        "lines",
+        None,
+        np.zeros(len(line)),
+        line,
+        recorded,
+        band_hz=found.case.band_hz,
+        own_decay_per_s=None if listed else lines.decay_per_s[line],
+        own_phase=None if listed else np.exp(1j * np.angle(amplitude)),
     )
-
-
-def amplitude_per_impulse(recorded: Recorded, of: Array | None = None) -> Array:
-    """Rms over the strikes, or over some (s,), of |A|/J (k,); J = 1 where it is not known."""
-    some = np.ones(len(recorded.recordings), bool) if of is None else of
-    level = np.array([r.impulse_n_s or 1.0 for r in recorded.recordings])[some]
-    return np.asarray(np.sqrt(np.nanmean(np.abs(recorded.lines.amplitude[some] / level[:, None]) ** 2, axis=0)))

@@ -252,7 +252,7 @@ def _cross_validated(
 
 
 def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
-    return np.array([f.take.body.impulse_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
+    return np.array([f.take.body.level_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
 
 
 def _augmented(fold: Fold, effect: Effect) -> Hypothesis:

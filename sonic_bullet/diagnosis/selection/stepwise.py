@@ -31,6 +31,7 @@ from sonic_bullet.diagnosis.prediction.score import (
     Take,
     comparable,
     mean_db,
+    predict_takes,
 )
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
@@ -106,21 +107,36 @@ def closed(
     *,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
+    against_silence: Sequence[Take] = (),
 ) -> Closed | NothingCompared:
-    """Select effects on fitted strikes alone, those that can be compared."""
+    """Select effects on fitted strikes alone, those that can be compared. against_silence: takes by which the baseline
+    is held against silence; the fitted ones where there are none.
+    """
     start = refitted(base, bodies)
     made = predict_each(start, (take.body for take in takes))
     found = comparable(takes, made)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
-    recorded = [take for take in found.takes if isinstance(take, Take)]
-    if recorded:
-        before = mean_db(Comparable(tuple(recorded)), made)
-        silence = float(np.mean([take.apart_db(np.zeros(len(take.sample))) for take in recorded]))
-        if before >= silence:
-            return WorseThanSilence(start, found.left_out, before, silence)
+    own = [take for take in found.takes if isinstance(take, Take)]
+    if worse := _worse_than_silence(start, against_silence or own, found.left_out):
+        return worse
     problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent)
     return _closed(start, made, problem, found.left_out)
+
+
+def _worse_than_silence(
+    start: Hypothesis, takes: Sequence[Take], left_out: tuple[LeftOut, ...]
+) -> WorseThanSilence | None:
+    """The verdict that the start is at least as far from takes as silence is, if it is; of takes that have a
+    distance.
+    """
+    made = predict_takes(start, takes)
+    held = comparable(takes, made)
+    if isinstance(held, Incomparable):
+        return None
+    before = mean_db(held.takes, made)
+    silence = float(np.mean([t.apart_db(np.zeros(len(t.sample))) for t in held.takes if isinstance(t, Take)]))
+    return WorseThanSilence(start, left_out, before, silence) if before >= silence else None
 
 
 def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:

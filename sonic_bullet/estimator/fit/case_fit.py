@@ -57,7 +57,8 @@ class TakeDistance:
     where nothing of it stands above its noise, or where there is no other take.
 
     free_gain: whether the prediction's gain was fitted to this take, its impulse or place being unknown. gain: that
-    gain, 0 where none makes it nearer than silence; else 1.
+    gain, 0 where none makes it nearer than silence; else 1. plausible_db: of the guessed material on the object's
+    shape, at its best gain; NaN where it has no mesh.
     """
 
     file: str
@@ -67,6 +68,7 @@ class TakeDistance:
     other_take_db: float
     free_gain: bool
     gain: float = 1.0
+    plausible_db: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,6 +99,17 @@ class CaseFit:
     radiation: RadiationIn = "damping"
     evidence: tuple[RecordedObject, ...] = ()
     takes: tuple[TakeDistance, ...] = ()
+
+    @property
+    def has_material(self) -> bool:
+        """Whether anybody says what is struck, by a shape or by a material: else no constant of one is known."""
+        return bool(self.objects) or any(r.object in self.case.objects for e in self.evidence for r in e.recordings)
+
+    def plays_modes(self, e: RecordedObject) -> bool:
+        """Whether an object's strikes at known places are played by the modes of its shape: where their gain is known
+        and the lines are modes, not by chance. Else by its lines, as struck on average.
+        """
+        return e.family is not None and bool(np.isfinite(self.gain_sd) and np.isfinite(self.fit.covariance[2, 2]))
 
     @property
     def worse_than_silence(self) -> bool:

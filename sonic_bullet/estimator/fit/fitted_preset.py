@@ -75,6 +75,12 @@ def preset_of(found: CaseFit) -> Preset:
     lines = recorded_lines(found)
     if lines is not None:
         assumed = (*assumed, "level (that of the body that plays the lines: the recordings' gain is not known)")
+    parameters = dict(
+        zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)
+    )
+    if not found.has_material:
+        assumed = (*assumed, "elasticity and density (steel's: neither a shape nor a material is given)")
+        parameters = {name: parameters[name] for name in ("alpha_per_s", "beta_s")}
     source = f"fitted: {found.case.name}"
     taken = f"taken from '{base.name}'"
     used = {o.evidence.thing.name: o for o in found.objects}
@@ -93,9 +99,7 @@ def preset_of(found: CaseFit) -> Preset:
         provenance=Provenance(
             method="modes paired with damped sinusoids of maximum likelihood; least squares",
             recordings=tuple(recordings),
-            parameters=dict(
-                zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)
-            ),
+            parameters=parameters,
             spreads=spreads(found),
             assumed=assumed,
             verdict=fit.verdict,

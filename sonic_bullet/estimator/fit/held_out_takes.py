@@ -4,6 +4,7 @@
     placed modes, or typical lines p  ──┴─► D(r, g·p)     g: of least D, where the impulse is not known;
                                                           p with what a residual adds to it, where one is given
     nothing                           ────► D(r, 0)
+    the guessed material on the mesh  ────► min over g of D(r, g·m)
     the fit's own takes t             ────► min over t and g of D(r, g·t)
 
 D: log_spectral.py, over what stands above the recording's noise, in the case's band. A prediction enters with the
@@ -19,12 +20,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.best_gain import BestGain, distance_at, find_best_gain
 from sonic_bullet.estimator.fit.case_fit import NO_GAIN, TakeDistance
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_modes
 from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
-from sonic_bullet.estimator.fit.typical_strike import typical_strike
-from sonic_bullet.estimator.lines.log_spectral import floor_between, power_spectra
+from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain
+from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
+from sonic_bullet.estimator.fit.typical_strike import strike_lines
+from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, power_spectra
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
@@ -110,7 +112,24 @@ def _distances(
         float(np.nanmin(nearest)) if np.isfinite(nearest).any() else float("nan"),
         free,
         best.gain,
+        _plausible_db(found, e, recording, power, floor, (len(signal), sr)),
     )
+
+
+def _plausible_db(
+    found: CaseFit,
+    e: RecordedObject,
+    recording: CaseRecording,
+    power: tuple[Array, ...],
+    floor: Floor,
+    size: tuple[int, int],
+) -> float:
+    """Distance of the guessed material's take at its best gain, of (n, sr); NaN where there is none."""
+    with suppress(SonicBulletError):
+        made = plausible_sound(found, e, recording, *size)
+        if made is not None:
+            return find_best_gain(power, power_spectra(made), floor).distance_db
+    return float("nan")
 
 
 def predicted_take(
@@ -120,9 +139,10 @@ def predicted_take(
 
     A strike of known place on a mesh is played by its modes; any other by the lines as they were struck on average.
     """
-    typical = typical_strike(e.lines)
-    modes, free = (typical.freq_hz, typical.decay_per_s, typical.amplitude), True
-    if e.family is not None and recording.position_m is not None and np.isfinite(found.gain_sd):
+    typical, known = strike_lines(e, recording)
+    impulse = recording.impulse_n_s if known and recording.impulse_n_s is not None else 1.0
+    modes, free = (typical.freq_hz, typical.decay_per_s, impulse * typical.amplitude), not known
+    if recording.position_m is not None and found.plays_modes(e):
         with suppress(SonicBulletError):
             modes, free = strike_modes(found, recording, sr), recording.impulse_n_s is None
     sound = damped_sum(*modes, n, sr)

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
+from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
@@ -53,6 +55,17 @@ class RecordedObject:
     signals: Array | None
     sr: int
     notes: tuple[str, ...] = ()
+
+
+class Sounds(NamedTuple):
+    """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them, and the
+    part of each recording's energy that lies before its onset, from where it begins to sound.
+    """
+
+    signals: Array
+    sr: int
+    remarks: list[str]
+    before: list[float]
 
 
 def guess_of(thing: CaseObject) -> Material:
@@ -123,13 +136,16 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks, hum = sounds
+            signals, sr, remarks, before = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
-            still = without_hum(signals - hum, noise_rms(signals, sr), sr)
+            still = without_hum(signals, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
-            notes = (*(f"{g} is missing" for g in gone), *remarks)
+            odd = []
+            if case.onset_s is None:
+                odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
+            notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
             found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
     if not found:
@@ -205,18 +221,12 @@ def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecord
     Raises FileError, AudioError.
     """
     found = [_sounds(case, thing, (r,), True) for r in recordings]
-    return [signals[0] - hum[0] for signals, _, _, hum in found], found[0][1]
+    return [one.signals[0] for one in found], found[0].sr
 
 
-def _sounds(
-    case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool
-) -> tuple[Array, int, list[str], Array]:
-    """Signals (s, n) of an object's strikes, each from its onset, their rate, what is odd about them, and the hum
-    (s, n) that stands in each.
-
-    Raises FileError, AudioError.
-    """
-    sounds, limited, rates, remarks, hums = [], [], [], [], []
+def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> Sounds:
+    """What is heard of an object's strikes. Raises FileError, AudioError."""
+    sounds, limited, rates, remarks, hums, begun = [], [], [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
         sound, sr, which = read_channel(r.file or "", r.channel)
@@ -243,6 +253,7 @@ def _sounds(
         hum, hum_hz = find_standing_hum(limited[-1], sr, one.start)
         hums.append(hum)
         limited[-1] = limited[-1] - hum
+        begun.append(one.start)
         doubts, _ = describe_doubts(limited[-1][one.start :], sr)
         for words in filter(None, (which, describe_hum(hum_hz), *doubts)):
             several.setdefault(words, []).append(str(r.file))
@@ -262,10 +273,12 @@ def _sounds(
         )
     if length < SHORTER * np.median(lengths):
         remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
-    signals, steady = (
-        np.stack([x[start : start + length] for x, start in zip(each, starts, strict=True)]) for each in (sounds, hums)
-    )
-    return signals, sr, remarks, steady
+    signals = np.stack([(x - hum)[start : start + length] for x, hum, start in zip(sounds, hums, starts, strict=True)])
+    before = [
+        float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
+        for x, first, start in zip(limited, begun, starts, strict=True)
+    ]
+    return Sounds(signals, sr, remarks, before)
 
 
 def refuse_clipped(sound: Array, name: object) -> None:

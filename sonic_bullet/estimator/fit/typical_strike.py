@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonic_bullet.estimator.lines.line_values import Lines, lines_at
 from sonic_bullet.records import Array
+
+if TYPE_CHECKING:
+    from sonic_bullet.estimator.fit.recorded import RecordedObject
+    from sonic_bullet.files.cases import CaseRecording
 
 FEWEST_CYCLES = 5.0
 """Of a line in the time in which it falls to 1/e: what is over sooner is the attack, lines that cancel each other, and
@@ -53,3 +58,23 @@ def typical_strike(lines: Lines) -> TypicalStrike:
     phase = np.exp(1j * np.angle(lines.amplitude[nearest]))
     spread = off.std(axis=0, ddof=1) if len(db) > 1 else np.zeros(db.shape[1])
     return TypicalStrike(lines.freq_hz, lines.decay_per_s, 10 ** ((middle + level.mean()) / 20) * phase, spread)
+
+
+def strike_lines(e: RecordedObject, recording: CaseRecording) -> tuple[TypicalStrike, bool]:
+    """Lines of a strike of an object, as those at its place were struck on average, or all where none was at its place.
+
+    Returns
+    -------
+    TypicalStrike
+        Amplitudes per N·s where the flag is set, else in the recordings' units.
+    bool
+        Whether the level is known: the impulses of this strike and of those that it is played by.
+    """
+    place = recording.position_m, recording.direction
+    here = [i for i, r in enumerate(e.recordings) if r.position_m is not None and (r.position_m, r.direction) == place]
+    use = here or list(range(len(e.recordings)))
+    impulse = [e.recordings[i].impulse_n_s for i in use]
+    known = recording.impulse_n_s is not None and all(impulse)
+    per = np.array(impulse if known else np.ones(len(use)), float)[:, None]
+    some = replace(e.lines, amplitude=e.lines.amplitude[use] / per, amplitude_sd=e.lines.amplitude_sd[use] / per)
+    return typical_strike(some), known

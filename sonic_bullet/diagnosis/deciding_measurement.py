@@ -1,0 +1,49 @@
+"""The one measurement that would decide what a diagnosis leaves open, in a sentence: the first that applies, by when,
+where and with what it goes what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.effects.protocol import Dereverberates
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement as of_fit
+
+DIFFERS = 0.5
+"""Standard deviation of ln of what is left, over strikes: more goes with the place or the strike."""
+NO_MODE = 0.5
+"""Of what is left, that no modes play."""
+SLOPE = 0.3
+"""Of ln of what is left against ln J: more goes with strength."""
+
+
+def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[str, Any]) -> str:
+    """Say which one measurement would decide; of a verdict that leaves nothing open what the fit leaves open."""
+    return of_fit(found) if isinstance(end, NothingCompared) or not left else next(_open(end, left))
+
+
+def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
+    """What would decide each thing that is open, the first things first."""
+    most = max(left["when"], key=left["when"].__getitem__)
+    slope = left["slope_against_impulse"]
+    if len(end.judged) == 1:
+        yield "strike the same place again, three times or more: no effect can be told by one strike"
+    if any(isinstance(c.effect, Dereverberates) and c.mean_db > 0 for c in end.tried) and most != "first":
+        yield "record at half the distance and at twice it: what the room adds stays, what the body radiates does not"
+    if slope is not None and abs(slope) > SLOPE:
+        yield "strike one place at five strengths from soft to hard, force recorded: what is left goes with strength"
+    if left["share_of_no_modes"] > NO_MODE and most == "first":
+        yield (
+            "record the hammer's force with the sound (case new --force-channel): what is left is at the beginning, "
+            "and no mode plays it"
+        )
+    if left["scatter_over_strikes"] > DIFFERS:
+        yield "strike one place five times alike: what is left differs from strike to strike, by the place or by itself"
+    band = max(left["bands"], key=lambda b: b["share_of_energy_left"])
+    yield (
+        f"strike and hang it at other points and listen from {band['from_hz']:.0f} to {band['to_hz']:.0f} Hz: what "
+        "stays is the body's, what goes is its support's"
+    )

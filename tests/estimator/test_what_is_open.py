@@ -1,0 +1,109 @@
+"""What nobody knows of a case is not printed; what would tell it is said; what was guessed before is held beside."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.material_fit import fit_case
+from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
+from sonic_bullet.estimator.fit.takes.plausible_preset import with_shipped_damping
+from sonic_bullet.files.cases import read_case
+from sonic_bullet.presets import load_material
+from sonic_bullet.records import Array, Material
+from tests.cli.test_commands import run
+from tests.estimator.test_held_out_takes import DECAY, HZ, case_of
+from tests.made.case import make
+
+
+@pytest.fixture(scope="module")
+def taps(tmp_path_factory: pytest.TempPathFactory) -> CaseFit:
+    return fit_case(read_case(case_of(tmp_path_factory.mktemp("taps"), 1)))
+
+
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory: pytest.TempPathFactory) -> CaseFit:
+    brass = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
+    made = make(tmp_path_factory.mktemp("bar"), brass, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3)
+    return fit_case(read_case(made.folder))
+
+
+@pytest.mark.parametrize("material", [None, "steel", "glass"])
+def test_no_constant_is_printed_that_nobody_gave(
+    material: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, told = case_of(tmp_path, 0), tmp_path / "fit.json"
+    if material is not None:
+        case = json.loads((folder / "case.json").read_text())
+        case["objects"] = {"thing": {"material": material}}
+        case["recordings"] = [entry | {"object": "thing"} for entry in case["recordings"]]
+        (folder / "case.json").write_text(json.dumps(case))
+    capsys.readouterr()
+    assert run("fit", str(folder), "-o", str(tmp_path / "p.json"), "--json", str(told)) == 0
+    out, found = capsys.readouterr().out, json.loads(told.read_text())
+    parameters = json.loads((tmp_path / "p.json").read_text())["provenance"]["parameters"]
+    for said in ("E in Pa", "density", "Poisson"):
+        assert (said in out) == (material is not None)
+    for name in ("gamma_m2_s2", "poisson_ratio"):
+        assert (found[name] is None) == (material is None) == (name not in parameters)
+
+
+def changed(found: CaseFit, **lines: Any) -> CaseFit:
+    (e,) = found.evidence
+    return replace(found, evidence=(replace(e, lines=replace(e.lines, **lines)),))
+
+
+def test_of_one_take_another_is_asked_for(taps: CaseFit) -> None:
+    (e,) = taps.evidence
+    assert e.signals is not None
+    lines = replace(e.lines, amplitude=e.lines.amplitude[:1])
+    one = replace(e, recordings=e.recordings[:1], signals=e.signals[:1], lines=lines)
+    assert next_measurement(replace(taps, evidence=(one,))).startswith("strike the same place again")
+
+
+def test_without_a_shape_it_is_asked_for(taps: CaseFit) -> None:
+    assert next_measurement(taps).startswith("measure the shape")
+
+
+@pytest.mark.parametrize("apart_hz", [0.5, 2.0])
+def test_lines_within_their_widths_ask_for_another_point(taps: CaseFit, apart_hz: float) -> None:
+    hz = np.array([HZ[0], HZ[0] + apart_hz, *HZ[2:]])
+    (e,) = taps.evidence
+    assert e.signals is not None
+    n = np.arange(e.signals.shape[1]) / e.sr
+    waves = np.exp((-DECAY + 2j * np.pi * hz)[:, None] * n)
+    amplitude = np.tile(np.array([0.3, 0.2, 0.1, 0.1], complex), (3, 1))
+    alike = replace(e, signals=(amplitude @ waves).real)
+    found = replace(taps, evidence=(alike,))
+    lines = {"freq_hz": hz, "decay_per_s": DECAY, "amplitude": amplitude, "energy": np.full(4, 1e6)}
+    said = next_measurement(changed(found, **lines))
+    assert f"{hz[0]:.1f} and {hz[1]:.1f} Hz" in said
+    assert next_measurement(changed(found, **(lines | {"energy": np.array([1e6, 1.0, 1e6, 1e6])}))) != said
+
+
+def test_an_attack_asks_for_the_force(taps: CaseFit) -> None:
+    (e,) = taps.evidence
+    assert e.signals is not None
+    burst: Array = np.zeros(e.signals.shape)
+    burst[:, :100] = 3 * np.abs(e.signals).max()
+    assert "record the hammer's force" in next_measurement(replace(taps, evidence=(replace(e, signals=burst),)))
+
+
+def test_the_guess_on_the_shape_is_held_beside_the_fit(bar: CaseFit, taps: CaseFit) -> None:
+    for take in bar.takes:
+        assert take.predicted_db < take.plausible_db <= take.silence_db
+    assert all(np.isnan(take.plausible_db) for take in taps.takes)
+
+
+@pytest.mark.parametrize("name", ["steel", "glass", "wood"])
+def test_a_guess_without_damping_takes_that_of_the_nearest_preset(name: str) -> None:
+    own = load_material(name)
+    bare = Material.isotropic("x", youngs_pa=7e10, poisson=0.2, density_kg_m3=2500)
+    assert with_shipped_damping(own) is own
+    assert with_shipped_damping(bare).name == "glass"
