@@ -4,8 +4,8 @@
 
 distance   of a take and of what its lines play with a noise like the take's own, from 20 ms after the onset
            (`estimator.lines.log_spectral`, the first recorded second)
-too loud   dB by which a line, or the lines closer than a window tells apart, stands above what was recorded in its band,
-           over max(50 ms, 5 cycles), where that stands 10 dB over the noise: the worst of all
+too loud   dB by which a line, or the lines closer than a window tells apart, stands above what was recorded in its
+           band, over max(50 ms, 5 cycles), where that stands 10 dB over the noise: the worst of all
 """
 
 from __future__ import annotations
@@ -190,8 +190,8 @@ def main() -> None:
     print(f"| take | silence dB | {' | '.join(f'{m}: lines, dB, too loud dB, s' for m in methods)} |")
     print("|---" * (2 + len(methods)) + "|")
     gathered: dict[str, list[tuple[float, float, float]]] = {m: [] for m in methods}
-    for name, x, sr in takes(asked.data, asked.sets):
-        x = x[: int(SECONDS * sr)]
+    for name, whole, sr in takes(asked.data, asked.sets):
+        x = whole[: int(SECONDS * sr)]
         late, end = int(LATE_S * sr), int(1.0 * sr)
         floor = floor_between([x])
         silence = log_spectral_db(x[late:end], with_noise(np.zeros(len(x[late:end])), floor, 1), floor)

@@ -52,7 +52,8 @@ FRONT, FRONT_SHARE = 0.3, 0.75
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
-LOUDER = 10**0.5  # rms of what modes leave of a sound's first tenth over that of its last third: 10 dB
+# what start poles leave of a real take: of the energy after its attack; rms of its first tenth over its last third
+LEFT, LOUDER = 10**-2.5, 2.0
 ATTACK_S = 0.02
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
@@ -149,7 +150,10 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     least = _least(x)
     start = _start(x, sr, band_hz, floor)
     left = likelihood.residual(x, start, sr)
-    if _rms(left[: len(x) // 10]) > LOUDER * _rms(left[-len(x) // 3 :]):
+    late = min(round(ATTACK_S * sr), len(x) // 4)
+    if _rms(left[late:]) > np.sqrt(LEFT) * _rms(x[late:]) and _rms(left[: len(x) // 10]) > LOUDER * _rms(
+        left[-len(x) // 3 :]
+    ):
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
