@@ -127,7 +127,7 @@ def by_peaks(x: Array, sr: int) -> Found:
     peak = np.flatnonzero(
         (spectrum[1:-1] > 100 * broad[1:-1]) & (spectrum[1:-1] >= spectrum[:-2]) & (spectrum[1:-1] > spectrum[2:])
     )
-    poles = []
+    poles: list[complex] = []
     for k in peak[np.argsort(-spectrum[peak + 1])][:40] + 1:
         f = k * sr / len(y)
         if f < 20 or f > 20_000 or any(abs(p.imag / 2 / np.pi - f) < sr / n for p in poles):
@@ -144,7 +144,7 @@ def by_peaks(x: Array, sr: int) -> Found:
 
 def by_lscf(x: Array, sr: int) -> Found:
     """Poles of sdypy-EMA's LSCF, band by band of 2 kHz, those that stay from order 20 to order 30."""
-    from sdypy import EMA
+    from sdypy import EMA  # type: ignore[import-not-found]
 
     start = int(LATE_S * sr)
     y = x[start : start + sr]

@@ -6,7 +6,7 @@ learnt since].
     -> noise_density.py   density over frequency, course over time
     -> subspace.py (poles, band by band)
         every frequency resolution at once, where the paper goes from level to level
-    -> ringing.py         where what those leave is far louder at first than at last: of what rings after the attack
+    -> after_attack.py         where what those leave is far louder than the noise: of what rings after the attack
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes
     -> onset.py   the modes, run backwards, tell the sample of the onset
@@ -24,11 +24,12 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
+from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import limit_band
+from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
-from sonic_bullet.estimator.lines.ringing import ringing_lines
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -52,9 +53,7 @@ FRONT, FRONT_SHARE = 0.3, 0.75
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
-# what start poles leave of a real take: of the energy after its attack; rms of its first tenth over its last third
-LEFT, LOUDER = 10**-2.5, 2.0
-ATTACK_S = 0.02
+ATTACK_S = 0.02  # after which a real take is judged
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
@@ -150,10 +149,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     least = _least(x)
     start = _start(x, sr, band_hz, floor)
     left = likelihood.residual(x, start, sr)
-    late = min(round(ATTACK_S * sr), len(x) // 4)
-    if _rms(left[late:]) > np.sqrt(LEFT) * _rms(x[late:]) and _rms(left[: len(x) // 10]) > LOUDER * _rms(
-        left[-len(x) // 3 :]
-    ):
+    if _rms(left) > OVER_NOISE * max(noise_rms(x[None], sr)[0], floor):
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
@@ -182,9 +178,7 @@ def _least(x: Array) -> float:
 
 
 def _least_of_a_second(modes: int, least: float) -> float:
-    """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole
-    recording.
-    """
+    """Least energy of a second mode in a line: of all cells it has but the few beside the lines to chance upon."""
     return float(min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS)))
 
 

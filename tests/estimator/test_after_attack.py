@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
-from sonic_bullet.estimator.lines.ringing import ringing_lines
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
 

@@ -4,7 +4,7 @@ first milliseconds of a real take hold the striker, slaps and a room, and its mo
     signals (s, n) -> bands of BAND_HZ about their centre, decimated, once the band's filter is full: after the attack
     -> poles of a band, of all recordings at once (ESPRIT)           [Roy & Kailath 1989, eq. 3.12-3.17]
     -> the one that takes most, of what is left the next           [Pati, Rezaiifar & Krishnaprasad 1993], while it
-         has OWN of its energy apart from those picked: what cancels is no line
+         has OWN of its energy apart from those chosen: what cancels is no line
          stands out of what is left about it while it rings:
              T = Σ_s |<q, r_s>|²/D_s > chance,  D = Σ |r|²|e|²/Σ |e|²             [Kay 1998, ch. 7.6]
     -> poles at the least sum of squares, amplitudes projected out             [Golub & Pereyra 1973; Kaufman 1975]
@@ -28,7 +28,7 @@ BAND_HZ, PASSED, STOPPED, OVERSAMPLED = 400.0, 0.5, 1.5, 2.0  # of a band's widt
 STOP_DB = 100.0
 ROWS, COLUMNS, MOST = 240, 800, 40  # of a band's data matrix; poles looked for
 OWN = 0.5
-BESIDE = np.concatenate([-np.arange(2.0, 8.0), np.arange(2.0, 8.0)])  # widths from a line
+AROUND = np.concatenate([-np.arange(2.0, 8.0), np.arange(2.0, 8.0)])  # widths from a line
 FALSE_ALARMS = 0.05  # of a recording of noise alone
 FEWEST_CYCLES = 3.0  # in which it falls by e
 
@@ -106,11 +106,11 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
     """Poles (k,) in 1/s, amplitudes (s, k) and their spreads, spreads (k,), energies (k,) of a band's lines."""
     y, pole = band.series, _candidates(band.series)
     pole = pole[pole.real < 0]
-    pole = pole[_picked(y, pole, least)]  # about the band, per sample; its neighbours' too
+    pole = pole[_selected(y, pole, least)]  # about the band, per sample; its neighbours' too
     for _ in range(3):
         pole = _polished(y, pole)
         size = len(pole)
-        pole = pole[_picked(y, pole, least)]
+        pole = pole[_selected(y, pole, least)]
         if len(pole) == size:
             break
     amplitude, left, gram, matrix = _solved(y, pole)[:4]
@@ -151,7 +151,7 @@ def _candidates(y: Array) -> Array:
         return np.asarray(np.log(np.linalg.eigvals(np.linalg.lstsq(vector[:-1], vector[1:], rcond=None)[0])))
 
 
-def _picked(y: Array, pole: Array, least: float) -> Array:
+def _selected(y: Array, pole: Array, least: float) -> Array:
     """Which poles (k,) are lines of series (s, m), in the order in which they take most."""
     if not len(pole):
         return np.zeros(0, int)
@@ -161,7 +161,7 @@ def _picked(y: Array, pole: Array, least: float) -> Array:
     free, found = np.ones(len(pole), bool), list[int]()
 
     def strongest(gram: Array, seen: Array, among: Array) -> tuple[int, Array, Array, Array]:
-        """Its number or -1, what it takes (s,); Gram matrix and moments without it. All are apart from those picked."""
+        """Its number or -1, what it takes (s,); Gram matrix and moments without it. All are apart from those chosen."""
         new = np.diag(gram).real
         taken = np.abs(seen) ** 2 / np.maximum(new, 1e-300)
         worth = np.where(among & (new > OWN * own), taken.sum(axis=0), -1.0)
@@ -174,11 +174,11 @@ def _picked(y: Array, pole: Array, least: float) -> Array:
 
     def stands(k: int, taken: Array, left: Array) -> bool:
         alive = np.abs(ring[:, k]) ** 2 / own[k]
-        level = np.maximum(np.abs(left) ** 2 @ alive, _left_beside(left, ring[:, k], pole[k]))
+        level = np.maximum(np.abs(left) ** 2 @ alive, _level_around(left, ring[:, k], pole[k]))
         return bool((taken / level).sum() >= least)
 
-    def without(picked: list[int]) -> Array:
-        return np.asarray(y - (ring[:, picked] @ np.linalg.solve(whole[np.ix_(picked, picked)], moment[:, picked].T)).T)
+    def without(chosen: list[int]) -> Array:
+        return np.asarray(y - (ring[:, chosen] @ np.linalg.solve(whole[np.ix_(chosen, chosen)], moment[:, chosen].T)).T)
 
     gram, seen = whole, moment
     while free.any():
@@ -186,18 +186,18 @@ def _picked(y: Array, pole: Array, least: float) -> Array:
         if k < 0:
             break
         free[k] = False
-        picked = [k]
-        if not stands(k, taken, without([*found, k])):  # with its twin it may: each stands beside the other
-            near = free & (np.abs(pole.imag - pole[k].imag) < BESIDE[-1] * _width(pole[k], len(ring)))
-            twin, more, *rest = strongest(rest[0], rest[1], near)
-            if twin < 0:
+        chosen = [k]
+        if not stands(k, taken, without([*found, k])):  # two close ones may, each beside the other
+            near = free & (np.abs(pole.imag - pole[k].imag) < AROUND[-1] * _width(pole[k], len(ring)))
+            second, more, *rest = strongest(rest[0], rest[1], near)
+            if second < 0:
                 continue
-            picked.append(twin)
-            left = without([*found, *picked])
-            if not stands(k, taken, left) or not stands(twin, more, left):
+            chosen.append(second)
+            left = without([*found, *chosen])
+            if not stands(k, taken, left) or not stands(second, more, left):
                 continue
-            free[twin] = False
-        found += picked
+            free[second] = False
+        found += chosen
         gram, seen = rest
     return np.array(found, int)
 
@@ -207,9 +207,9 @@ def _width(pole: complex, samples: int) -> float:
     return float(np.hypot(-pole.real, np.pi / samples))
 
 
-def _left_beside(left: Array, ring: Array, pole: complex) -> Array:
+def _level_around(left: Array, ring: Array, pole: complex) -> Array:
     """Power (s,) of what is left beside a line's frequency while it rings, as its energy's square root's variance."""
-    other = ring[:, None] * np.exp(1j * np.outer(np.arange(len(ring)), _width(pole, len(ring)) * BESIDE))
+    other = ring[:, None] * np.exp(1j * np.outer(np.arange(len(ring)), _width(pole, len(ring)) * AROUND))
     power = np.abs(left @ other.conj()) ** 2 / (np.abs(ring) ** 2).sum()
     return np.asarray(np.median(power, axis=1) / np.log(2))  # of an exponential law
 
