@@ -149,7 +149,8 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     least = _least(x)
     start = _start(x, sr, band_hz, floor)
     left = likelihood.residual(x, start, sr)
-    if _rms(left) > OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST * _rms(x)):
+    late = min(round(ATTACK_S * sr), len(x) // 4)
+    if _rms(left[late:]) > OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST * _rms(x[late:])):
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
