@@ -166,6 +166,14 @@ def features(**options: Any) -> None:
 @click.argument("source", metavar="RECORDING|CASE_DIR")
 @click.option("-o", "--output", required=True, metavar="PRESET.json", help="The fitted material as a preset file.")
 @strike_options
+@click.option(
+    "--dimension-tolerance",
+    "tolerance_percent",
+    type=float,
+    metavar="PERCENT",
+    help="Standard error of the mesh's dimensions, twice in the spread of E/density; 0: of the lines alone. "
+    "[default: the case's, or 0.5]",
+)
 @click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
 @csv_option
 @json_option

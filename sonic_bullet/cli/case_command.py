@@ -19,8 +19,9 @@ from sonic_bullet.cli.hammer import FORCE_COLUMNS, StrikeFiles, part_force
 from sonic_bullet.cli.output import places, table, warn
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_channel, replacing
+from sonic_bullet.files.case_fields import LARGEST
 from sonic_bullet.files.case_schema import case_schema
-from sonic_bullet.files.cases import FORMAT, LARGEST, UNITS, Case, read_case
+from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.errors import FileError
@@ -150,6 +151,7 @@ def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any
         "units": units,
         "material": guess.name,
         "elastic_guess": {key: float(f"{value:.6g}") for key, value in constants.items()},
+        "dimension_tolerance": None,
     }
 
 
