@@ -16,6 +16,7 @@ from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, take_
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
 from sonic_bullet.files.case_fields import LARGEST
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
+from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
@@ -58,6 +59,7 @@ def run_fit(
     picture: str | None,
     json_to: str | None,
     csv_to: str | None,
+    uff_to: str | None,
     tolerance_percent: float | None,
     **one: Any,
 ) -> None:
@@ -66,7 +68,7 @@ def run_fit(
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    to, picture, json_to, csv_to = places(output, picture, json_to, csv_to)
+    to, picture, json_to, csv_to, uff_to = places(output, picture, json_to, csv_to, uff_name(uff_to))
     case = _with_tolerance(as_case(source, one), tolerance_percent)
     warn(case.warnings)
     with clean_stdout(json_to) as say:
@@ -76,6 +78,11 @@ def run_fit(
 
         with status(source) as progress:
             found = fit_case(case, progress=progress)
+        if uff_to is not None:
+            from sonic_bullet.estimator.fit.modal_shapes import mobilities, modal_shapes
+
+            shapes = modal_shapes(found)
+            write_uff(uff_to, shapes, mobilities(found, shapes))
         write_preset(str(to), preset_of(found))
         if picture is not None:
             from sonic_bullet.plots.fit_plot import write_fit_picture
