@@ -144,7 +144,8 @@ def _say_missing(case: dict[str, Any], force_newton: float | None) -> None:
     where = any(strike["position"] is None for strike in strikes)
     hard = force_newton is None and any(strike["impulse"] is None for strike in strikes)
     if missing := " and ".join(["where"] * where + ["how hard"] * hard):
-        print(f"now say {missing} each strike was: strike.position in m, strike.impulse in N·s, or null")
+        fields = ", ".join(["strike.position in m"] * where + ["strike.impulse in N·s"] * hard)
+        print(f"now say {missing} each strike was: {fields}, or null")
 
 
 def _check_options(

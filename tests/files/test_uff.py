@@ -73,11 +73,11 @@ def test_what_is_not_understood_is_named(tmp_path: Path) -> None:
     found = read_uff(made.write_uff(tmp_path / "a.uff", made.nodes(PLACES), *ones))
     assert len(found.responses) == 2
     assert found.notes == (
-        "not used: 1 coherences, 1 rotations, 1 frequency responses of ordinate type 12 per type 12",
-        "no coordinates of node 7 (dataset 15 or 2411): its place stays null",
+        "not used: coherences (1), rotations (1), frequency responses of ordinate type 12 per type 12 (1)",
+        "no coordinates (dataset 15 or 2411) of node 7, whose place stays null",
         "1 frequency responses do not say per what: taken per force",
     )
-    with pytest.raises(FileError, match=r"a\.uff holds no response that is understood \(1 coherences\)"):
+    with pytest.raises(FileError, match=r"a\.uff holds no response that is understood \(coherences \(1\)\)"):
         read_uff(made.write_uff(tmp_path / "a.uff", ones[2]))
 
 

@@ -179,7 +179,7 @@ def test_others_than_one_sensors_are_left_out_and_said(capfd: pytest.CaptureFixt
     made.write_uff(Path("test.unv"), *sets, other)
     assert run("case", "new", "mine", "test.unv") == 0
     ended = capfd.readouterr()
-    assert "1 of 4 responses are left out" in ended.err and "no coordinates of node 9" in ended.err
+    assert "1 of 4 responses are left out" in ended.err and "of node 9, whose place stays null" in ended.err
     assert len(json.loads(Path("mine/case.json").read_text())["recordings"]) == 3
 
 

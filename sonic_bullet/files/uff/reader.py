@@ -235,7 +235,7 @@ def _response(
 
 
 def _counted(unread: Counter[str]) -> list[str]:
-    return [f"{count} {words}" for words, count in unread.items()]
+    return [f"{words} ({count})" for words, count in unread.items()]
 
 
 def _notes(found: list[Response], unread: Counter[str], kinds: list[int], assumed: int) -> list[str]:
@@ -250,7 +250,8 @@ def _notes(found: list[Response], unread: Counter[str], kinds: list[int], assume
     if freedoms:
         nodes = sorted({f.node for f in freedoms})
         listed = ", ".join(map(str, nodes[:8])) + (" …" if len(nodes) > 8 else "")
-        lines.append(f"no coordinates of node {listed} (dataset 15 or 2411): its place stays null")
+        whose = f"node {listed}" if len(nodes) == 1 else f"nodes {listed}"
+        lines.append(f"no coordinates (dataset 15 or 2411) of {whose}, whose place stays null")
     if assumed:
         lines.append(f"{assumed} frequency responses do not say per what: taken per force")
     return lines
