@@ -19,6 +19,7 @@ from sonic_bullet.records import Array
 
 BLOCK_S = 1e-3
 NEAR_DB = 20.0
+FALLS = 1.1  # the loudest block of a strike's first 50 ms over those after
 CLIPPED_RUN = 3
 SHOWN = 6  # hits whose times are said
 REACH = 64  # samples that the first guess may be off
@@ -64,8 +65,9 @@ def span(signal: Array, sr: int) -> Span:
     strikes = find_strikes(signal, sr)
     early = int(np.argmax(power >= power.max() * 10 ** (-NEAR_DB / 10)))  # the first hit, be a later one louder
     struck = round(strikes[0] * sr) // block if len(strikes) else 0
-    if struck > early and np.argmax(power[early:struck]) > GAP_S / BLOCK_S:
-        early = struck  # what was there before is not loudest where it begins: no strike
+    begun = early + round(GAP_S / BLOCK_S)
+    if struck > begun and power[early:begun].max() < FALLS * power[begun:struck].max():
+        early = struck  # what was there before does not fall: no strike
     loud = early + int(np.argmax(power[early : early + 10]))
     quiet = np.flatnonzero(power[:loud] < max(1e-3 * power[loud], 4 * floor))
     first = int(quiet[-1]) if len(quiet) else 0
