@@ -15,7 +15,7 @@ from benchmarks.measured import LEAD_S, LONGEST_S, Piece
 
 DIFFIMPACT = "https://github.com/samuel-clarke/diffimpact, commit c9f5b949fc5b4194ee861b0c29490b33cdfb4072"
 NUMBERS_ALONE = "numbers alone"
-"""In place of a licence: of these takes the file holds measured facts, and nothing that was recorded."""
+"""How the licence ends where the file holds measured facts of takes, and nothing that was recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +86,15 @@ OBJECTS = {
     "steel-bar": Struck(
         "pyrfda-steel-bar", "a bar of hot-rolled mild steel, 114.36 × 25.44 × 3.12 mm",
         "numbers measured on https://github.com/jjderooy/pyRFDA, commit 44d3c9600bea936739436c989861cb6bec58b2d7",
-        NUMBERS_ALONE, "steel", whole("dev/*.flac"), mesh="mesh/bar.obj", density_kg_m3=7855.0,
-        band_hz=(500.0, 10_000.0), shape_note="half the last digit of the thickness, 3.12 mm, is 0.3 % of E/ρ",
+        f"MIT, added after this take; {NUMBERS_ALONE}", "steel", whole("dev/*.flac"), mesh="mesh/bar.obj",
+        density_kg_m3=7855.0, band_hz=(500.0, 10_000.0),
+        shape_note="half the last digit of the thickness, 3.12 mm, is 0.3 % of E/ρ",
     ),
     "ceramic-bowl": Struck(
         "diffsound-bowl", "a ceramic bowl; its takes are microphones of one stroke",
         "numbers measured on https://github.com/hellojxt/DiffSound, data/real_audio and data/mesh/bowl, as in the copy "
-        "TechnetiumMan/DiffSound at d2a97cd", NUMBERS_ALONE, "porcelain", whole("mic*.flac", 0.5, 3.5),
-        mesh="bowl.obj", shape_note="the mesh, as `fit` says, may move E/ρ by 1.6 %",
+        "TechnetiumMan/DiffSound at d2a97cd", f"none stated; {NUMBERS_ALONE}", "porcelain",
+        whole("mic*.flac", 0.5, 3.5), mesh="bowl.obj",
+        shape_note="the mesh, as `fit` says, may move E/ρ by 1.6 %",
     ),
 }  # fmt: skip
