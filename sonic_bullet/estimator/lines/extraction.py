@@ -26,7 +26,7 @@ import numpy as np
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import limit_band
-from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, noise_rms
+from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, QUIETEST, noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
@@ -149,7 +149,8 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     least = _least(x)
     start = _start(x, sr, band_hz, floor)
     left = likelihood.residual(x, start, sr)
-    if _rms(left) > OVER_NOISE * max(noise_rms(x[None], sr)[0], floor):
+    late = min(round(ATTACK_S * sr), len(x) // 4)
+    if _rms(left[late:]) > OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST * _rms(x[late:])):
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)

@@ -37,6 +37,7 @@ DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
 # rms that poles leave of what is a sum of lines, at most: 20 dB; times that, what a room that is one later leaves
 OVER_NOISE, A_ROOM = 10.0, 2.0
+QUIETEST = 10**-2.6  # noise over the signal there, at least: 52 dB
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -92,7 +93,7 @@ def _attacked(signals: Array, sr: int, band_hz: tuple[float, float]) -> bool:
 
 def _left_by_start(signals: Array, sr: int, band_hz: tuple[float, float]) -> tuple[int, float]:
     """How many poles signals (s, n) start with, and what these leave over the noise, the median over signals."""
-    noise = noise_rms(signals, sr)
+    noise = np.maximum(noise_rms(signals, sr), QUIETEST * np.sqrt((signals**2).mean(axis=1)))
     pole = start_poles(signals / noise[:, None], sr, *band_hz)
     return len(pole), float(np.median(amplitudes_at(signals, noise, apart(pole), sr)[3] / noise))
 
