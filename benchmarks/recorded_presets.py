@@ -88,11 +88,19 @@ def command(*words: str) -> None:
         raise SystemExit((done.stderr.strip().splitlines() or ["no word"])[-1])
 
 
-def lines_of(path: Path) -> Rows:
-    """The lines that `fit --csv` wrote and that decay."""
+def lines_of(path: Path, top_hz: float) -> Rows:
+    """The lines that `fit --csv` wrote, that decay, and that lie within a band that ends at ``top_hz``: a line d 1/s
+    wide is 16 dB below its peak d Hz away, and what the band's end cuts nearer than that is known by nothing.
+    """
     with path.open(newline="") as file:
         rows = [{k: float(v) for k, v in row.items() if k != "object" and v} for row in csv.DictReader(file)]
-    return [row for row in rows if row["decay_per_s"] >= STANDARD_ERRORS * row["decay_sd_per_s"]]
+    known = [row for row in rows if {"freq_sd_hz", "decay_per_s", "decay_sd_per_s"} <= set(row)]
+    return [
+        row
+        for row in known
+        if row["decay_per_s"] >= STANDARD_ERRORS * row["decay_sd_per_s"]
+        and row["freq_hz"] + row["decay_per_s"] < top_hz
+    ]
 
 
 def with_lines(preset: Preset, rows: Rows) -> Preset:
@@ -185,7 +193,10 @@ def made_preset(name: str, data: Path) -> Preset:
         command("fit", str(folder), "-o", to, "--json", str(said), "--csv", str(table))
         if thing.mesh is None:
             command("residual", str(folder), "-o", to, "--json", str(said))
-        preset, rows = msgspec.structs.replace(read_preset(to), name=name), lines_of(table)
+        preset, rows = (
+            msgspec.structs.replace(read_preset(to), name=name),
+            lines_of(table, read_case(folder).band_hz[1]),
+        )
         if thing.mesh is None:
             preset = with_lines(preset, rows)
         else:

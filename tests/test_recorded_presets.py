@@ -91,6 +91,19 @@ def test_numbers_are_no_finer_than_known() -> None:
     assert min(lines["decay_per_s"]) > 1.0  # a tone of the recorder at 8821 Hz hardly decays, and is no line of a mug
 
 
+def test_no_file_is_led_by_what_the_band_cut() -> None:
+    """Lines at the end of the band that cancel each other would leave nothing of the level for those that ring."""
+    count = 0
+    for name in NAMES:
+        for lines in (e for e in read(name)[0].effects if e["id"] == RecordedLines.id):
+            energy = np.array(lines["amplitude"]) ** 2 / np.array(lines["decay_per_s"])
+            inside = np.array(lines["freq_hz"]) + np.array(lines["decay_per_s"]) < 20_000
+            assert inside.all(), name
+            assert energy[np.array(lines["freq_hz"]) < 16_000].sum() > 0.9 * energy.sum(), name
+            count += 1
+    assert count >= 6
+
+
 def test_known_modes_of_the_objects() -> None:
     """By the readers of the sets, who looked at peaks of a plain spectrum."""
     for name, freq_hz, t60_s in (
