@@ -100,7 +100,7 @@ def with_numbers(preset: Preset, modes: Rows, thing: Struck) -> Preset:
     gamma = rounded(fitted.parameters["gamma_m2_s2"], error[0] or 0.0, 4)
     weighed = "as weighed" if thing.density_kg_m3 else f"taken from '{thing.guess}'"
     elasticity = Elasticity(
-        youngs_pa=rounded(gamma * density, digits=4), poisson=poisson, note=thing.shape_note,
+        youngs_pa=rounded(gamma * density, (error[0] or 0.0) * density, 4), poisson=poisson, note=thing.shape_note,
         source=f"fitted; density {weighed}",
     )  # fmt: skip
     damping, effects = damping_of(modes, thing.guess)

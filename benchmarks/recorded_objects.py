@@ -88,13 +88,13 @@ OBJECTS = {
         "numbers measured on https://github.com/jjderooy/pyRFDA, commit 44d3c9600bea936739436c989861cb6bec58b2d7",
         f"MIT, added after this take; {NUMBERS_ALONE}", "steel", whole("dev/*.flac"), mesh="mesh/bar.obj",
         density_kg_m3=7855.0, band_hz=(500.0, 10_000.0),
-        shape_note="half the last digit of the thickness, 3.12 mm, is 0.3 % of E/ρ",
+        shape_note="the spread of E/ρ holds 0.5 % of each dimension",
     ),
     "ceramic-bowl": Struck(
         "diffsound-bowl", "a ceramic bowl; its takes are microphones of one stroke",
         "numbers measured on https://github.com/hellojxt/DiffSound, data/real_audio and data/mesh/bowl, as in the copy "
         "TechnetiumMan/DiffSound at d2a97cd", f"none stated; {NUMBERS_ALONE}", "porcelain",
         whole("mic*.flac", 0.5, 3.5), mesh="bowl.obj",
-        shape_note="the mesh, as `fit` says, may move E/ρ by 1.6 %",
+        shape_note="the spread of E/ρ holds 0.5 % of each dimension; `fit` says that the mesh may move it by 1.6 %",
     ),
 }  # fmt: skip

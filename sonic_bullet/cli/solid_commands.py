@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
 from sonic_bullet.files import write_model
+from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import FileError, MaterialError
@@ -46,12 +48,13 @@ def run_modes(
     accuracy: float,
     scale: float,
     json_to: str | None,
+    uff_to: str | None,
     output: str | None,
 ) -> None:
     """The `modes` command. Raises SonicBulletError."""
     if output is not None and not output.endswith(".npz"):
         raise FileError(f"cannot write {output}: modal models are npz files", "end the name with .npz")
-    to, json_to = places(output, json_to)
+    to, json_to, uff_to = places(output, json_to, uff_name(uff_to))
     if count is not None and to_hz is not None:
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
@@ -74,12 +77,20 @@ def run_modes(
             )
         if to is not None:
             write_model(to, model)
+        if uff_to is not None:
+            write_uff(uff_to, _shapes(mesh, made, model))
         say(_summary(mesh, made, model))
     if large := oversize(model.vertex_m, model.mass_kg):
         print(
             f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr
         )
     write_json(json_to, _described(mesh, made, model, output))
+
+
+def _shapes(mesh: str, material: Material, model: ModalModel) -> ModalShapes:
+    """A model's modes at its vertices, at 1 kg."""
+    title = f"{Path(mesh).name}, {material.name}"
+    return ModalShapes(model.vertex_m, model.shape, model.freq_hz, model.decay_per_s, 1.0, title)
 
 
 def chosen_material(
