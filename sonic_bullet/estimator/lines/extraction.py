@@ -26,7 +26,7 @@ import numpy as np
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import limit_band
-from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, QUIETEST, noise_rms
+from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
@@ -53,7 +53,7 @@ FRONT, FRONT_SHARE = 0.3, 0.75
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
-ATTACK_S = 0.02  # after which a real take is judged
+ATTACK_S, QUIETEST = 0.02, 10**-2.6  # after which a real take is judged; noise over the signal there, at least
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 

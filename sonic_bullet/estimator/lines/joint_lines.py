@@ -38,7 +38,6 @@ PLAINLY = 0.75  # of what other lines leave, in squares
 # rms that poles leave of what is a sum of lines, at most: 20 dB; times that, what a room that is one later leaves
 OVER_NOISE, A_ROOM = 10.0, 2.0
 AS_DENSE = 0.95  # poles from LATE_S on over those from the onset on: a room's, of which none is over by then
-QUIETEST = 10**-2.6  # noise over the signal there, at least: 52 dB
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -87,14 +86,16 @@ def _attacked(signals: Array, sr: int, band_hz: tuple[float, float]) -> bool:
     if left < OVER_NOISE:
         return False
     fewer, later = _left_by_start(signals[:, late:], sr, band_hz)
-    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or fewer < FEWER * poles) or fewer > AS_DENSE * poles:
+    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or fewer < FEWER * poles):
+        return False
+    if later < OVER_NOISE**2 and fewer > AS_DENSE * poles:
         return False
     return not any((find_strikes(signal, sr) > late / sr).any() for signal in signals)
 
 
 def _left_by_start(signals: Array, sr: int, band_hz: tuple[float, float]) -> tuple[int, float]:
     """How many poles signals (s, n) start with, and what these leave over the noise, the median over signals."""
-    noise = np.maximum(noise_rms(signals, sr), QUIETEST * np.sqrt((signals**2).mean(axis=1)))
+    noise = noise_rms(signals, sr)
     pole = start_poles(signals / noise[:, None], sr, *band_hz)
     return len(pole), float(np.median(amplitudes_at(signals, noise, apart(pole), sr)[3] / noise))
 
