@@ -37,7 +37,8 @@ DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
 # rms that poles leave of what is a sum of lines, at most: 20 dB; times that, what a room that is one later leaves
 OVER_NOISE, A_ROOM = 10.0, 2.0
-AS_DENSE = 0.95  # poles from LATE_S on over those from the onset on: a room's, of which none is over by then
+# poles from LATE_S on over those from the onset on: after hits that are over by then; in a room, of which none is over
+OVER, AS_DENSE = 0.4, 0.95
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -86,7 +87,7 @@ def _attacked(signals: Array, sr: int, band_hz: tuple[float, float]) -> bool:
     if left < OVER_NOISE:
         return False
     fewer, later = _left_by_start(signals[:, late:], sr, band_hz)
-    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or fewer < FEWER * poles):
+    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or fewer < OVER * poles):
         return False
     if later < OVER_NOISE**2 and fewer > AS_DENSE * poles:
         return False
