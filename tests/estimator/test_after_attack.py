@@ -34,7 +34,7 @@ def take(seed: int, modes: tuple[tuple[float, float, float], ...] = MODES, room:
 
 @pytest.mark.parametrize("room", [0.0, 0.003])
 def test_an_attack_makes_no_lines(room: float) -> None:
-    lines = joint_lines(take(1, room=room)[None], SR, band_hz=BAND)
+    lines = joint_lines(take(1, room=room)[None], SR, band_hz=BAND, shaped=True)
     assert len(lines.freq_hz) == len(MODES)
     for k, (freq, decay, _) in enumerate(MODES):
         assert abs(lines.freq_hz[k] - freq) < 4 * lines.freq_sd_hz[k] + 0.01

@@ -3,7 +3,7 @@ own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
     start:   shared_poles.py
-    after_attack.py, where these leave far more than the noise: a real take is no sum of lines from its onset on
+    after_attack.py, for a known shape, where these leave far more than the noise: a real take is no sum of lines
     refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
         [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
@@ -51,10 +51,14 @@ def joint_lines(
     band_hz: tuple[float, float] = (20.0, 20_000.0),
     signed: bool = True,
     modes: int | None = None,
+    shaped: bool = False,
 ) -> Lines:
     """Lines of signals (s, n), all starting at the onset of their strike.
 
     Raises AudioError where there is too little signal.
+
+    shaped: whether lines are to be paired with modes of a known shape. Those of a real take are then of what rings
+    after its attack; where lines are only played again, those from the onset on predict other takes better.
 
     modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of
     lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
@@ -71,7 +75,7 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     try:
-        if _attacked(signals, sr, (low, high)):
+        if shaped and _attacked(signals, sr, (low, high)):
             return ringing_lines(signals, sr, (low, high), signed=signed)
         return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
