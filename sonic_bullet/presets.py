@@ -43,6 +43,7 @@ from sonic_bullet.residual.code import ResidualForm, residual_of
 
 FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
+RECORDED_FOLDER = FOLDER / "recorded"
 BYTES_MAX = 1 << 20
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
@@ -101,12 +102,32 @@ class Restitution(_Part, frozen=True):
     restitution: Fraction
 
 
+class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """Of a preset that ships with the package and was made of recordings: what was struck, the command that made the
+    file, whose recordings they are, and how near the file alone comes to takes.
+
+    Distances are means in dB over the takes held out, or where none is over those fitted; other_take_db: the nearest
+    other take, None where there is none. distance: what was played and held against which takes, in words.
+    """
+
+    struck: Annotated[str, msgspec.Meta(min_length=1)]
+    command: Annotated[str, msgspec.Meta(min_length=1)]
+    source: Annotated[str, msgspec.Meta(min_length=1)]
+    licence: Annotated[str, msgspec.Meta(min_length=1)]
+    takes_fitted: Annotated[int, msgspec.Meta(ge=1)]
+    takes_held_out: Annotated[int, msgspec.Meta(ge=0)] = 0
+    distance: str = ""
+    predicted_db: NotNegative
+    silence_db: NotNegative
+    other_take_db: NotNegative | None = None
+
+
 class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in
     the same units, where known.
 
     assumed: what was taken from the guess. verdict: the fit's own, or the diagnosis' where one wrote it. correction:
-    relative, of each mode's frequency against the mesh's.
+    relative, of each mode's frequency against the mesh's. origin: of a preset that ships with the package.
     """
 
     method: str
@@ -116,6 +137,7 @@ class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     assumed: tuple[str, ...] = ()
     verdict: str = ""
     correction: dict[str, tuple[float, ...]] = {}
+    origin: Origin | None = None
 
 
 class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
@@ -171,20 +193,33 @@ def named_preset(name: str | os.PathLike[str]) -> Preset:
         return read_preset(text)
     known = material_names()
     if text.lower() in known:
-        return read_preset(FOLDER / f"{text.lower()}.json")
+        folder = RECORDED_FOLDER if text.lower() in recorded_names() else FOLDER
+        return read_preset(folder / f"{text.lower()}.json")
     remedy = nearest(text, known, ", or the path of a preset file")
     raise MaterialError(f"there is no material {shown(text)}", f"{remedy}; 'sonic-bullet materials' lists all")
 
 
 def list_materials() -> tuple[Material, ...]:
-    """All materials that come with the package, by name."""
+    """All materials that come with the package, by name: those of tables, and those of recordings."""
     return tuple(load_material(name) for name in material_names())
 
 
 @cache
 def material_names() -> tuple[str, ...]:
     """The names `load_material` knows, sorted."""
+    return tuple(sorted((*table_names(), *recorded_names())))
+
+
+@cache
+def table_names() -> tuple[str, ...]:
+    """The names of materials whose numbers come from tables, sorted."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
+
+
+@cache
+def recorded_names() -> tuple[str, ...]:
+    """The names of things that were struck and recorded, whose presets come with the package, sorted."""
+    return tuple(sorted(path.stem for path in RECORDED_FOLDER.glob("*.json")))
 
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:

@@ -3,11 +3,13 @@
     python -m benchmarks.ren2013 --data ../shared/practice [CASE ...]
     python -m benchmarks.ren2013 --question speed|ablation [MATERIAL ...]
     python -m benchmarks.ren2013 --question features
+    python -m benchmarks.ren2013 --question real --data ../shared/measured [SET ...]
 
 cases      the paper's procedure and this project's fit against each case's truth, beside the paper's Tables I and II
 speed      the paper's simplex from all its starts, and the fast search down the same metric
 ablation   what hangs on the constants that the paper's lost appendix held
 features   the paper's greedy extraction and this project's
+real       the paper's procedure and this project's fit on real bodies with a mesh
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.ren2013 import ablation, cases, features, speed
+from benchmarks.ren2013 import ablation, cases, features, real_bodies, speed
 
 
 def main() -> int:
@@ -24,7 +26,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.ren2013", description=__doc__.splitlines()[0] if __doc__ else ""
     )
-    parser.add_argument("--question", choices=["cases", "speed", "ablation", "features"], default="cases")
+    parser.add_argument("--question", choices=["cases", "speed", "ablation", "features", "real"], default="cases")
     parser.add_argument("--data", type=Path, help="the folder of cases")
     parser.add_argument("names", nargs="*", metavar="NAME", help="cases, or materials; all by default")
     asked = parser.parse_args()
@@ -37,6 +39,8 @@ def main() -> int:
         return features.main()
     if asked.data is None:
         parser.error("--data is needed: the folder of cases")
+    if asked.question == "real":
+        return real_bodies.main(asked.data, names)
     return cases.main(asked.data, list(names))
 
 

@@ -35,7 +35,7 @@ from sonic_bullet.cli.examples import (
     MODES_EPILOG,
     RESIDUAL_EPILOG,
 )
-from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options
+from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options, uff_option
 from sonic_bullet.cli.scenes.play_command import play
 from sonic_bullet.cli.scenes.render_command import render
 from sonic_bullet.cli.soundtrack.film_command import film
@@ -102,6 +102,7 @@ cli.add_command(score)
     metavar="S",
     help="Metres per mesh unit: 0.001 for a mesh in millimetres.",
 )
+@uff_option
 @json_option
 @click.option(
     "-o",
@@ -166,8 +167,17 @@ def features(**options: Any) -> None:
 @click.argument("source", metavar="RECORDING|CASE_DIR")
 @click.option("-o", "--output", required=True, metavar="PRESET.json", help="The fitted material as a preset file.")
 @strike_options
+@click.option(
+    "--dimension-tolerance",
+    "tolerance_percent",
+    type=float,
+    metavar="PERCENT",
+    help="Standard error of the mesh's dimensions, twice in the spread of E/density; 0: of the lines alone. "
+    "[default: the case's, or 0.5]",
+)
 @click.option("--picture", metavar="NAME.png", help="Also draw recording, synthesis, features and the fitted circle.")
 @csv_option
+@uff_option
 @json_option
 def fit(**options: Any) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
@@ -244,7 +254,7 @@ def case() -> None:
     "--recordings",
     multiple=True,
     metavar="A.wav [B.wav]...",
-    help="The strikes' recordings. [default: all in the folder]",
+    help="The strikes' recordings, or a .uff or .unv file of responses. [default: all in the folder]",
 )
 @click.option("--split", is_flag=True, help="Cut recordings of several strikes into takes of one each.")
 @click.option("--picture", metavar="NAME.png", help="With --split, also draw where each recording is cut.")

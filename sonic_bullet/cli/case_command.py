@@ -1,7 +1,7 @@
 """`case`: a folder of recordings to a case.json that `fit` and `diagnose` read; and whether one can be read.
 
 new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it; recordings
-        of several strikes are cut into takes where that is asked for
+        of several strikes are cut into takes where that is asked for; responses of UFF files become recordings
 check   FOLDER -> what the case holds, and what of it is not read; or one line that says what is wrong
 schema  JSON Schema of case.json
 """
@@ -17,10 +17,12 @@ from typing import Any
 
 from sonic_bullet.cli.hammer import FORCE_COLUMNS, StrikeFiles, part_force
 from sonic_bullet.cli.output import places, table, warn
+from sonic_bullet.cli.responses import RESPONSE_COLUMNS, UFF, ResponseTakes, with_responses, write_takes
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_channel, replacing
+from sonic_bullet.files.case_fields import LARGEST
 from sonic_bullet.files.case_schema import case_schema
-from sonic_bullet.files.cases import FORMAT, LARGEST, UNITS, Case, read_case
+from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.errors import FileError
@@ -52,19 +54,17 @@ def run_case_new(
 
     Raises SonicBulletError.
     """
-    _check_options(hold_out, force_channel, force_newton, mesh, material, sensor, sensor_at or sensor_direction)
-    if picture is not None and not (split and picture.endswith((".png", ".pdf", ".svg"))):
-        wrong = "pictures are .png, .pdf or .svg" if split else "there is nothing to draw without --split"
-        raise FileError(f"cannot write {picture}: {wrong}", "end the name with .png, and give --split too")
-    (drawing,) = places(picture)
-    place = Path(folder)
-    if place.exists() and not place.is_dir():
-        raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
-    if (place / "case.json").exists():
-        raise FileError(f"{place / 'case.json'} is there already", "name another folder, or move it away")
-    sounds = [Path(name) for name in recordings] or sorted(p for p in place.glob("*") if p.suffix.lower() in AUDIO)
-    if not sounds:
-        raise FileError(f"{folder} holds no recordings", "name them: --recordings a.wav b.wav")
+    _check_options(hold_out, force_channel, force_newton, mesh, material)
+    drawing = _drawing(picture, split)
+    place = _new_place(folder)
+    sounds = [Path(name) for name in recordings] or _inside(place)
+    universal = bool(sounds) and all(sound.suffix.lower() in UFF for sound in sounds)
+    _check_recordings(folder, sounds, "--split" if split else "" if force_channel is None else "--force-channel")
+    if sensor != "velocity" and (sensor_at or sensor_direction) and not universal:
+        raise FileError(
+            f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
+            "give --sensor velocity, or leave it out",
+        )
     if mesh is not None:
         from sonic_bullet.modal import read_mesh
 
@@ -72,13 +72,19 @@ def run_case_new(
     thing = _object(mesh, units, material)
     with temporary_folder() as takes:
         if split:
-            sounds, rows = cut_takes(sounds, takes, force_channel, Path(drawing) if drawing else None)
+            sounds, rows = cut_takes(sounds, takes, force_channel, drawing)
             print(table(TAKE_COLUMNS, rows))
         struck: list[StrikeFiles] = []
+        made: ResponseTakes | None = None
         if force_channel is not None:
             struck, rows = part_force(sounds, force_channel, force_newton, takes)
             sounds = [take.sound for take in struck]
             print(table(FORCE_COLUMNS, rows))
+        elif universal:
+            made = write_takes(sounds, takes)
+            sounds = list(made.sounds)
+            warn(made.warnings)
+            print(table(RESPONSE_COLUMNS, made.rows))
         elif not split:
             for sound in sounds:
                 warn(f"{sound}: {words}" for words in _doubts(sound))
@@ -89,6 +95,8 @@ def run_case_new(
         case = _described(
             place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium
         )
+        if made is not None:
+            case = with_responses(case, made, sensor_at, sensor_direction)
         for recording, take in zip(case["recordings"], struck, strict=False):
             force = {"file": name_of[take.force], "channel": 0, "newton_per_unit": force_newton}
             recording["strike"] = recording["strike"] | {"impulse": take.impulse_n_s, "force": force}
@@ -96,8 +104,48 @@ def run_case_new(
             recording["split"] = "holdout"
         _written(place, name_of, case)
     print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {thing['mesh']}"))
-    hard = "" if struck and force_newton is not None else " and how hard"
-    print(f"now say where{hard} each strike was: strike.position in m, strike.impulse in N·s, or null")
+    _say_missing(case, force_newton)
+
+
+def _drawing(picture: str | None, split: bool) -> Path | None:
+    """Where the picture goes. Raises FileError."""
+    if picture is not None and not (split and picture.endswith((".png", ".pdf", ".svg"))):
+        wrong = "pictures are .png, .pdf or .svg" if split else "there is nothing to draw without --split"
+        raise FileError(f"cannot write {picture}: {wrong}", "end the name with .png, and give --split too")
+    (drawing,) = places(picture)
+    return Path(drawing) if drawing else None
+
+
+def _new_place(folder: str) -> Path:
+    """The case's folder, which may be there, without a case.json. Raises FileError."""
+    place = Path(folder)
+    if place.exists() and not place.is_dir():
+        raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
+    if (place / "case.json").exists():
+        raise FileError(f"{place / 'case.json'} is there already", "name another folder, or move it away")
+    return place
+
+
+def _check_recordings(folder: str, sounds: Sequence[Path], option: str) -> None:
+    """Raise FileError where there are none, or UFF files among audio or beside an option that cuts audio."""
+    if not sounds:
+        raise FileError(f"{folder} holds no recordings", "name them: --recordings a.wav b.wav")
+    responses = [sound for sound in sounds if sound.suffix.lower() in UFF]
+    if responses and (option or len(responses) < len(sounds)):
+        raise FileError(
+            f"{responses[0]} beside {option or 'audio'}",
+            "responses of a UFF file are cut already, and per force; make a case of them alone",
+        )
+
+
+def _say_missing(case: dict[str, Any], force_newton: float | None) -> None:
+    """Print what of the strikes is to be filled in; nothing where all is known."""
+    strikes = [recording["strike"] for recording in case["recordings"]]
+    where = any(strike["position"] is None for strike in strikes)
+    hard = force_newton is None and any(strike["impulse"] is None for strike in strikes)
+    if missing := " and ".join(["where"] * where + ["how hard"] * hard):
+        fields = ", ".join(["strike.position in m"] * where + ["strike.impulse in N·s"] * hard)
+        print(f"now say {missing} each strike was: {fields}, or null")
 
 
 def _check_options(
@@ -106,8 +154,6 @@ def _check_options(
     force_newton: float | None,
     mesh: str | None,
     material: str | None,
-    sensor: str,
-    sensor_point: Point | None,
 ) -> None:
     """Raise FileError where an option of `case new` is out of range or lacks another."""
     if hold_out is not None and hold_out < 2:
@@ -121,11 +167,15 @@ def _check_options(
         raise FileError(
             "--material missing", "a shape needs a guess of what it is made of; 'sonic-bullet materials' lists names"
         )
-    if sensor != "velocity" and sensor_point is not None:
-        raise FileError(
-            f"--sensor-at or --sensor-direction is given, but --sensor is {sensor}",
-            "give --sensor velocity, or leave it out",
-        )
+
+
+def _inside(place: Path) -> list[Path]:
+    """The recordings in a folder: audio, or UFF files where there is none."""
+    files = sorted(place.glob("*"))
+    for suffixes in (AUDIO, UFF):
+        if found := [file for file in files if file.suffix.lower() in suffixes]:
+            return found
+    return []
 
 
 def _doubts(sound: Path) -> list[str]:
@@ -150,6 +200,7 @@ def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any
         "units": units,
         "material": guess.name,
         "elastic_guess": {key: float(f"{value:.6g}") for key, value in constants.items()},
+        "dimension_tolerance": None,
     }
 
 

@@ -15,7 +15,8 @@ Examples:
   sonic-bullet modes mug.obj --material porcelain --scale 0.001
   sonic-bullet modes bar.stl --young 2.1e11 --poisson 0.3 --density 7850 --count 10
   sonic-bullet modes tray.obj --material metal --thickness 0.002 --to-hz 5000 --json tray.json -o tray.npz
-  sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01"""
+  sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01
+  sonic-bullet modes plate.obj --material glass --uff plate.uff"""
 
 FIT_EPILOG = """\b
 Examples:
@@ -23,6 +24,7 @@ Examples:
   sonic-bullet fit tap.wav --mesh mug.obj --scale 0.001 --strike 0,0.04,0 --sensor sum \
 --material porcelain -o mug.json --json
   sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
+  sonic-bullet fit my_case/ -o preset.json --dimension-tolerance 0.1 --uff modes.uff
 The preset plays at once: listener.add(body, material="preset.json")."""
 
 RESIDUAL_EPILOG = """\b
@@ -51,6 +53,7 @@ Examples:
   sonic-bullet case new my_case --mesh bar.obj --recordings taps/*.wav --material steel --sensor pressure
   sonic-bullet case new my_taps long_recording.wav --split --hold-out 3
   sonic-bullet case new my_taps taps/*.wav --force-channel 1 --force-newton 2224
+  sonic-bullet case new my_case hammer_test.uff --mesh bar.obj --material steel   (extra: uff)
   sonic-bullet case check my_case
   sonic-bullet fit my_case -o preset.json"""
 

@@ -5,7 +5,7 @@ Exit 0: fitted; 1: a result that says no, as what is fitted is farther from the 
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ import numpy as np
 
 from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, take_tables, write_csv
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
-from sonic_bullet.files.cases import LARGEST, Case, CaseObject, CaseRecording, medium_of, read_case
+from sonic_bullet.files.case_fields import LARGEST
+from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
+from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
@@ -51,15 +53,23 @@ ONE = (
 
 
 def run_fit(
-    source: str, *, output: str, picture: str | None, json_to: str | None, csv_to: str | None, **one: Any
+    source: str,
+    *,
+    output: str,
+    picture: str | None,
+    json_to: str | None,
+    csv_to: str | None,
+    uff_to: str | None,
+    tolerance_percent: float | None,
+    **one: Any,
 ) -> None:
     """The `fit` command. Raises SonicBulletError."""
     if not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
-    to, picture, json_to, csv_to = places(output, picture, json_to, csv_to)
-    case = as_case(source, one)
+    to, picture, json_to, csv_to, uff_to = places(output, picture, json_to, csv_to, uff_name(uff_to))
+    case = _with_tolerance(as_case(source, one), tolerance_percent)
     warn(case.warnings)
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.fit.fitted_preset import preset_of
@@ -68,6 +78,11 @@ def run_fit(
 
         with status(source) as progress:
             found = fit_case(case, progress=progress)
+        if uff_to is not None:
+            from sonic_bullet.estimator.fit.modal_shapes import mobilities, modal_shapes
+
+            shapes = modal_shapes(found)
+            write_uff(uff_to, shapes, mobilities(found, shapes))
         write_preset(str(to), preset_of(found))
         if picture is not None:
             from sonic_bullet.plots.fit_plot import write_fit_picture
@@ -79,6 +94,15 @@ def run_fit(
     write_json(json_to, described(found))
     if found.worse_than_silence:
         raise click.exceptions.Exit(1)
+
+
+def _with_tolerance(case: Case, percent: float | None) -> Case:
+    """The case with the dimensions' tolerance that an option gives, in place of its own. Raises FileError."""
+    if percent is None:
+        return case
+    tolerance = dimension_tolerance(percent / 100, "--dimension-tolerance")
+    things = {name: replace(thing, dimension_tolerance=tolerance) for name, thing in case.objects.items()}
+    return replace(case, objects=things)
 
 
 def as_case(source: str, one: dict[str, Any]) -> Case:
@@ -160,6 +184,7 @@ def described(found: Any) -> dict[str, Any]:
         "sigma": fit.sigma,
         "poisson_ratio": fit.poisson_ratio if found.has_material else None,
         "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
+        "dimension_tolerance": found.dimension_tolerance,
         "verdict": fit.verdict,
         "metric": fit.metric if fit.metric >= 0 else None,
         "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
@@ -198,6 +223,7 @@ def line_rows(found: Any) -> list[dict[str, Any]]:
 
 
 def _summary(found: Any) -> str:
+    from sonic_bullet.estimator.fit.dimension_tolerance import GAMMA_PER_SCALE, lines_sd
     from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
     fit = found.fit
@@ -226,6 +252,12 @@ def _summary(found: Any) -> str:
         table(("", "value", "spread"), rows),
         f"{paired} modes paired with {lines} observed lines",
     ]
+    if np.isfinite(sd[2]) and found.dimension_tolerance:
+        own = lines_sd(fit.covariance, found.dimension_tolerance)
+        text.append(
+            f"spread of E: lines {own:.2g}, dimensions {GAMMA_PER_SCALE * found.dimension_tolerance:.2g} of it, "
+            f"as they are known to {found.dimension_tolerance:.2%} (--dimension-tolerance)"
+        )
     cells = [
         (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
         for row in line_rows(found)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.hammer_pulse import HammerPulse, measure_pulse
+from sonic_bullet.estimator.hammer_pulse import HammerPulse, measure_pulse
 from sonic_bullet.files import live_channel, read_audio, read_audio_scale, write_audio
 from sonic_bullet.records.errors import AudioError, FileError
 

@@ -37,6 +37,13 @@ csv_option = click.option(
     help="Also write the lines: frequency, decay, T60, η and Q with their spreads.",
 )
 
+uff_option = click.option(
+    "--uff",
+    "uff_to",
+    metavar="NAME.uff",
+    help="Also write modal shapes at points, with frequency and damping, as a UFF file (dataset 55). Extra: uff.",
+)
+
 json_option = click.option(
     "--json",
     "json_to",

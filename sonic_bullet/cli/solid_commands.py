@@ -5,16 +5,33 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
 from sonic_bullet.files import write_model
+from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
 from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.errors import FileError, MaterialError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 
+if TYPE_CHECKING:
+    from sonic_bullet.presets import Preset
+
 DEFAULT_MATERIAL = "steel"
+RECORDED_COLUMNS = (
+    "name",
+    "lines",
+    "fitted",
+    "held out",
+    "predicted",
+    "silence",
+    "another take",
+    "licence",
+    "what was struck",
+)
+"""Of the table of presets of recordings; takes fitted and held out are counts."""
 
 
 def run_modes(
@@ -31,12 +48,13 @@ def run_modes(
     accuracy: float,
     scale: float,
     json_to: str | None,
+    uff_to: str | None,
     output: str | None,
 ) -> None:
     """The `modes` command. Raises SonicBulletError."""
     if output is not None and not output.endswith(".npz"):
         raise FileError(f"cannot write {output}: modal models are npz files", "end the name with .npz")
-    to, json_to = places(output, json_to)
+    to, json_to, uff_to = places(output, json_to, uff_name(uff_to))
     if count is not None and to_hz is not None:
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
@@ -59,12 +77,20 @@ def run_modes(
             )
         if to is not None:
             write_model(to, model)
+        if uff_to is not None:
+            write_uff(uff_to, _shapes(mesh, made, model))
         say(_summary(mesh, made, model))
     if large := oversize(model.vertex_m, model.mass_kg):
         print(
             f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr
         )
     write_json(json_to, _described(mesh, made, model, output))
+
+
+def _shapes(mesh: str, material: Material, model: ModalModel) -> ModalShapes:
+    """A model's modes at its vertices, at 1 kg."""
+    title = f"{Path(mesh).name}, {material.name}"
+    return ModalShapes(model.vertex_m, model.shape, model.freq_hz, model.decay_per_s, 1.0, title)
 
 
 def chosen_material(
@@ -97,9 +123,10 @@ def chosen_material(
 
 def run_materials(json_to: str | None) -> None:
     """The `materials` command. Raises FileError."""
-    from sonic_bullet.presets import list_materials
+    from sonic_bullet.presets import load_material, named_preset, recorded_names, table_names
 
-    found = list_materials()
+    found = [load_material(name) for name in table_names()]
+    recorded = [(load_material(name), named_preset(name)) for name in recorded_names()]
     if json_to is None:
         head = ("name", "kg/m³", "E in GPa", "ν", "α in 1/s", "β in s", "roughness in µm", "restitution")
         rows = [
@@ -116,8 +143,46 @@ def run_materials(json_to: str | None) -> None:
             for m in found
         ]
         print(table(head, rows))
+        print("\nof recordings by others: how near the file comes to takes of its object, in dB")
+        print(table(RECORDED_COLUMNS, [_recorded_row(preset) for _, preset in recorded]))
         print("\nsources: 'sonic-bullet materials --json' and docs/explanation/materials.md")
-    write_json(json_to, {"materials": [_material(m) for m in found]})
+    write_json(
+        json_to,
+        {
+            "materials": [_material(m) for m in found],
+            "recorded": [_material(m) | _described_origin(preset) for m, preset in recorded],
+        },
+    )
+
+
+def _recorded_row(preset: Preset) -> tuple[str, ...]:
+    """What the table of recorded presets says of one."""
+    from sonic_bullet.effects.recorded_lines import RecordedLines
+
+    origin = preset.provenance.origin if preset.provenance is not None else None
+    if origin is None:
+        return (preset.name, *("-" for _ in RECORDED_COLUMNS[1:]))
+    lines = [one for one in preset.effects if one["id"] == RecordedLines.id]
+    other = "-" if origin.other_take_db is None else f"{origin.other_take_db:.1f}"
+    return (
+        preset.name,
+        str(len(lines[0]["freq_hz"])) if lines else "numbers",
+        str(origin.takes_fitted),
+        str(origin.takes_held_out or "none"),
+        f"{origin.predicted_db:.1f}",
+        f"{origin.silence_db:.1f}",
+        other,
+        origin.licence,
+        origin.struck,
+    )
+
+
+def _described_origin(preset: Preset) -> dict[str, Any]:
+    """What a recorded preset was made of, for JSON: the fields of its origin."""
+    import msgspec
+
+    origin = preset.provenance.origin if preset.provenance is not None else None
+    return {"origin": None if origin is None else msgspec.to_builtins(origin)}
 
 
 def _material(m: Material) -> dict[str, Any]:

@@ -13,13 +13,41 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 
+from sonic_bullet.files.case_fields import (
+    CaseFields,
+    FixedFields,
+    Line,
+    ObjectFields,
+    RecordingFields,
+    SensorFields,
+    SupportFields,
+    Vector,
+)
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.unread import shown, unread_fields
 from sonic_bullet.records.errors import FileError, excerpt
+
+__all__ = [
+    "DIMENSION_TOLERANCE",
+    "FORMAT",
+    "IN_AIR",
+    "MEDIA",
+    "MOST_TOLERANCE",
+    "SPLITS",
+    "UNITS",
+    "Case",
+    "CaseObject",
+    "CaseRecording",
+    "Line",
+    "dimension_tolerance",
+    "inside",
+    "medium_of",
+    "read_case",
+]
 
 FORMAT = "sonic-bullet-case/1"
 BYTES_MAX = 1 << 24
@@ -29,92 +57,19 @@ SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none")
 IN_AIR = ("velocity", "pressure")
 """Sensors of real things: what they recorded was in air where a case does not say otherwise."""
-LARGEST = 1e6  # metres, or N·s: no place, size or impulse is larger, and squares of such numbers stay finite
-Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
-Magnitude = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
-Hertz = Annotated[float, msgspec.Meta(le=1e7)]
-Channel = Annotated[int, msgspec.Meta(le=4096)]
-Vector = tuple[Number, Number, Number]
-
-
-class _Elastic(msgspec.Struct, frozen=True):
-    youngs_modulus: float | None = None
-    density: Annotated[float, msgspec.Meta(ge=1e-3, le=LARGEST)] | None = None
-    poisson_ratio: float | None = None
-
-
-class _Object(msgspec.Struct, frozen=True):
-    mesh: str | None = None
-    units: str = "m"
-    material: str | None = None
-    elastic_guess: _Elastic = _Elastic()
-
-
-class _Fixed(msgspec.Struct, frozen=True):
-    position: Vector
-    radius: Number = 0.0
-    object: str | None = None
-
-
-class _Support(msgspec.Struct, frozen=True):
-    fixed: tuple[_Fixed, ...] = ()
-
-
-class _Sensor(msgspec.Struct, frozen=True):
-    type: str = ""
-    response: str = ""
-    position: dict[str, Vector] | Vector | None = None
-    direction: dict[str, Vector] | Vector | None = None
-
-
-class _Force(msgspec.Struct, frozen=True):
-    file: str
-    channel: Channel = 0
-    newton_per_unit: Magnitude | None = None
-
-
-class _Strike(msgspec.Struct, frozen=True):
-    position: Vector | None = None
-    direction: Vector | None = None
-    impulse: Annotated[float, msgspec.Meta(ge=1e-12, le=LARGEST)] | None = None
-    force: _Force | None = None
-
-
-class Line(msgspec.Struct, frozen=True):
-    """A measured resonance: freq_hz, and what else was measured of it."""
-
-    freq_hz: Hertz
-    decay_per_s: Hertz | None = None
-    freq_sd_hz: Hertz | None = None
-    decay_sd_per_s: Hertz | None = None
-    amplitude: Magnitude | None = None
-
-
-class _Recording(msgspec.Struct, frozen=True):
-    file: str | None = None
-    features: tuple[Line, ...] | None = None
-    object: str | None = None
-    split: str = "fit"
-    strike: _Strike = _Strike()
-    channel: Channel | None = None
-
-
-class _Raw(msgspec.Struct, frozen=True):
-    format: str
-    recordings: tuple[_Recording, ...]
-    objects: dict[str, _Object] = {}
-    case: str = ""
-    support: _Support | str | None = None
-    sensor: _Sensor | None = None
-    band_hz: tuple[Hertz, Hertz] | None = None
-    onset: str | Number | None = None
-    medium: str | None = None
+DIMENSION_TOLERANCE = 0.005
+"""Relative standard error of a mesh's dimensions where nobody says better: ± 0.1 mm, any error in it as likely, has
+0.058 mm, 0.5 % of 12 mm. [ISO 2768-1, class f, 6 to 30 mm]
+"""
+MOST_TOLERANCE = 0.2  # beyond it a shape is not known at all
 
 
 @dataclass(frozen=True, slots=True)
 class CaseObject:
     """One object: its mesh file and metres per unit, the name of the guessed material, and guessed constants in SI
     units.
+
+    dimension_tolerance: relative standard error of the mesh's dimensions.
     """
 
     name: str
@@ -125,6 +80,7 @@ class CaseObject:
     density_kg_m3: float | None = None
     poisson: float | None = None
     fixed: tuple[tuple[float, float, float, float], ...] = ()
+    dimension_tolerance: float = DIMENSION_TOLERANCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,8 +146,8 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
         if len(content) > BYTES_MAX:
             raise FileError(f"case {path} is over 16 MiB", "give a case.json")
         try:
-            raw = msgspec.json.decode(content, type=_Raw)
-            unread = unread_fields(msgspec.json.decode(content), _Raw, f"case {path}")
+            raw = msgspec.json.decode(content, type=CaseFields)
+            unread = unread_fields(msgspec.json.decode(content), CaseFields, f"case {path}")
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise FileError(
                 f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file"
@@ -205,19 +161,20 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
         return _case(raw, path, unread)
 
 
-def _case(raw: _Raw, path: Path, unread: tuple[str, ...]) -> Case:
+def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
     folder = path.parent
-    clamps = raw.support.fixed if isinstance(raw.support, _Support) else ()
+    clamps = raw.support.fixed if isinstance(raw.support, SupportFields) else ()
     for clamp in clamps:
         if clamp.radius < 0 or (clamp.object is not None and clamp.object not in raw.objects):
             raise FileError(
                 f"case {path}: a clamp has radius {clamp.radius:g} m on object '{clamp.object}'",
                 "give a radius of at least 0, and a listed object",
             )
-    objects = {name: _object(name, thing, folder, clamps) for name, thing in raw.objects.items()}
+    common = dimension_tolerance(raw.dimension_tolerance, f"case {path}: dimension_tolerance")
+    objects = {name: _object(name, thing, folder, clamps, common) for name, thing in raw.objects.items()}
     only = next(iter(objects)) if len(objects) == 1 else None
     recordings = tuple(_recording(entry, i, objects, only, path) for i, entry in enumerate(raw.recordings))
-    sensor = raw.sensor or _Sensor()
+    sensor = raw.sensor or SensorFields()
     low, high = raw.band_hz or (20.0, 20_000.0)
     if not 0 <= low < high:
         raise FileError(f"case {path}: band_hz is {low:g} to {high:g}", "give a low and a high frequency")
@@ -242,7 +199,21 @@ def medium_of(declared: str | None, sensor: str) -> str:
     return declared if declared in MEDIA else "unknown"
 
 
-def _object(name: str, thing: _Object, folder: Path, clamps: tuple[_Fixed, ...]) -> CaseObject:
+def dimension_tolerance(given: float | None, name: str, default: float = DIMENSION_TOLERANCE) -> float:
+    """A relative error of dimensions as given, or the default. Raises FileError where it is out of range."""
+    if given is None:
+        return default
+    if not 0 <= given <= MOST_TOLERANCE:
+        raise FileError(
+            f"{name} is {100 * given:g} %",
+            f"give their relative standard error, 0 to {100 * MOST_TOLERANCE:g} %; in a case.json 0.005 is 0.5 %",
+        )
+    return float(given)
+
+
+def _object(
+    name: str, thing: ObjectFields, folder: Path, clamps: tuple[FixedFields, ...], tolerance: float
+) -> CaseObject:
     if thing.units not in UNITS:
         raise FileError(f"object '{name}': unit '{thing.units}' is not known", f"use one of {', '.join(UNITS)}")
     guess = thing.elastic_guess
@@ -255,13 +226,13 @@ def _object(name: str, thing: _Object, folder: Path, clamps: tuple[_Fixed, ...])
         )
     fixed = tuple((*clamp.position, clamp.radius) for clamp in clamps if clamp.object in (None, name))
     mesh = inside(folder, thing.mesh) if thing.mesh is not None else None
-    return CaseObject(
-        name, mesh, UNITS[thing.units], thing.material, guess.youngs_modulus, guess.density, guess.poisson_ratio, fixed
-    )
+    own = dimension_tolerance(thing.dimension_tolerance, f"object '{name}': dimension_tolerance", tolerance)
+    constants = guess.youngs_modulus, guess.density, guess.poisson_ratio
+    return CaseObject(name, mesh, UNITS[thing.units], thing.material, *constants, fixed, own)
 
 
 def _recording(
-    entry: _Recording, number: int, objects: dict[str, CaseObject], only: str | None, path: Path
+    entry: RecordingFields, number: int, objects: dict[str, CaseObject], only: str | None, path: Path
 ) -> CaseRecording:
     where = f"case {path}: recording {number + 1}"
     name = entry.object or only or ("" if not objects else None)
@@ -321,7 +292,7 @@ def _by_object(value: dict[str, Vector] | Vector | None, objects: dict[str, Case
     return dict.fromkeys(objects or [""], value)
 
 
-def _response(sensor: _Sensor) -> str:
+def _response(sensor: SensorFields) -> str:
     """What is recorded: the declared response decides, then the sensor's type."""
     for text in (sensor.response.lower(), sensor.type.lower()):
         if "velocity" in text or "vibromet" in text:
@@ -342,7 +313,7 @@ def _onset(value: Any) -> float | None:
     return None
 
 
-def _said(support: _Support | str | None) -> str:
-    if isinstance(support, _Support):
+def _said(support: SupportFields | str | None) -> str:
+    if isinstance(support, SupportFields):
         return f"clamped at {len(support.fixed)} places" if support.fixed else "free"
     return support or "not declared"

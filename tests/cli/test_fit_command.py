@@ -23,6 +23,7 @@ KEYS = {
     "sigma",
     "poisson_ratio",
     "covariance",
+    "dimension_tolerance",
     "verdict",
     "metric",
     "log_spectral_db",

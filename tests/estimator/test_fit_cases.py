@@ -31,8 +31,12 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> Planted:
     return make(tmp_path_factory.mktemp("box"), BRASS, guess=GUESS, strikes=3, seconds=0.4)
 
 
-def described(folder: Path, names: tuple[str, ...], *, units: str, to_hz: float = 9_000.0) -> Case:
-    """Measured lines of boxes of brass, frequencies to 1e-4 and decays to 1 %; meshes in the unit named."""
+def described(
+    folder: Path, names: tuple[str, ...], *, units: str, to_hz: float = 9_000.0, tolerance: float | None = None
+) -> Case:
+    """Measured lines of boxes of brass, frequencies to 1e-4 and decays to 1 %; meshes in the unit named, whose
+    dimensions are known to a tolerance.
+    """
     rng = np.random.default_rng(8)
     scale = {"m": 1.0, "mm": 1000.0}[units]
     objects: dict[str, Any] = {}
@@ -58,19 +62,18 @@ def described(folder: Path, names: tuple[str, ...], *, units: str, to_hz: float 
             for x, y in zip(f, d, strict=True)
         ]
         recordings.append({"features": lines, "object": name, "split": "fit"})
-    (folder / "case.json").write_text(
-        json.dumps({"format": "sonic-bullet-case/1", "objects": objects, "recordings": recordings})
-    )
+    case = {"format": "sonic-bullet-case/1", "objects": objects, "recordings": recordings}
+    (folder / "case.json").write_text(json.dumps(case | {"dimension_tolerance": tolerance}))
     return read_case(folder)
 
 
 def test_two_objects_of_one_material_tell_more_than_either(tmp_path: Path) -> None:
     """Meshes in millimetres and said to be; one γ, ν, α, β for both, each within four of its spreads, and the spreads
-    smaller than one object's.
+    smaller than one object's. Dimensions are exact: the spreads are those of the lines.
     """
     (tmp_path / "one").mkdir()
-    both = fit_case(described(tmp_path, ("bar", "plate"), units="mm"))
-    one = fit_case(described(tmp_path / "one", ("plate",), units="m"))
+    both = fit_case(described(tmp_path, ("bar", "plate"), units="mm", tolerance=0.0))
+    one = fit_case(described(tmp_path / "one", ("plate",), units="m", tolerance=0.0))
     assert [(o.line >= 0).sum() for o in both.objects] == [len(o.evidence.lines.freq_hz) for o in both.objects]
     sd, alone = (np.sqrt(np.diag(found.fit.covariance)) for found in (both, one))
     gamma = BRASS.youngs_pa / BRASS.density_kg_m3

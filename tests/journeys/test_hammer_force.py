@@ -11,7 +11,7 @@ import pytest
 import soundfile
 
 from sonic_bullet import modal
-from sonic_bullet.estimator.lines.hammer_pulse import measure_pulse
+from sonic_bullet.estimator.hammer_pulse import measure_pulse
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run

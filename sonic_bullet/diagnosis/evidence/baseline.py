@@ -123,7 +123,8 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
     assert one.signals is not None
     still = without_hum(one.signals, noise_rms(one.signals, one.sr), one.sr)
     try:
-        some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed)
+        shaped = one.family is not None
+        some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed, shaped=shaped)
         lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
     except (AudioError, np.linalg.LinAlgError):
         return None

@@ -81,6 +81,7 @@ class CaseFit:
     mean over the fitted strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with.
     evidence: what was recorded of each object, those
     without a mesh included. takes: how far the prediction of each take is, of those held out where there are any.
+    dimension_tolerance: of the shapes, relative, in γ's variance.
     """
 
     case: Case
@@ -99,6 +100,7 @@ class CaseFit:
     radiation: RadiationIn = "damping"
     evidence: tuple[RecordedObject, ...] = ()
     takes: tuple[TakeDistance, ...] = ()
+    dimension_tolerance: float = 0.0
 
     @property
     def has_material(self) -> bool:

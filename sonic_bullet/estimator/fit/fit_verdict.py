@@ -11,6 +11,7 @@ import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
+from sonic_bullet.estimator.fit.dimension_tolerance import add_dimension_tolerance, scale_tolerance
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.fit.rayleigh import RayleighFit
 from sonic_bullet.estimator.fit.recorded import RecordedObject
@@ -47,6 +48,8 @@ def finished(
         unsaid.append(f"{name} (the decays of {_decays_seen(evidence)} lines do not tell it)")
     covariance[:2, :2] = damping.covariance
     _elastic(covariance, information, unsaid, bool(objects))
+    tolerance = scale_tolerance(objects)
+    add_dimension_tolerance(covariance, tolerance)
     if np.isfinite(gain[0]):
         covariance[3, 3] = (gain[1] / gain[0]) ** 2
         if not any(e.seen is not None and (e.seen.level & e.seen.known).any() for e in evidence):
@@ -80,6 +83,8 @@ def finished(
         assumed.append("poisson_ratio (from the guess)")
     if not objects:
         assumed.append("gamma (from the guess: no mesh)")
+    elif tolerance and np.isfinite(covariance[2, 2]):
+        assumed.append(f"dimensions (known to {tolerance:.2%}: they are in the spread of gamma)")
     warnings = [note for e in evidence for note in e.notes]
     if objects and objects[0].evidence.family is not None and not np.isnan(covariance[2, 2]):
         warnings += _mesh_warning(objects[0].evidence.family)
@@ -98,6 +103,7 @@ def finished(
         decibels,
         radiation,
         evidence,
+        dimension_tolerance=tolerance,
     )
 
 

@@ -141,7 +141,8 @@ def gather(
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             still = without_hum(signals, noise_rms(signals, sr), sr)
-            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
+            signed, shaped = case.onset_s is not None, body is not None
+            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=signed, modes=modes, shaped=shaped)
             odd = []
             if case.onset_s is None:
                 odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])

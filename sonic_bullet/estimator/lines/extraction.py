@@ -6,6 +6,7 @@ learnt since].
     -> noise_density.py   density over frequency, course over time
     -> subspace.py (poles, band by band)
         every frequency resolution at once, where the paper goes from level to level
+    -> after_attack.py         where what those leave is far louder than the noise: of what rings after the attack
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes
     -> onset.py   the modes, run backwards, tell the sample of the onset
@@ -23,9 +24,11 @@ from collections.abc import Callable
 import numpy as np
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
+from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import limit_band
+from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
-from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.lines.line_values import Features, Lines
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.records import Array
@@ -50,6 +53,7 @@ FRONT, FRONT_SHARE = 0.3, 0.75
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
+ATTACK_S, QUIETEST = 0.02, 10**-2.6  # after which a real take is judged; noise over the signal there, at least
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
@@ -95,11 +99,14 @@ def extract(
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
     notes += [*filter(None, [describe_hum(hum_hz)]), *doubts]
-    modes, noise = (
+    found = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
         else _modes(x, sr, (low, high))
     )
+    if isinstance(found, Lines):
+        return _ringing(x, limited[part.start : part.start + len(x)], found, sr, part.start, notes)
+    modes, noise = found
     start = part.start
     for _ in range(RESTORED if steady_above and len(modes.pole) else 0):
         # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
@@ -133,14 +140,19 @@ def _fit(
     )
 
 
-def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise]:
-    """The significant modes of a signal and the noise they leave."""
+def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:
+    """The significant modes of a signal and the noise they leave; of a real take what rings after its attack."""
     floor = FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
         return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
     least = _least(x)
-    modes, noise = _first(x, sr, band_hz, least, floor)
+    start = _start(x, sr, band_hz, floor)
+    left = likelihood.residual(x, start, sr)
+    late = min(round(ATTACK_S * sr), len(x) // 4)
+    if _rms(left[late:]) > OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST * _rms(x[late:])):
+        return ringing_lines(x[None], sr, band_hz, signed=True)
+    modes, noise = _first(x, sr, start, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(ROUNDS):
         more = matched(likelihood.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), FASTEST_PER_S)
@@ -167,9 +179,7 @@ def _least(x: Array) -> float:
 
 
 def _least_of_a_second(modes: int, least: float) -> float:
-    """Least energy of a second mode in a line: it has the few cells beside the lines to chance upon, not the whole
-    recording.
-    """
+    """Least energy of a second mode in a line: of all cells it has but the few beside the lines to chance upon."""
     return float(min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS)))
 
 
@@ -188,10 +198,8 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
     return at
 
 
-def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor: float) -> tuple[Sinusoids, Noise]:
-    """The significant ones of the bands' poles, fitted; the strongest alone where there are more than can be
-    identified.
-    """
+def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sinusoids:
+    """The bands' poles and their amplitudes; the strongest alone where there are more than can be identified."""
     density = np.maximum(noise_density(x, sr, band_hz, tail=True), floor)
     slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
@@ -200,7 +208,14 @@ def _first(x: Array, sr: int, band_hz: tuple[float, float], least: float, floor:
     most = min(2 * MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     if len(pole) > most:
         pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
-    start = likelihood.amplitudes(x, pole, sr)
+    return likelihood.amplitudes(x, pole, sr)
+
+
+def _first(
+    x: Array, sr: int, start: Sinusoids, band_hz: tuple[float, float], least: float, floor: float
+) -> tuple[Sinusoids, Noise]:
+    """The significant ones of the bands' poles, fitted."""
+    pole = start.pole
     noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole), band_hz)
     if not len(pole):
         return start, noise
@@ -275,18 +290,11 @@ def _features(
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
             notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
-    front = banded[: int(FRONT * len(x))]
-    # a rattle starts with its most; speech, noise, music do not
-    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(banded @ banded)
-    if explained < EXPLAINED:
-        given = "" if modal else "; no feature is given"
-        notes.append(
-            f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy{given}"
-        )
+    modal = _modal(explained, banded, notes)
     amplitude, turn = np.abs(modes.amplitude), np.angle(modes.amplitude)
     pinned = (sd[1] > 0) & (np.abs(decay / FASTEST_PER_S - PINNED) < 1.001 * (1 - PINNED)) & (len(noise.density) > 2)
     keep = np.flatnonzero(~(tone | vague | pinned) & (freq >= band_hz[0]) & (freq <= band_hz[1]) & modal)
-    keep = keep[np.argsort(-amplitude[keep], kind="stable")]
+    keep = keep[np.argsort(-(amplitude[keep] ** 2) / decay[keep], kind="stable")]
     if not len(keep) and modal:
         notes.append("no mode stands above the noise")
     return Features(
@@ -297,6 +305,44 @@ def _features(
         freq_sd_hz=sd[0, keep] / (2 * np.pi),
         decay_sd_per_s=sd[1, keep],
         amplitude_sd=np.hypot(sd[2, keep] * np.cos(turn[keep]), sd[3, keep] * np.sin(turn[keep])),
+        onset_s=start / sr,
+        noise_dbfs=20 * np.log10(max(_rms(left), 1e-15)),
+        sr=sr,
+        note="; ".join(notes),
+    )
+
+
+def _modal(explained: float, banded: Array, notes: list[str], enough: float = EXPLAINED) -> bool:
+    """Whether lines that explain so much of a sound's energy are worth being shown; notes get what is amiss."""
+    front = banded[: int(FRONT * len(banded))]
+    # a rattle starts with its most; speech, noise, music do not
+    modal = explained >= TRUSTED or float(front @ front) >= FRONT_SHARE * float(banded @ banded)
+    if explained < enough:
+        given = "" if modal else "; no feature is given"
+        notes.append(
+            f"not an impact, or not modal: damped sinusoids explain {100 * explained:.0f} % of the energy{given}"
+        )
+    return modal
+
+
+def _ringing(x: Array, banded: Array, lines: Lines, sr: int, start: int, notes: list[str]) -> Features:
+    """Features of what rings after the attack of a take (n,); banded (n,): what the band alone holds of it."""
+    left = likelihood.residual(x, Sinusoids(lines.pole, lines.amplitude[0]), sr) + banded - x
+    late = min(round(ATTACK_S * sr), len(x) // 4)
+    explained = 1 - float(left[late:] @ left[late:]) / float(banded[late:] @ banded[late:])
+    amplitude = np.abs(lines.amplitude[0])
+    order = np.argsort(-(amplitude**2) / lines.decay_per_s, kind="stable")
+    keep = order if _modal(explained, banded, notes, TRUSTED) else order[:0]
+    if not len(order):
+        notes.append("no mode stands above the noise")
+    return Features(
+        freq_hz=lines.freq_hz[keep],
+        decay_per_s=lines.decay_per_s[keep],
+        amplitude=amplitude[keep],
+        phase_rad=np.angle(lines.amplitude[0, keep]) + np.pi / 2,
+        freq_sd_hz=lines.freq_sd_hz[keep],
+        decay_sd_per_s=lines.decay_sd_per_s[keep],
+        amplitude_sd=lines.amplitude_sd[0, keep],
         onset_s=start / sr,
         noise_dbfs=20 * np.log10(max(_rms(left), 1e-15)),
         sr=sr,

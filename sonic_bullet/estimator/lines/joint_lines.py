@@ -3,6 +3,7 @@ own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
     start:   shared_poles.py
+    after_attack.py, for a known shape, where these leave far more than the noise: a real take is no sum of lines
     refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
         [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
@@ -15,11 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.pole_selection import apart, selected
 from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
+from sonic_bullet.estimator.lines.strike_times import find_strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -32,6 +35,10 @@ CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at t
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
+# rms that poles leave of what is a sum of lines, at most: 20 dB; times that, what a room that is one later leaves
+OVER_NOISE, A_ROOM = 10.0, 2.0
+# poles from LATE_S on over those from the onset on: after hits that are over by then; in a room, of which none is over
+OVER, AS_DENSE = 0.4, 0.95
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -44,10 +51,14 @@ def joint_lines(
     band_hz: tuple[float, float] = (20.0, 20_000.0),
     signed: bool = True,
     modes: int | None = None,
+    shaped: bool = False,
 ) -> Lines:
     """Lines of signals (s, n), all starting at the onset of their strike.
 
     Raises AudioError where there is too little signal.
+
+    shaped: whether lines are to be paired with modes of a known shape. Those of a real take are then of what rings
+    after its attack; where lines are only played again, those from the onset on predict other takes better.
 
     modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of
     lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
@@ -64,11 +75,34 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     try:
+        if shaped and _attacked(signals, sr, (low, high)):
+            return ringing_lines(signals, sr, (low, high), signed=signed)
         return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
         ) from error
+
+
+def _attacked(signals: Array, sr: int, band_hz: tuple[float, float]) -> bool:
+    """Whether signals (s, n) hold what no sum of lines is, and neither a room nor hits in a row explain."""
+    late = min(round(LATE_S[0] * sr), signals.shape[1] // 8)
+    poles, left = _left_by_start(signals, sr, band_hz)
+    if left < OVER_NOISE:
+        return False
+    fewer, later = _left_by_start(signals[:, late:], sr, band_hz)
+    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or fewer < OVER * poles):
+        return False
+    if later < OVER_NOISE**2 and fewer > AS_DENSE * poles:
+        return False
+    return not any((find_strikes(signal, sr) > late / sr).any() for signal in signals)
+
+
+def _left_by_start(signals: Array, sr: int, band_hz: tuple[float, float]) -> tuple[int, float]:
+    """How many poles signals (s, n) start with, and what these leave over the noise, the median over signals."""
+    noise = noise_rms(signals, sr)
+    pole = start_poles(signals / noise[:, None], sr, *band_hz)
+    return len(pole), float(np.median(amplitudes_at(signals, noise, apart(pole), sr)[3] / noise))
 
 
 def _identified(

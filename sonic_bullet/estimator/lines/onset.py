@@ -1,9 +1,10 @@
 """Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest
 signal.
 
-energy in blocks of 1 ms -> the first block within 20 dB of the loudest -> first sample above the noise in that block ->
-about the onset the modes observed after it, run backwards, against silence: the sample where the sound takes over from
-silence -> the onset a later strike (strike_times.py): another hit; what follows it is left out
+energy in blocks of 1 ms -> the first block within 20 dB of the loudest, or the first strike (strike_times.py) ->
+first sample above the noise in that block -> about the onset the modes observed after it, run backwards, against
+silence: the sample where the sound takes over from silence -> the onset a later strike: another hit; what follows it is
+left out
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from sonic_bullet.records import Array
 
 BLOCK_S = 1e-3
 NEAR_DB = 20.0
-HUM, STEADY = 0.5, 1.2  # power before a strike over that after it; of its first half over that of its second
+FALLS = 1.1  # the loudest block of a strike's first 50 ms over those after
 CLIPPED_RUN = 3
 SHOWN = 6  # hits whose times are said
 REACH = 64  # samples that the first guess may be off
@@ -61,7 +62,12 @@ def span(signal: Array, sr: int) -> Span:
     if len(power) < 4:
         return Span(0, len(signal))
     floor = max(float(np.quantile(power, 0.05)), 1e-20)
+    strikes = find_strikes(signal, sr)
     early = int(np.argmax(power >= power.max() * 10 ** (-NEAR_DB / 10)))  # the first hit, be a later one louder
+    struck = round(strikes[0] * sr) // block if len(strikes) else 0
+    begun = early + round(GAP_S / BLOCK_S)
+    if struck > begun and power[early:begun].max() < FALLS * power[begun:struck].max():
+        early = struck  # what was there before does not fall: no strike
     loud = early + int(np.argmax(power[early : early + 10]))
     quiet = np.flatnonzero(power[:loud] < max(1e-3 * power[loud], 4 * floor))
     first = int(quiet[-1]) if len(quiet) else 0
@@ -70,30 +76,17 @@ def span(signal: Array, sr: int) -> Span:
     edge = max(6 * sigma, 0.02 * float(np.abs(signal).max()))
     over = np.flatnonzero(np.abs(signal[first * block :]) > edge)
     start = first * block + (int(over[0]) if len(over) else 0)
-    found = until_next_hit(signal, sr, start)
-    first, half = found.stop, (found.stop - start) // 2
-    before, after = signal[start:first], signal[first : first + round(GAP_S * sr)]
-    if (
-        found.later
-        and np.abs(after).max() > np.abs(before).max()
-        and _power(before) < HUM * _power(after)
-        and _power(before[:half]) < STEADY * _power(before[half:])
-    ):
-        begin = first - block  # what neither strikes nor decays before a strike is hum or noise, and no hit
-        over = np.flatnonzero(np.abs(signal[begin:]) > np.abs(before).max())
-        return Span(begin + int(over[0]), (*found.later[1:], len(signal))[0], found.later[1:])
-    return found
+    return _until_next(strikes, sr, start, len(signal))
 
 
 def until_next_hit(signal: Array, sr: int, start: int) -> Span:
     """The impact of a recording (n,) that begins at sample ``start``."""
-    strikes = find_strikes(signal, sr)
+    return _until_next(find_strikes(signal, sr), sr, start, len(signal))
+
+
+def _until_next(strikes: Array, sr: int, start: int, end: int) -> Span:
     later = tuple(round(t * sr) for t in strikes[strikes > start / sr + GAP_S])
-    return Span(start, later[0] if later else len(signal), later)
-
-
-def _power(signal: Array) -> float:
-    return float((signal**2).mean())
+    return Span(start, later[0] if later else end, later)
 
 
 def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float) -> int:

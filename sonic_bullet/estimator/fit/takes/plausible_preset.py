@@ -3,13 +3,15 @@
     (E/ρ, ν, α, β) of the guess -> modes of the object's shape -> A = ψ(place) w, d = ½(α + βλ)
         no place known: the root mean square of ψ over the surface
 
-α and β of a guess without them are those of the shipped preset whose E/ρ and ρ are nearest, by ratio.
+α and β of a guess without them are those of the table's preset whose E/ρ and ρ are nearest, by ratio. A damping law of
+the guess takes their place.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
 from sonic_bullet.estimator.fit.recorded import RecordedObject, observed
@@ -18,13 +20,13 @@ from sonic_bullet.records import Array, Material
 
 
 def with_shipped_damping(guess: Material) -> Material:
-    """The guess, or where it has no damping the shipped isotropic preset that is nearest to it."""
-    from sonic_bullet.presets import load_material, material_names
+    """The guess, or where it has no damping the isotropic preset of a table that is nearest to it."""
+    from sonic_bullet.presets import load_material, table_names
 
     if guess.alpha_per_s is not None and guess.beta_s is not None:
         return guess
     own = np.log([guess.youngs_pa / guess.density_kg_m3, guess.density_kg_m3])
-    shipped = [m for name in material_names() if (m := load_material(name)).youngs_pa and m.beta_s is not None]
+    shipped = [m for name in table_names() if (m := load_material(name)).youngs_pa and m.beta_s is not None]
     return min(
         shipped,
         key=lambda m: float(((np.log([m.youngs_pa / m.density_kg_m3, m.density_kg_m3]) - own) ** 2).sum()),
@@ -41,6 +43,8 @@ def plausible_sound(found: CaseFit, e: RecordedObject, recording: CaseRecording,
     guess, shipped = e.guess, with_shipped_damping(e.guess)
     value, vector = e.family.modes(guess.youngs_pa / guess.density_kg_m3, guess.poisson)
     decay = 0.5 * ((shipped.alpha_per_s or 0) + (shipped.beta_s or 0) * value)
+    for law in (effect for effect in guess.effects if isinstance(effect, DampingLaw)):
+        decay = law.decay_per_s(np.sqrt(np.maximum(value, 0)))
     band = found.case.band_hz[0], min(found.case.band_hz[1], sr / 2)
     freq = np.sqrt(np.maximum(value - decay**2, 0)) / (2 * np.pi)
     seen = observed(found.case, e.thing, guess, (recording,), e.family)

@@ -1,0 +1,150 @@
+"""Responses of UFF files as takes of a case: a recording each, where its strike was and along what.
+
+responses -> those of one sensor, as a case has one -> recordings (impulse_response.py), one common factor
+    -> NAME-01.wav and so on, strike {place, direction, impulse}, sensor, onset, band
+
+What hangs on a force is played as struck with J N·s, J such that the loudest take peaks at PEAK: then files are in m/s
+or Pa. Responses at many points to one exciter are turned round: H_ij = H_ji of motion.     [Maxwell-Betti]
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files import write_audio
+from sonic_bullet.files.case_fields import LARGEST
+from sonic_bullet.files.uff.impulse_response import as_recording
+from sonic_bullet.files.uff.reader import Freedom, Point, Response, read_uff
+from sonic_bullet.records.errors import FileError
+
+UFF = frozenset({".uff", ".unv"})
+RESPONSE_COLUMNS = ("take", "struck at", "measured at", "of", "")
+PEAK = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class ResponseTakes:
+    """Takes made of UFF files: sounds and strikes (JSON) in order, rows by `RESPONSE_COLUMNS`, and what a case says of
+    all. warnings: one line each.
+    """
+
+    sounds: tuple[Path, ...]
+    strikes: tuple[dict[str, Any], ...]
+    rows: tuple[tuple[str, ...], ...]
+    response: str
+    sensor: Freedom
+    onset: str | None
+    band_hz: tuple[float, float]
+    warnings: tuple[str, ...]
+
+
+def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
+    """Write the takes of UFF files to a folder.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Of one object and one kind of response.
+    to : Path
+        Folder for the takes.
+
+    Returns
+    -------
+    ResponseTakes
+        What was written, and what of it a case says.
+
+    Raises
+    ------
+    FileError
+        A file that cannot be read or holds nothing that is understood.
+    """
+    read = {file: read_uff(file) for file in files}
+    warnings = [f"{file}: {note}" for file, one in read.items() for note in one.notes]
+    every = [(file, response) for file, one in read.items() for response in one.responses]
+    kept, turned = _of_one_sensor([response for _, response in every])
+    if len(kept) < len(every):
+        warnings.append(
+            f"{len(every) - len(kept)} of {len(every)} responses are left out: a case has one sensor, and they have "
+            "another, or are of another kind"
+        )
+    chosen = [(file, response) for file, response in every if any(response is one for one in kept)]
+    recordings = [as_recording(response) for _, response in chosen]
+    loudest = max(float(np.abs(sound).max()) for sound, _, _ in recordings)
+    if not loudest > 0:
+        raise FileError(f"{files[0]} holds zeros alone", "export what was measured")
+    first = kept[0]
+    impulse = min(float(f"{PEAK / loudest:.5g}"), LARGEST) if first.per_force else None
+    sounds, strikes, rows = [], [], []
+    number: dict[Path, int] = defaultdict(int)
+    for (file, response), (sound, sr, _) in zip(chosen, recordings, strict=True):
+        number[file] += 1
+        path = to / f"{file.stem}-{number[file]:02d}.wav"
+        write_audio(path, sound * (impulse or 1.0), sr, full_scale_pa=None, subtype="FLOAT")
+        strike, sensor = (response.sensor, response.strike) if turned else (response.strike, response.sensor)
+        sounds.append(path)
+        strikes.append({"position": strike.position_m, "direction": strike.direction, "impulse": impulse})
+        rows.append((path.name, _place(strike), _place(sensor), response.quantity, _done(response, turned)))
+    return ResponseTakes(
+        tuple(sounds),
+        tuple(strikes),
+        tuple(rows),
+        "pressure" if first.quantity == "pressure" else "velocity",
+        first.strike if turned else first.sensor,
+        "sample 0: responses to an impulse" if first.per_force else None,
+        (max(low for _, _, (low, _) in recordings), min(high for _, _, (_, high) in recordings)),
+        tuple(warnings),
+    )
+
+
+def with_responses(
+    case: dict[str, Any], made: ResponseTakes, sensor_at: Point | None, sensor_direction: Point | None
+) -> dict[str, Any]:
+    """The case with what its UFF files say; what options say of the sensor comes first."""
+    surface = made.response == "velocity"
+    sensor = {
+        "response": made.response,
+        "position": sensor_at or (made.sensor.position_m if surface else None),
+        "direction": sensor_direction or (made.sensor.direction if surface else None),
+    }
+    recordings = [
+        recording | {"strike": strike} for recording, strike in zip(case["recordings"], made.strikes, strict=True)
+    ]
+    said = {"sensor": sensor, "onset": made.onset, "band_hz": list(made.band_hz), "recordings": recordings}
+    return case | said
+
+
+def _of_one_sensor(responses: list[Response]) -> tuple[list[Response], bool]:
+    """The most responses of one kind that one sensor can have recorded, and whether exciter and sensor change places
+    for that.
+    """
+    groups: dict[tuple[Any, ...], list[Response]] = defaultdict(list)
+    for response in responses:
+        pressure = response.quantity == "pressure"
+        kind = pressure, response.per_force
+        groups[(False, *kind, response.sensor)].append(response)
+        if response.per_force and not pressure and response.strike.node:
+            groups[(True, *kind, response.strike)].append(response)
+    best = max(groups, key=lambda key: (len(groups[key]), not key[0]))
+    return groups[best], bool(best[0])
+
+
+def _place(freedom: Freedom) -> str:
+    """A node with its direction and place, in words."""
+    if not freedom.node:
+        return "not said"
+    axis = f" {'+-'[freedom.axis < 0]}{'XYZ'[abs(freedom.axis) - 1]}" if freedom.axis else ""
+    place = "" if freedom.position_m is None else " (" + ", ".join(f"{x:.4g}" for x in freedom.position_m) + ") m"
+    return f"node {freedom.node}{axis}{place}"
+
+
+def _done(response: Response, turned: bool) -> str:
+    """What was done with a response, in words."""
+    change = {"acceleration": "integrated to velocity", "displacement": "derived to velocity"}
+    parts = [change.get(response.quantity, ""), "exciter and sensor change places" * turned]
+    return "; ".join(filter(None, parts))

@@ -1,0 +1,130 @@
+"""Responses to a force as a recording of one impulse: velocity of a surface, or pressure.
+
+    H(f) of acceleration, velocity, displacement  ->  V = H/(iω), H, iωH          [Ewins 2000, ch. 2.2, mobility]
+    h(t) = ∫ V e^{iωt} df  ->  irfft(V·W)·sr, response in m/s (or Pa) to 1 N·s
+
+W falls to nothing over the top tenth of what was measured and below the band: a sharp edge rings. Steps of Δf give a
+period 1/Δf; a mode that rings on beyond it wraps around as A e^{pt}/(1 − e^{p/Δf}), with the same pole p.
+
+h jumps at the impulse, and of a jump no band is exact: half of it stands in the first sample, the rest rings about it.
+Those samples are predicted from those that follow, x_n = Σ a_k x_{n+k}.        [linear prediction: Makhoul 1975, eq. 2]
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sonic_bullet.files.recordings import MOST_SAMPLES, READ_MIN_HZ
+from sonic_bullet.files.uff.reader import Response
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError
+
+LOWEST_HZ = 20.0
+TOP, BAND = 0.85, 0.8  # of the highest frequency measured: where W begins to fall, where the band ends
+OFF_GRID = 0.01  # of a step
+OFF_RATE = 5e-5  # relative: six figures of a step, and their last
+ABOUT_JUMP = 24  # samples at twice the highest frequency: a few periods of what is left of the top tenth
+ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
+EXACT = 1e-13  # of the largest eigenvalue: below it are rounding errors
+LENGTHS = 4096  # even numbers of samples to choose the whole rate from
+MOTION = {"acceleration": -1, "velocity": 0, "displacement": 1}
+"""Powers of iω from a quantity to velocity."""
+
+
+def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
+    """A response as a recording.
+
+    Parameters
+    ----------
+    response : Response
+        Of motion or pressure, over frequency or time.
+
+    Returns
+    -------
+    (n,) array
+        Velocity in m/s or pressure in Pa; per N·s where the response is per force.
+    int
+        Its rate in Hz.
+    tuple of float
+        The band that it holds, in Hz.
+
+    Raises
+    ------
+    FileError
+        No whole number of Hz is its rate, or it unpacks to more than memory is for.
+    """
+    power = MOTION.get(response.quantity, 0)
+    if not response.spectral:
+        return _from_time(response, power)
+    step, first = response.step, round(response.start / response.step)
+    if abs(response.start / step - first) > OFF_GRID:
+        raise FileError(
+            f"a response starts at {response.start:g} Hz in steps of {step:g} Hz", "export it from a multiple of them"
+        )
+    last = first + len(response.value) - 1
+    count, sr = _length(max(2 * last, math.ceil(READ_MIN_HZ / step)), step)
+    freq = sr / count * np.arange(first, last + 1)
+    low = max(LOWEST_HZ, 2 * step, response.start * 1.1)
+    spectrum = np.zeros(count // 2 + 1, complex)
+    spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, TOP * freq[-1])
+    sound = np.fft.irfft(spectrum, count) * sr
+    jump = math.ceil(ABOUT_JUMP * sr / (2 * freq[-1]))
+    return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, BAND * float(freq[-1]))
+
+
+def _predicted_back(sound: Array, jump: int) -> Array:
+    """A recording (n,) whose first samples are predicted from those that follow; itself where it is too short."""
+    order = min(ORDER, (len(sound) - jump) // 8)
+    if order < 2:
+        return sound
+    window = np.lib.stride_tricks.sliding_window_view(sound[jump : jump + 7 * order], order + 1)
+    value, vector = np.linalg.eigh(window[:, 1:].T @ window[:, 1:])
+    keep = value > EXACT * value[-1]
+    weight = vector[:, keep] @ ((vector[:, keep].T @ (window[:, 1:].T @ window[:, 0])) / value[keep])
+    made = sound.copy()
+    for n in range(jump - 1, -1, -1):
+        made[n] = weight @ made[n + 1 : n + 1 + order]
+    return made
+
+
+def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float, float]]:
+    """A time record as velocity or pressure."""
+    sr = round(1 / response.step)
+    if not sr or abs(sr * response.step - 1) > OFF_RATE:
+        raise FileError(f"a time record has {1 / response.step:g} samples a second", "export it at a whole number")
+    value = np.asarray(response.value, float)
+    if power == 0:
+        return value, sr, (LOWEST_HZ, 0.45 * sr)
+    freq = np.fft.rfftfreq(len(value), 1 / sr)
+    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, LOWEST_HZ, 0.45 * sr)
+    return np.fft.irfft(spectrum, len(value)), sr, (LOWEST_HZ, 0.45 * sr)
+
+
+def _derived(value: Array, freq_hz: Array, power: int) -> Array:
+    """(iω)^power times a spectrum, nothing at zero."""
+    omega = np.where(freq_hz > 0, 2j * np.pi * freq_hz, 1.0)
+    return np.asarray(np.where(freq_hz > 0, value * omega**power, 0.0))
+
+
+def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
+    """One between two frequencies; raised cosines to zero at half the one and, above the other, at the last."""
+    below = np.clip((freq_hz - low_hz / 2) / (low_hz / 2), 0, 1)
+    above = np.clip((freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9), 0, 1)
+    return np.asarray(np.sin(np.pi / 2 * below) ** 2 * np.sin(np.pi / 2 * above) ** 2)
+
+
+def _length(least: int, step_hz: float) -> tuple[int, int]:
+    """An even number of samples, no fewer than ``least``, whose rate in steps of ``step_hz`` is a whole number of Hz,
+    and that rate. Raises FileError.
+    """
+    count = least + least % 2 + 2 * np.arange(LENGTHS)
+    if count[0] > MOST_SAMPLES:
+        raise FileError(f"a response unpacks to {count[0]} samples", "export it in larger steps, or a smaller band")
+    rate = count * step_hz
+    off = np.abs(np.rint(rate) / rate - 1)
+    good = np.flatnonzero(off <= max(float(off.min()), 1e-9))[0]
+    if off[good] > OFF_RATE:
+        raise FileError(f"steps of {step_hz:g} Hz give no whole rate", "export it in steps of a whole number of Hz")
+    return int(count[good]), round(float(rate[good]))
