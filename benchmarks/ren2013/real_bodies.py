@@ -16,6 +16,7 @@ import json
 import shutil
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,8 +100,8 @@ def main(data: Path, names: tuple[str, ...]) -> int:
             value, _ = thing.family.modes(guess.youngs_pa / guess.density_kg_m3, guess.poisson)
             hat = value / (guess.youngs_pa / guess.density_kg_m3)
             begun = time.process_time()
-            one = Recorded(case, thing, 0, {})
-            problem = Problem(greedy_features(one), one.signal[: round(SECONDS * thing.sr)], hat, np.ones(len(hat)))
+            one = Recorded(case, replace(thing, signals=thing.signals[:, : round(SECONDS * thing.sr)]), 0, {})
+            problem = Problem(greedy_features(one), one.signal, hat, np.ones(len(hat)))
             found = reference(problem)
             spent = time.process_time() - begun
             lam = found.gamma_m2_s2 * hat

@@ -6,7 +6,7 @@ learnt since].
     -> noise_density.py   density over frequency, course over time
     -> subspace.py (poles, band by band)
         every frequency resolution at once, where the paper goes from level to level
-    -> after_attack.py         where what those leave is far louder than the noise: of what rings after the attack
+    -> after_attack.py    where what those leave is far louder than the noise: of what rings after the attack
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
     -> the residual's matched filter adds poles while they are significant; what is not, goes
     -> onset.py   the modes, run backwards, tell the sample of the onset

@@ -75,43 +75,52 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
     noise = noise_rms(signals, sr)
     try:
-        if shaped and _attacked(signals, sr, (low, high)):
+        start = start_poles(signals / noise[:, None], sr, low, high)
+        if shaped and _attacked(signals, noise, sr, (low, high), start):
             return ringing_lines(signals, sr, (low, high), signed=signed)
-        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
+        return _identified(signals, noise, sr, (low, high), signed, modes, start, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
         ) from error
 
 
-def _attacked(signals: Array, sr: int, band_hz: tuple[float, float]) -> bool:
+def _attacked(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], start: Array) -> bool:
     """Whether signals (s, n) hold what no sum of lines is, and neither a room nor hits in a row explain."""
-    late = min(round(LATE_S[0] * sr), signals.shape[1] // 8)
-    poles, left = _left_by_start(signals, sr, band_hz)
+    left = _over_noise(signals, noise, sr, start)
     if left < OVER_NOISE:
         return False
-    fewer, later = _left_by_start(signals[:, late:], sr, band_hz)
-    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or fewer < OVER * poles):
+    late = min(round(LATE_S[0] * sr), signals.shape[1] // 8)
+    rest = signals[:, late:]
+    noise = noise_rms(rest, sr)
+    fewer = start_poles(rest / noise[:, None], sr, *band_hz)
+    later = _over_noise(rest, noise, sr, fewer)
+    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or len(fewer) < OVER * len(start)):
         return False
-    if later < OVER_NOISE**2 and fewer > AS_DENSE * poles:
+    if later < OVER_NOISE**2 and len(fewer) > AS_DENSE * len(start):
         return False
     return not any((find_strikes(signal, sr) > late / sr).any() for signal in signals)
 
 
-def _left_by_start(signals: Array, sr: int, band_hz: tuple[float, float]) -> tuple[int, float]:
-    """How many poles signals (s, n) start with, and what these leave over the noise, the median over signals."""
-    noise = noise_rms(signals, sr)
-    pole = start_poles(signals / noise[:, None], sr, *band_hz)
-    return len(pole), float(np.median(amplitudes_at(signals, noise, apart(pole), sr)[3] / noise))
+def _over_noise(signals: Array, noise: Array, sr: int, pole: Array) -> float:
+    """What poles leave of signals (s, n) over their noise (s,), the median over signals."""
+    return float(np.median(amplitudes_at(signals, noise, apart(pole), sr)[3] / noise))
 
 
 def _identified(
-    signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
+    signals: Array,
+    noise: Array,
+    sr: int,
+    band_hz: tuple[float, float],
+    signed: bool,
+    modes: int | None,
+    start: Array,
+    *,
+    crowd: bool,
 ) -> Lines:
     """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one
     after another, where these say plainly more.
     """
-    start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
         if signals.shape[1] >= 8 * late and FEWEST_LINES <= len(
@@ -167,7 +176,9 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
     try:
-        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
+        noise = noise_rms(rest, sr)
+        start = start_poles(rest / noise[:, None], sr, *band_hz)
+        lines = _identified(rest, noise, sr, band_hz, signed, None, start, crowd=False)
     except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
