@@ -113,8 +113,10 @@ def by_sonic_bullet(x: Array, sr: int) -> Found:
     return lines.pole, lines.amplitude[0]
 
 
-def by_peaks(x: Array, sr: int) -> Found:
-    """Peaks of a spectrum from LATE_S on that stand 20 dB above their neighbourhood; decay by the level's slope."""
+def by_peaks(x: Array, sr: int, seconds: float = 1.0) -> Found:
+    """Peaks of a spectrum of some seconds from LATE_S on that stand 20 dB above their neighbourhood; decay by the
+    level's slope.
+    """
     from scipy.ndimage import median_filter
 
     start = int(LATE_S * sr)
@@ -122,14 +124,15 @@ def by_peaks(x: Array, sr: int) -> Found:
     n = 2048 if sr < 30_000 else 4096
     frames = np.lib.stride_tricks.sliding_window_view(y, n)[:: n // 4]
     level = np.abs(np.fft.rfft(frames * np.hanning(n), axis=1)) ** 2
-    spectrum = np.abs(np.fft.rfft(y * np.hanning(len(y)))) ** 2
-    broad = median_filter(spectrum, 201)
+    early = y[: round(seconds * sr)]
+    spectrum = np.abs(np.fft.rfft(early * np.hanning(len(early)))) ** 2
+    broad = median_filter(spectrum, max(31, round(201 * min(seconds, 1.0)) | 1))
     peak = np.flatnonzero(
         (spectrum[1:-1] > 100 * broad[1:-1]) & (spectrum[1:-1] >= spectrum[:-2]) & (spectrum[1:-1] > spectrum[2:])
     )
     poles: list[complex] = []
     for k in peak[np.argsort(-spectrum[peak + 1])][:40] + 1:
-        f = k * sr / len(y)
+        f = k * sr / len(early)
         if f < 20 or f > 20_000 or any(abs(p.imag / 2 / np.pi - f) < sr / n for p in poles):
             continue
         course = 10 * np.log10(level[:, round(f * n / sr)] + 1e-30)

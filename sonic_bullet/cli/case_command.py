@@ -277,7 +277,7 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 def run_case_check(folder: str) -> None:
     """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
-    from sonic_bullet.estimator.fit.recorded import refuse_clipped
+    from sonic_bullet.estimator.fit.takes.clipped_take import refuse_clipped
 
     case = read_case(folder)
     warn(case.warnings)

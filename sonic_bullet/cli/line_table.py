@@ -16,8 +16,10 @@ Row = dict[str, float | int | None]
 
 
 def decay_values(freq_hz: float, decay_per_s: float, decay_sd_per_s: float) -> Row:
-    """T60 in s, loss factor η and quality factor Q of a line, each with its spread; None for what is not known."""
-    known = math.isfinite(decay_per_s) and decay_per_s > 0
+    """T60 in s, loss factor η and quality factor Q of a line, each with its spread; None for what is not known, as of
+    a decay within its spread of none.
+    """
+    known = math.isfinite(decay_per_s) and decay_per_s > (decay_sd_per_s if math.isfinite(decay_sd_per_s) else 0)
     values = {
         "t60_s": math.log(1000) / decay_per_s if known else math.nan,
         "loss_factor": decay_per_s / (math.pi * freq_hz) if known else math.nan,

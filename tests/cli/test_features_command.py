@@ -113,5 +113,6 @@ def test_t60_loss_factor_and_q_stand_beside_the_decay(tmp_path: Path, freq_hz: f
 def test_what_has_no_decay_has_no_t60() -> None:
     assert set(decay_values(100.0, float("nan"), 1.0).values()) == {None}
     assert set(decay_values(100.0, 0.0, 1.0).values()) == {None}
+    assert set(decay_values(3523.0, 0.0008, 0.075).values()) == {None}  # a short take of a bar that rings for a minute
     known = decay_values(100.0, 3.0, float("inf"))
     assert known["q"] == pytest.approx(100 * np.pi / 3) and known["q_sd"] is None

@@ -206,3 +206,11 @@ def test_fit_of_what_is_no_impact_writes_no_preset(sound: Array, capfd: pytest.C
     assert status == 2 and "no impact found: " in said and "record one impact" in said
     assert not Path("fit.json").exists()
     assert run("diagnose", "mine") == 2
+
+
+def test_a_drift_below_the_band_is_no_reason_to_doubt_an_impact(capfd: pytest.CaptureFixture[str]) -> None:
+    """Wind on a microphone, 10 dB louder than the tap and after it."""
+    drift = np.sin(2 * np.pi * 4.0 * np.arange(SR // 2) / SR) * np.linspace(0, 1, SR // 2)
+    soundfile.write("x.wav", 0.3 * tap() + 0.5 * drift, SR, subtype="FLOAT")
+    status, said = check_fit(capfd)
+    assert status == 0 and "no impact" not in said

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
+from sonic_bullet.estimator.fit.chance_pairs import strong_lines
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
 from sonic_bullet.estimator.fit.dimension_tolerance import add_dimension_tolerance, scale_tolerance
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
@@ -24,9 +25,7 @@ DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their s
 AMPLITUDE_MISFIT = 0.25
 GAMMA_MOVES = 0.01  # by elements: what is worth a warning
 FREQUENCY_MISFIT = 0.01
-FOREIGN = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of strong lines that must be modes
-CHANCE = 0.35  # and below this share, they may be by chance: nothing is known then
 
 
 def finished(
@@ -38,8 +37,9 @@ def finished(
     gain: tuple[float, float, float],
     *,
     radiation: RadiationIn,
+    by_chance: bool,
 ) -> CaseFit:
-    """The CaseFit of all that was found."""
+    """The CaseFit of all that was found. by_chance: lines would find as many modes of the meshes by chance."""
     log_gamma, poisson, information, scatter = elastic
     guess = evidence[0].guess
     covariance = np.full((5, 5), np.nan)
@@ -58,13 +58,13 @@ def finished(
         unsaid.append("sigma (no strike of known place)")
     foreign, share = _foreign(evidence, objects)
     # another object, another rate, no impact: nothing that rests on the pairs is known, nor whose decays these are
-    if share < CHANCE:
+    if by_chance:
         covariance[:] = np.nan
-        unsaid = ["alpha, beta, gamma, poisson_ratio, sigma (few lines are modes, maybe by chance)"]
+        unsaid = ["alpha, beta, gamma, poisson_ratio, sigma (as many lines would be modes by chance)"]
     identified = np.isfinite(np.diag(covariance))
     # frequencies, decays and amplitudes are found apart
     covariance[np.outer(identified, identified) & np.isnan(covariance)] = 0.0
-    amiss = _amiss(objects, damping, scatter, gain[2], foreign, share)
+    amiss = _amiss(objects, damping, scatter, gain[2], foreign, share, by_chance)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
     metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
     verdict = (
@@ -144,7 +144,7 @@ def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...
     good = total = 0.0
     for o in objects:
         lines = o.evidence.lines
-        strong = lines.energy >= FOREIGN * lines.energy.max(initial=0)
+        strong = strong_lines(lines)
         taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
         double = np.array([f for f, who in zip(o.freq_hz, o.member, strict=True) if len(who) > 1])
         if len(double):  # two lines of modes that count as one
@@ -155,13 +155,23 @@ def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...
 
 
 def _amiss(
-    objects: tuple[ObjectFit, ...], damping: RayleighFit, scatter: float, amplitude: float, foreign: Array, share: float
+    objects: tuple[ObjectFit, ...],
+    damping: RayleighFit,
+    scatter: float,
+    amplitude: float,
+    foreign: Array,
+    share: float,
+    by_chance: bool,
 ) -> list[str]:
     amiss = []
     if objects and len(foreign):
         shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
         amiss.append(f"{len(foreign)} strong lines belong to no mode ({shown} Hz)")
-    if np.isfinite(share) and share < PAIRED:
+    if by_chance:
+        amiss.append(
+            f"only {share:.0%} of the strong lines are modes of this mesh, as many as by chance (another object's?)"
+        )
+    elif np.isfinite(share) and share < PAIRED:
         amiss.append(f"only {share:.0%} of the strong lines are modes of this mesh")
     if np.isfinite(scatter) and scatter > FREQUENCY_MISFIT:
         amiss.append(f"frequencies scatter by {scatter:.1%} about an isotropic body's")

@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.chance_pairs import paired_by_chance
 from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.held_out_takes import judged_by_takes
 from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
@@ -75,8 +76,10 @@ def fit_evidence(
         )
     shaped = tuple(e for e in evidence if e.family is not None)
     guess = evidence[0].guess
+    chance = False
     if shaped:
         pairs, information, scatter = _placed(shaped, case.band_hz)
+        chance = paired_by_chance(shaped, pairs, lambda moved: _placed(moved, case.band_hz)[0])
         log_gamma, poisson = pairs[0].log_gamma, pairs[0].poisson
     else:
         pairs, information, scatter = (), np.zeros((2, 2)), np.nan
@@ -103,6 +106,7 @@ def fit_evidence(
         damping,
         (gain, gain_sd, amplitude_scatter),
         radiation=radiation,
+        by_chance=chance,
     )
 
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
+from sonic_bullet.estimator.fit.takes.clipped_take import refuse_clipped
 from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
-from sonic_bullet.estimator.lines.band_limit import limit_band
+from sonic_bullet.estimator.lines.band_limit import LOWEST_HZ, limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
@@ -31,12 +32,9 @@ from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
 MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
-CLIPPED = 8  # samples in a row at the file's peak
 # after an onset; of the usual length: that much shorter is worth a word
 LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5
 SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
-LOWEST_HZ = 20.0  # of a case that names no band: nothing is to be taken off below
-CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +143,8 @@ def gather(
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=signed, modes=modes, shaped=shaped)
             odd = []
             if case.onset_s is None:
-                odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
+                names_played = [str(r.file) for r in played]
+                odd = describe_no_impacts(signals, lines, sr, case.band_hz, before, names_played)
             notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
             found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]
@@ -233,17 +232,19 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         sound, sr, which = read_channel(r.file or "", r.channel)
         if not clipped:
             refuse_clipped(sound, r.file)
-        sounds.append(until_it_breaks_off(sound, sr))
-        if len(sounds[-1]) < len(sound):
+        whole = until_it_breaks_off(sound, sr)
+        if len(whole) < len(sound):
             remarks.append(
-                f"{r.file} breaks off after {len(sounds[-1]) / sr:.3g} s: the digital silence behind is no "
+                f"{r.file} breaks off after {len(whole) / sr:.3g} s: the digital silence behind is no "
                 "decay, and is left out"
             )
-        rates.append(sr)
-        limited.append(sounds[-1])
+        heard, drift = without_drift(whole, sr)
+        limited.append(heard)
         if case.band_hz[0] > LOWEST_HZ:
-            limited[-1] = limit_band(sounds[-1], sr, case.band_hz)
-            sounds[-1] = limit_band(sounds[-1], sr, (case.band_hz[0], np.inf))
+            heard, drift = limit_band(whole, sr, (case.band_hz[0], np.inf)), ""
+            limited[-1] = limit_band(whole, sr, case.band_hz)
+        rates.append(sr)
+        sounds.append(heard)
         known = None if case.onset_s is None else round(case.onset_s * sr)
         one = span(limited[-1], sr) if known is None else until_next_hit(limited[-1], sr, known)
         if one.later:
@@ -256,7 +257,7 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         limited[-1] = limited[-1] - hum
         begun.append(one.start)
         doubts, _ = describe_doubts(limited[-1][one.start :], sr)
-        for words in filter(None, (which, describe_hum(hum_hz), *doubts)):
+        for words in filter(None, (which, drift, describe_hum(hum_hz), *doubts)):
             several.setdefault(words, []).append(str(r.file))
     remarks += [
         f"{names[0]}{f' and {len(names) - 1} more' * (len(names) > 1)}: {words}" for words, names in several.items()
@@ -280,19 +281,6 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
         for x, first, start in zip(limited, begun, starts, strict=True)
     ]
     return Sounds(signals, sr, remarks, before)
-
-
-def refuse_clipped(sound: Array, name: object) -> None:
-    """Raise AudioError where a channel stands at its peak."""
-    peak = float(np.abs(sound).max())
-    runs = np.convolve(np.abs(sound) >= 0.9999 * peak, np.ones(CLIPPED), "valid")
-    rows = np.convolve(np.abs(sound) >= (1 - 1e-6) * peak, np.ones(3), "valid") > 2.5
-    flat = int((np.diff(rows.astype(np.int8), prepend=0) > 0).sum())
-    if (len(runs) and runs.max() >= CLIPPED) or flat >= CLIPPED_RUNS:
-        raise AudioError(
-            f"{name} is clipped: rows of samples stand at its peak",
-            "leave it out, or record at a lower level; a fit of it would be of the limiter",
-        )
 
 
 def until_it_breaks_off(sound: Array, sr: int) -> Array:

@@ -11,6 +11,8 @@ from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
 FALL = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
+LOWEST_HZ = 20.0  # of what is heard
+DRIFTS = 3.16  # times the rms of all that is heard, in most tenths of a recording: wind, a warming amplifier
 PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
@@ -50,3 +52,28 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
 def _raised(freq: Array, start: float, stop: float) -> Array:
     """Raised cosine (n,) from 0 at start to 1 at stop."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip((freq - start) / (stop - start), 0, 1))
+
+
+def without_drift(signal: Array, sr: int) -> tuple[Array, str]:
+    """Take a drift off a recording, which would hide its onset and its noise.
+
+    Parameters
+    ----------
+    signal : (n,) array
+        Samples.
+    sr : int
+        Their rate in Hz.
+
+    Returns
+    -------
+    (n,) array
+        What lies above 20 Hz; the recording itself where nothing drifts.
+    str
+        What to say of it, or nothing.
+    """
+    heard = limit_band(signal, sr, (LOWEST_HZ, np.inf))
+    edge = np.arange(0, len(signal), max(len(signal) // 10, 1))
+    drift, above = (np.add.reduceat(x**2, edge) for x in (signal - heard, heard))
+    if not np.median(drift - DRIFTS**2 * above) > 0:
+        return signal, ""
+    return heard, f"a drift below {LOWEST_HZ:.0f} Hz, louder than all above it, is taken off"

@@ -25,7 +25,7 @@ import numpy as np
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
-from sonic_bullet.estimator.lines.band_limit import limit_band
+from sonic_bullet.estimator.lines.band_limit import limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
@@ -78,6 +78,7 @@ def extract(
     if not 0 < low < high:
         raise AudioError(f"band is {low:g} to {high:g} Hz", f"give a band inside 0 to {sr / 2:g} Hz")
     clipped = onset.clipped_samples(signal)
+    signal, drift = without_drift(signal, sr) if band_hz is None else (signal, "")
     limited = signal
     if band_hz is not None:
         signal, limited = limit_band(signal, sr, (low, np.inf)), limit_band(signal, sr, (low, high))
@@ -98,7 +99,7 @@ def extract(
     notes = [f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used"] if hits else []
     if clipped:
         notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
-    notes += [*filter(None, [describe_hum(hum_hz)]), *doubts]
+    notes += [*filter(None, [drift, describe_hum(hum_hz)]), *doubts]
     found = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
@@ -106,8 +107,7 @@ def extract(
     )
     if isinstance(found, Lines):
         return _ringing(x, limited[part.start : part.start + len(x)], found, sr, part.start, notes)
-    modes, noise = found
-    start = part.start
+    (modes, noise), start = found, part.start
     for _ in range(RESTORED if steady_above and len(modes.pole) else 0):
         # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
         model = np.zeros(len(limited))

@@ -1,0 +1,60 @@
+"""How many strong lines pair with a mesh's modes, and how many would by chance.
+
+    lines (f_k) of recordings, modes (γ, ν) -> pairs (material_fit.py)          n strong lines paired of N
+    lines (f_k e^{δ_c}), clusters c moved at random -> pairs, `DRAWS` times     n_1 … n_D
+    by chance: n ≤ max n_i
+
+The moved lines are searched through the same γ and ν as those recorded, so that the freedom of the search is in n_i. A
+body of which every strong line is a mode needs no such test: nothing speaks against its mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from sonic_bullet.estimator.fit.pairing import Pairs
+from sonic_bullet.estimator.fit.recorded import RecordedObject
+from sonic_bullet.estimator.lines.line_values import Lines
+from sonic_bullet.records import Array
+
+STRONG = 1e-3  # of the strongest line's energy
+DRAWS = 8
+MOVED = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
+CLUSTER = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
+
+Placing = Callable[[tuple[RecordedObject, ...]], tuple[Pairs, ...]]
+
+
+def strong_lines(lines: Lines) -> Array:
+    """Which lines (k,) hold `STRONG` of the strongest line's energy."""
+    return np.asarray(lines.energy >= STRONG * lines.energy.max(initial=0))
+
+
+def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], place: Placing) -> bool:
+    """Whether lines moved at random find as many modes as those recorded. place: how a search pairs objects' lines."""
+    found = _strong_paired(shaped, pairs)
+    if found == sum(int(strong_lines(e.lines).sum()) for e in shaped):
+        return False
+    random = np.random.default_rng(0)
+    for _ in range(DRAWS):
+        moved = tuple(replace(e, lines=_moved(e.lines, random)) for e in shaped)
+        if _strong_paired(moved, place(moved)) >= found:
+            return True
+    return False
+
+
+def _strong_paired(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...]) -> int:
+    return sum(int(strong_lines(e.lines)[p.line].sum()) for e, p in zip(shaped, pairs, strict=True))
+
+
+def _moved(lines: Lines, random: np.random.Generator) -> Lines:
+    """Lines whose clusters stand elsewhere, as loud and as long as they were."""
+    order = np.argsort(lines.freq_hz)
+    cluster = np.cumsum(np.diff(np.log(lines.freq_hz[order]), prepend=0.0) > CLUSTER)
+    off = random.uniform(-MOVED, MOVED, len(order) + 1)[cluster]
+    freq = lines.freq_hz.copy()
+    freq[order] *= np.exp(off)
+    return replace(lines, freq_hz=freq)
