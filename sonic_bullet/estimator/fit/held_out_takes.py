@@ -23,7 +23,7 @@ import numpy as np
 from sonic_bullet.estimator.fit.case_fit import NO_GAIN, TakeDistance
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, strike_modes
 from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
-from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain
+from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain, find_nearest_take
 from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.estimator.fit.typical_strike import strike_lines
 from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, power_spectra
@@ -101,7 +101,6 @@ def _distances(
     floor, power = floor_between([signal]).within(sr, found.case.band_hz), power_spectra(signal)
     made, free = predicted_take(found, e, recording, len(signal), sr, residual)
     modelled = power_spectra(made)
-    nearest = [find_best_gain(power, other, floor, recorded=True).distance_db for other in others]
     silence = distance_at(power, modelled, floor, 0.0)
     best = find_best_gain(power, modelled, floor) if free else BestGain(1.0, distance_at(power, modelled, floor, 1.0))
     return TakeDistance(
@@ -109,7 +108,7 @@ def _distances(
         recording.split,
         best.distance_db,
         silence,
-        float(np.nanmin(nearest)) if np.isfinite(nearest).any() else float("nan"),
+        find_nearest_take(power, others, floor),
         free,
         best.gain,
         _plausible_db(found, e, recording, power, floor, (len(signal), sr)),

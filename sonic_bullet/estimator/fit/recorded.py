@@ -143,8 +143,7 @@ def gather(
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=signed, modes=modes, shaped=shaped)
             odd = []
             if case.onset_s is None:
-                names_played = [str(r.file) for r in played]
-                odd = describe_no_impacts(signals, lines, sr, case.band_hz, before, names_played)
+                odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])
             notes = (*(f"{g} is missing" for g in gone), *remarks, *odd)
             found.append(RecordedObject(thing, guess, played, lines, body, seen, signals, sr, notes))
         found += [_listed(case, thing, guess, entry, body) for entry in listed]

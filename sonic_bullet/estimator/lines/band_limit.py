@@ -12,7 +12,7 @@ from sonic_bullet.records import Array
 
 FALL = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
 LOWEST_HZ = 20.0  # of what is heard
-DRIFTS = 3.16  # times the rms of all that is heard, in most tenths of a recording: wind, a warming amplifier
+DRIFTS = 3.16  # times the rms of all that is heard, most of the time: wind, a warming amplifier
 PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
@@ -71,9 +71,10 @@ def without_drift(signal: Array, sr: int) -> tuple[Array, str]:
     str
         What to say of it, or nothing.
     """
-    heard = limit_band(signal, sr, (LOWEST_HZ, np.inf))
-    edge = np.arange(0, len(signal), max(len(signal) // 10, 1))
-    drift, above = (np.add.reduceat(x**2, edge) for x in (signal - heard, heard))
-    if not np.median(drift - DRIFTS**2 * above) > 0:
+    edge = np.arange(0, len(signal), max(round(sr / LOWEST_HZ / 2), 1))
+    mean = np.add.reduceat(signal, edge) / np.diff(edge, append=len(signal))  # a drift's samples over half a period
+    power = np.add.reduceat(signal**2, edge) / np.diff(edge, append=len(signal))
+    if not np.median(mean**2 - DRIFTS**2 * (power - mean**2)) > 0:
         return signal, ""
+    heard = limit_band(signal, sr, (LOWEST_HZ, np.inf))
     return heard, f"a drift below {LOWEST_HZ:.0f} Hz, louder than all above it, is taken off"

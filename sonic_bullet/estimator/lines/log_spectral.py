@@ -103,7 +103,14 @@ def _broad(level: Array, side: int) -> Array:
     k = np.arange(count)
     first = np.maximum(np.ceil(k / REACH).astype(int), k - side)
     last = np.minimum(np.minimum(np.floor(k * REACH).astype(int), k + side), count - 1)
-    return np.array([np.quantile(level[a : b + 1], 0.4) for a, b in zip(first, last, strict=True)])
+    found = np.empty(count)
+    whole = np.flatnonzero(last - first == 2 * side)
+    if len(whole):
+        every = np.lib.stride_tricks.sliding_window_view(level, 2 * side + 1)
+        found[whole] = np.quantile(every[whole - side], 0.4, axis=1)
+    for i in np.flatnonzero(last - first < 2 * side):
+        found[i] = np.quantile(level[first[i] : last[i] + 1], 0.4)
+    return found
 
 
 def white(rms: float) -> Floor:

@@ -74,12 +74,35 @@ def find_best_gain(
     BestGain
         Distance NaN where nothing stands above the noise at any gain.
     """
-    silence = BestGain(0.0, distance_at(power, made, floor, 0.0))
+    return _refined(power, made, floor, _searched(power, made, floor, recorded), recorded)
+
+
+def find_nearest_take(power: tuple[Array, ...], takes: list[tuple[Array, ...]], floor: Floor) -> float:
+    """Distance in dB of the nearest of other takes at its best gain, by power spectra; NaN where there is none.
+
+    All are searched by some cells, the `LOWEST` nearest by all.
+    """
+    searched = [_searched(power, take, floor, True) for take in takes]
+    order = np.argsort([costs.min(initial=np.inf) for _, costs in searched], kind="stable")[:LOWEST]
+    found = [_refined(power, takes[k], floor, searched[k], True).distance_db for k in order]
+    return float(np.nanmin(found)) if np.isfinite(found).any() else float("nan")
+
+
+def _searched(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, recorded: bool) -> tuple[Array, Array]:
+    """Gains (g,) of the grid and D (g,) there, by some cells."""
     grid = _grid(power, made, floor)
     if not len(grid):
-        return silence
+        return grid, grid
     few = _few_cells(power, made, floor, added=not recorded)
-    costs = np.nan_to_num(_distances_of_few(few, grid), nan=np.inf, posinf=np.inf)
+    return grid, np.nan_to_num(_distances_of_few(few, grid), nan=np.inf, posinf=np.inf)
+
+
+def _refined(
+    power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, searched: tuple[Array, Array], recorded: bool
+) -> BestGain:
+    """The best gain about the lowest minima of a search, by all cells."""
+    grid, costs = searched
+    silence = BestGain(0.0, distance_at(power, made, floor, 0.0))
     padded = np.concatenate([[np.inf], costs, [np.inf]])
     minima = np.flatnonzero((costs <= padded[:-2]) & (costs < padded[2:]))
     found: list[BestGain] = []

@@ -1,7 +1,6 @@
 """Whether a take is one impact: its sound begins with its most, and falls; speech, rain and noise do not.
 
-    F = energy of the first `FRONT` of a take over all, E = energy that its lines describe, both over the noise, in the
-        case's band: a drift below it is no sound
+    F = energy of the first `FRONT` of a take over all, E = energy that its lines describe, both over the noise
     no impact: F < FRONT_ENERGY and E < DESCRIBED, or more than BEFORE of the energy before the onset
 
 What falls has F ≥ FRONT. Long beats and long rings have little more; lines describe them.
@@ -10,7 +9,6 @@ What falls has F ≥ FRONT. Long beats and long rings have little more; lines de
 from __future__ import annotations
 
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
-from sonic_bullet.estimator.lines.band_limit import limit_band
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.records import Array
@@ -24,21 +22,18 @@ LEAST = 0.05
 """Of a take's energy, over the noise: of less nothing is said."""
 
 
-def describe_no_impact(
-    signal: Array, lines: Lines, take: int, sr: int, band_hz: tuple[float, float], before: float
-) -> str:
+def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: float) -> str:
     """Say why a take (n,) of some lines is no single impact; nothing where it may be one. before: part of the energy
     that lies before its loudest rise.
     """
     if before > BEFORE:
         return f"{100 * before:.0f} % of its energy lies before its loudest rise, and does not decay from there"
-    heard = limit_band(signal, sr, band_hz)
-    noise = float(floor_between([heard]).variance.mean())
-    n, front = len(heard), int(FRONT * len(heard))
-    whole, first = (float(x @ x) - noise * len(x) for x in (heard, heard[:front]))
-    if whole < LEAST * float(heard @ heard):
+    noise = float(floor_between([signal]).variance.mean())
+    n, front = len(signal), int(FRONT * len(signal))
+    whole, first = (float(x @ x) - noise * len(x) for x in (signal, signal[:front]))
+    if whole < LEAST * float(signal @ signal):
         return ""
-    rest = heard - lines_sound(lines, take, n, sr)
+    rest = signal - lines_sound(lines, take, n, sr)
     described = 1 - max(float(rest @ rest) - noise * n, 0.0) / whole
     if first / whole < FRONT_ENERGY and described < DESCRIBED:
         return (
@@ -48,11 +43,9 @@ def describe_no_impact(
     return ""
 
 
-def describe_no_impacts(
-    signals: Array, lines: Lines, sr: int, band_hz: tuple[float, float], before: list[float], names: list[str]
-) -> list[str]:
+def describe_no_impacts(signals: Array, lines: Lines, sr: int, before: list[float], names: list[str]) -> list[str]:
     """Say of each take (s, n) that is no impact why, by name. Raises AudioError where none is one."""
-    said = [describe_no_impact(x, lines, i, sr, band_hz, before[i]) for i, x in enumerate(signals)]
+    said = [describe_no_impact(x, lines, i, sr, before[i]) for i, x in enumerate(signals)]
     odd = [f"no impact found: {name}: {words}" for name, words in zip(names, said, strict=True) if words]
     if len(odd) == len(signals):
         raise AudioError(odd[0], "record one impact: a fit of this would be of no object")
