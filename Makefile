@@ -2,6 +2,7 @@
 # make test      a virtual environment with the tools, then style, types and tests, ways of use first
 # make test-all  the same with the tests that take minutes (marked slow)
 # make bench     one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
+# make gate      BASE=main [HEAD=branch]: does a revision keep every bit of another? One line a probe
 # make docs      the pages that are made of the code: API, commands, case.json and its schema, contact log
 # Python 3.11, 3.12 or 3.13 is all that is needed. PYTHON=python3.13 or a path names one.
 
@@ -30,7 +31,7 @@ export NUMEXPR_NUM_THREADS := 1
 export PYTHONUNBUFFERED := 1
 export MPLBACKEND := Agg
 
-.PHONY: help demo test test-all check bench docs clean
+.PHONY: help demo test test-all check bench gate docs clean
 
 help:
 	@sed -n 's/^# \(make\)/\1/p' Makefile
@@ -53,6 +54,9 @@ check: .venv/dev.stamp
 
 bench: .venv/dev.stamp
 	@$(BIN)/python benchmarks/run_time.py
+
+gate: .venv/dev.stamp
+	@$(BIN)/python tools/gate.py $(or $(BASE),main) $(or $(HEAD),HEAD)
 
 docs: .venv/dev.stamp
 	$(BIN)/python docs/make_reference.py

@@ -17,7 +17,7 @@ PACKAGE = REPO / "sonic_bullet"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "__pycache__" not in path.parts)
 TEXTS = sorted(
     path
-    for folder in ("sonic_bullet", "tests", "scenes", "benchmarks", "assets", "docs", ".ci", ".")
+    for folder in ("sonic_bullet", "tests", "scenes", "benchmarks", "tools", "assets", "docs", ".ci", ".")
     for path in ((REPO / folder).rglob("*") if folder != "." else REPO.glob("*"))
     if path.is_file()
     and path.name != ".git"  # of a worktree: it names the machine's own folders
