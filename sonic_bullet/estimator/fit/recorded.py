@@ -237,13 +237,13 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
                 f"{r.file} breaks off after {len(whole) / sr:.3g} s: the digital silence behind is no "
                 "decay, and is left out"
             )
-        heard, drift = without_drift(whole, sr)
-        limited.append(heard)
+        above, drift = without_drift(whole, sr)
+        limited.append(above)
         if case.band_hz[0] > LOWEST_HZ:
-            heard, drift = limit_band(whole, sr, (case.band_hz[0], np.inf)), ""
+            above, drift = limit_band(whole, sr, (case.band_hz[0], np.inf)), ""
             limited[-1] = limit_band(whole, sr, case.band_hz)
         rates.append(sr)
-        sounds.append(heard)
+        sounds.append(above)
         known = None if case.onset_s is None else round(case.onset_s * sr)
         one = span(limited[-1], sr) if known is None else until_next_hit(limited[-1], sr, known)
         if one.later:

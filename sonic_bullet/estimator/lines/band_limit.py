@@ -76,5 +76,5 @@ def without_drift(signal: Array, sr: int) -> tuple[Array, str]:
     power = np.add.reduceat(signal**2, edge) / np.diff(edge, append=len(signal))
     if not np.median(mean**2 - DRIFTS**2 * (power - mean**2)) > 0:
         return signal, ""
-    heard = limit_band(signal, sr, (LOWEST_HZ, np.inf))
-    return heard, f"a drift below {LOWEST_HZ:.0f} Hz, louder than all above it, is taken off"
+    above = limit_band(signal, sr, (LOWEST_HZ, np.inf))
+    return above, f"a drift below {LOWEST_HZ:.0f} Hz, louder than all above it, is taken off"
