@@ -1,6 +1,6 @@
 # make demo      a virtual environment, then scenes/tabletop.py to out/: sound, contact log, picture
 # make test      a virtual environment with the tools, then style, types and tests, ways of use first
-# make test-all  the same with the tests that take minutes (marked slow)
+# make test-all  the same with those marked slow: tests that take minutes, and all cases of what `make test` samples
 # make bench     one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
 # make gate      BASE=main [HEAD=branch]: does a revision keep every bit of another? One line a probe
 # make docs      the pages that are made of the code: API, commands, case.json and its schema, contact log

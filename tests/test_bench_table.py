@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks import run_time
 from benchmarks.peers import PEERS, faust_modal, klank, tools
+from tests.few_cases import parametrize_few
 
 
 def say_measured(rows: list[run_time.Row]) -> None:
@@ -20,7 +21,7 @@ def say_measured(rows: list[run_time.Row]) -> None:
         assert re.match(r"\d", said) or said.startswith(run_time.NOT_RUN), (what, said)
 
 
-@pytest.mark.parametrize("part", run_time.PARTS)
+@parametrize_few("part", run_time.PARTS, (0, 4, 5))
 def test_each_part_makes_its_rows(part: str) -> None:
     tiny = {
         "piles": lambda: run_time.piles([2], 4),

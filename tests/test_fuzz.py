@@ -13,8 +13,8 @@ from benchmarks import fuzz
 from benchmarks.fuzzing.doors import Door, doors
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records.errors import SonicBulletError
+from tests.few_cases import parametrize_few
 
-INPUTS, LEAST = 1600, 800
 SECONDS = 20.0
 
 
@@ -33,12 +33,15 @@ def test_every_seed_goes_through_its_door(tmp_path: Path) -> None:
     assert sum(door.share for door in doors()) == pytest.approx(1)
 
 
-def test_mutated_files_of_every_format_end_in_our_own_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@parametrize_few(("inputs", "least"), [(400, 200), (1600, 800)], 1)
+def test_mutated_files_of_every_format_end_in_our_own_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inputs: int, least: int
+) -> None:
     monkeypatch.setenv("SONIC_BULLET_CACHE", str(tmp_path / "cache"))
     with one_thread():
         fuzz.warm(tmp_path)
-        tallies = fuzz.run(INPUTS, 11, tmp_path, seconds=SECONDS)
-    assert sum(tally.inputs for tally in tallies.values()) >= LEAST
+        tallies = fuzz.run(inputs, 11, tmp_path, seconds=SECONDS)
+    assert sum(tally.inputs for tally in tallies.values()) >= least
     assert all(tally.inputs for tally in tallies.values())
     assert {name: tally.faults for name, tally in tallies.items() if tally.faults} == {}
     for name, tally in tallies.items():

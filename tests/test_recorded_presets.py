@@ -18,6 +18,7 @@ from sonic_bullet import presets
 from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.presets import Origin, Preset
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[1]
 MAY_BE_COPIED = {"CC0-1.0", "MIT", "BSD-2-Clause", "BSD-3-Clause"}
@@ -139,7 +140,7 @@ def build(client):
 """
 
 
-@pytest.mark.parametrize("name", ["ceramic-mug", "ceramic-bowl"])
+@parametrize_few("name", ["ceramic-mug", "ceramic-bowl"], 1)
 def test_it_plays_by_name(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import soundfile
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from sonic_bullet.scene import render_scene
+from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).parents[1]
 SCENES = sorted(path.stem for path in (REPO / "scenes").glob("*.py"))
@@ -26,7 +27,7 @@ def test_every_scene_has_measurements_and_says_where_they_come_from(name: str) -
     assert "peak" in told["why"] or "dB" in told["why"]
 
 
-@pytest.mark.parametrize("name", ["bar", "sliding", "rolling"])
+@parametrize_few("name", ["bar", "sliding", "rolling"], 2)
 def test_a_scene_keeps_its_measurements(name: str) -> None:
     told = BENCH["expected"](name)
     found = list(BENCH["claims"](render_scene(REPO / "scenes" / f"{name}.py"), told))

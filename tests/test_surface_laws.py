@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 BENCH: dict[str, Any] = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "rolling_laws.py"))
 SPEEDS, ROUGHNESS = np.geomspace(0.1, 0.8, 5), np.geomspace(0.3e-6, 5e-6, 5)
@@ -21,6 +22,7 @@ M, N = (0.63, 1.16), (0.5, 0.96)
 """Bands of the exponents of level against roughness and speed that were measured on real pairs."""
 
 
+@pytest.mark.slow
 def test_level_follows_speed_and_roughness_and_neither_law_hangs_on_the_other() -> None:
     logs = [BENCH["run"]("ball", v, 1.1, count=60) for v in SPEEDS]
     rms = np.full((5, 5), np.nan)

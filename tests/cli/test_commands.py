@@ -31,6 +31,7 @@ from sonic_bullet.records import Body, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.scene import RenderResult
+from tests.few_cases import parametrize_few
 
 SR = 8000
 
@@ -486,7 +487,7 @@ def sonic_bullet_process(*words: str, **options: Any) -> subprocess.CompletedPro
     )
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "words",
     [
         ["--help"],
@@ -496,6 +497,7 @@ def sonic_bullet_process(*words: str, **options: Any) -> subprocess.CompletedPro
         ["materials", "--help"],
         ["cache", "--help"],
     ],
+    (0, 1),
 )
 def test_help_teaches_by_example(words: list[str]) -> None:
     done = sonic_bullet_process(*words)

@@ -16,6 +16,7 @@ import pytest
 import trimesh
 
 from tests.comparing.made import scene
+from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[2]
 MAIN = "from sonic_bullet.cli import main; main()"
@@ -54,7 +55,7 @@ def one_line(done: subprocess.CompletedProcess[str], *words: str) -> None:
         assert word in lines[0]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@parametrize_few("command", COMMANDS, (0, 6))
 def test_a_scene_that_ends_the_process_is_named_with_its_line(tmp_path: Path, command: str) -> None:
     (tmp_path / "a.py").write_text(f"{HEAD}{STEPS}os._exit(0)\n")
     done = shell(tmp_path, COMMANDS[command].format("a.py", "a.py"))
@@ -63,7 +64,7 @@ def test_a_scene_that_ends_the_process_is_named_with_its_line(tmp_path: Path, co
     assert [path.name for path in tmp_path.iterdir() if path.name != "__pycache__"] == ["a.py"]
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("text", "words"),
     [
         (f"{HEAD}def fall():\n    ctypes.string_at(0)\nfall()\n", "line 5: the process was ended by SIGSEGV"),
@@ -73,7 +74,7 @@ def test_a_scene_that_ends_the_process_is_named_with_its_line(tmp_path: Path, co
         (f"{HEAD}{STEPS}ctypes.CDLL(None)._exit(0)\n", "exit(0) ended the process before there was a result"),
         (f"{HEAD}sys.exit()\n", "line 4: SystemExit"),
         (f"{HEAD}{STEPS}sys.exit('no cup')\n", "line 7: SystemExit: no cup"),
-    ],
+    ], (0,3,6),
 )  # fmt: skip
 def test_whatever_ends_the_process_is_exit_2_and_one_line(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "a.py").write_text(text)
@@ -88,7 +89,7 @@ def test_a_script_that_ends_itself_after_its_steps_has_ended(tmp_path: Path) -> 
     assert shell(tmp_path, COMMANDS["doctor"].format("a.py")).returncode == 0
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("text", "line"),
     [
         (f"{HEAD}while True:\n    p.getKeyboardEvents()\n    time.sleep(0.01)\n", (4, 6)),
@@ -97,6 +98,7 @@ def test_a_script_that_ends_itself_after_its_steps_has_ended(tmp_path: Path) -> 
         (f"{HEAD}threading.Event().wait()\n", (4, 4)),
         ("def build(client):\n    while True:\n        client.getKeyboardEvents()\n", (2, 3)),
     ],
+    (1, 4),
 )
 def test_a_script_that_never_steps_is_ended(tmp_path: Path, text: str, line: tuple[int, int]) -> None:
     (tmp_path / "a.py").write_text(text)
@@ -165,7 +167,7 @@ LOOP = f"{HEAD}{STEPS}while True:\n    p.stepSimulation()\n    [None for _ in ra
 STOPS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@parametrize_few("command", COMMANDS, 1)
 @pytest.mark.parametrize(("number", "after_s"), [(0, 1.5), (1, 4.0)])
 def test_every_command_ends_within_a_second(tmp_path: Path, command: str, number: int, after_s: float) -> None:
     word, code = STOPS[number]
@@ -178,7 +180,7 @@ def test_every_command_ends_within_a_second(tmp_path: Path, command: str, number
     assert not left_behind(tmp_path)
 
 
-@pytest.mark.parametrize(("word", "code"), STOPS)
+@parametrize_few(("word", "code"), STOPS, 1)
 @pytest.mark.parametrize("after_s", [1.5, 3.0])
 def test_meshing_and_solving_end_within_a_second(
     tmp_path: Path, word: signal.Signals, code: int, after_s: float
@@ -193,6 +195,7 @@ def test_meshing_and_solving_end_within_a_second(
     assert not left_behind(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("word", "code"), STOPS)
 def test_compiling_ends_within_a_second(tmp_path: Path, word: signal.Signals, code: int) -> None:
     scene(tmp_path, "a.py")
@@ -223,7 +226,7 @@ def test_a_process_that_is_asked_at_every_moment_where_it_is_does_its_work() -> 
         "from sonic_bullet.machine.worker import running_scene\n"
         "s.ASK_S = 0.0\n"
         "def run():\n"
-        "    end = time.monotonic() + 3\n"
+        "    end = time.monotonic() + 1\n"
         "    with running_scene(Path('a.py')):\n"
         "        while time.monotonic() < end:\n"
         "            compile('def f(x):\\n return [y for y in range(x)]\\n' * 50, 'b', 'exec'), sorted(range(1000))\n"

@@ -14,6 +14,7 @@ import soundfile
 from sonic_bullet.cli import main
 from sonic_bullet.presets import load_material, read_preset
 from sonic_bullet.records import Material
+from tests.few_cases import parametrize_few
 from tests.made.case import make
 
 KEYS = {
@@ -229,8 +230,8 @@ def spoiled(folder: Path, place: Path, how: str) -> Path:
     return place / "spoiled.wav"
 
 
-@pytest.mark.parametrize(
-    ("how", "surest"), [("20 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)]
+@parametrize_few(
+    ("how", "surest"), [("20 ms", 0), ("other rate", 0), ("tone", 0), ("speech", 0), ("stereo", 2)], (0, 3)
 )
 def test_what_a_recording_does_not_say_is_not_claimed(
     folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], how: str, surest: int
@@ -333,7 +334,7 @@ def test_the_entrys_channel_is_fitted_and_said(folder: Path, tmp_path: Path, cap
     assert lines[1].endswith("two.wav: 2 channels: channel 1 is used, counted from 0")
 
 
-@pytest.mark.parametrize("command", ["fit", "residual", "diagnose"])
+@parametrize_few("command", ["fit", "residual", "diagnose"], 1)
 def test_the_first_channel_unless_another_is_named(
     folder: Path, tmp_path: Path, command: str, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,6 +20,7 @@ REPO = Path(__file__).resolve().parents[2]
 LAYOUT = {"shape": cache.Kept("f8", (3,))}
 
 
+@pytest.mark.slow
 def test_commands_run_as_another_user_without_a_home_on_a_read_only_install() -> None:
     words = [sys.executable, REPO / "benchmarks" / "no_home.py", "--json", "--commands", "modes"]
     done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=280)

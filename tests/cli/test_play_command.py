@@ -20,6 +20,7 @@ from sonic_bullet.live import playback
 from sonic_bullet.render import log_frames, render_log
 from sonic_bullet.scene import render_scene
 from tests.cli.test_commands import error_of, run
+from tests.few_cases import parametrize_few
 from tests.made.sound_cards import StandInLibrary
 
 SCRIPT = """
@@ -67,7 +68,7 @@ def test_a_logs_frames_are_its_sound_so_much_later(made: Path) -> None:
     np.testing.assert_array_equal(late[:, lag:], sound[:, : late.shape[1] - lag])
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("words", "seconds"),
     [
         (("script.py", "--seconds", 0.25), 0.25),
@@ -79,6 +80,7 @@ def test_a_logs_frames_are_its_sound_so_much_later(made: Path) -> None:
         (("log.npz",), 0.3),
         (("log.npz", "--seconds", 0.1, "--sr", 48000, "--seed", 3, "--microphone", "0,1,0"), 0.1),
     ],
+    2,
 )
 def test_what_was_played_is_said(
     place: Path, capfd: pytest.CaptureFixture[str], words: tuple[object, ...], seconds: float
@@ -121,7 +123,7 @@ def test_what_cannot_be_played_is_one_line(
     assert said in error_of(capfd, "play", *words, "--device", "null")
 
 
-@pytest.mark.parametrize("what", ["log.npz", "script.py"])
+@parametrize_few("what", ["log.npz", "script.py"], (1,))
 def test_no_sound_card_is_one_line(
     place: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -129,7 +131,7 @@ def test_no_sound_card_is_one_line(
     assert "this machine has no sound card; connect one, or play to 'null'" in error_of(capfd, "play", what)
 
 
-@pytest.mark.parametrize("what", ["log.npz", "script.py"])
+@parametrize_few("what", ["log.npz", "script.py"], (1,))
 def test_a_card_that_is_pulled_ends_it_with_what_was_played(
     place: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -151,7 +153,7 @@ def test_a_card_that_is_pulled_ends_it_with_what_was_played(
     assert library.streams[0].closed
 
 
-@pytest.mark.parametrize(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@parametrize_few(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], 1)
 def test_an_interrupt_says_what_was_played(place: Path, word: signal.Signals, code: int) -> None:
     (place / "long.py").write_text(SCRIPT.replace("    p.step", "    open('stepping', 'w').close(); p.step"))
     # a shell's background jobs are started deaf to SIGINT
@@ -166,7 +168,7 @@ def test_an_interrupt_says_what_was_played(place: Path, word: signal.Signals, co
         end = time.monotonic() + 100
         while not (place / "stepping").exists() and running.poll() is None and time.monotonic() < end:
             time.sleep(0.05)
-        time.sleep(3)
+        time.sleep(1)
         os.kill(running.pid, word)
         said = running.communicate(timeout=100)[1]
     finally:

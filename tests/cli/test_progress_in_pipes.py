@@ -18,6 +18,7 @@ import pytest
 import trimesh
 
 from sonic_bullet.machine.progress import CALL_QUIET_S, EVERY_S, LEAST_S, ProgressLines, status
+from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "sonic_bullet"]
@@ -136,6 +137,7 @@ def test_modes_announce_the_mesh_and_leave_json_clean(tmp_path: Path) -> None:
     assert json.loads(run.stdout)["modes"]
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_a_fit_says_what_it_listens_to(tmp_path: Path, shared_path: Path) -> None:
     late_s = start_s()
@@ -159,7 +161,7 @@ def test_add_in_a_script_names_the_body_that_takes_long(tmp_path: Path) -> None:
     assert quick.code == 0 and len(quick.progress) <= 1, quick.text  # kept; one line on a machine that is very busy
 
 
-@pytest.mark.parametrize("word", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+@parametrize_few("word", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL], (2,))
 def test_nobody_stays_behind_a_script_that_is_ended(tmp_path: Path, word: signal.Signals) -> None:
     """What speaks is gone with what it speaks of: the pipe is closed."""
     bowl(tmp_path)
@@ -185,7 +187,7 @@ def test_nobody_stays_behind_a_script_that_is_ended(tmp_path: Path, word: signal
         assert time.monotonic() - began < 5.0
 
 
-@pytest.mark.parametrize("words", [["materials"], ["--version"], ["features", "missing.wav"]])
+@parametrize_few("words", [["materials"], ["--version"], ["features", "missing.wav"]], 1)
 def test_what_is_quick_says_nothing(tmp_path: Path, words: list[str]) -> None:
     late_s = start_s()
     run = heard(tmp_path, [*COMMAND, *words])

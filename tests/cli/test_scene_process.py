@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from sonic_bullet.files import read_audio, read_log
+from tests.few_cases import parametrize_few
 
 MAIN = "from sonic_bullet.cli import main; main()"
 WITHOUT_PYBULLET = "import sys; sys.modules['pybullet'] = None; " + MAIN
@@ -73,7 +73,7 @@ def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
-@pytest.mark.parametrize(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@parametrize_few(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], 1)
 def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signal.Signals, code: int) -> None:
     write_scene(
         tmp_path,
@@ -116,7 +116,7 @@ def test_an_interrupt_that_compiled_code_met_is_an_interrupt(tmp_path: Path) -> 
     assert read_audio(tmp_path / "a.partial.wav")[0].shape[1] >= 0.2 * 48_000
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("options", "words"),
     [
         ({"mass": "float('nan')"}, "mass"),
@@ -124,6 +124,7 @@ def test_an_interrupt_that_compiled_code_met_is_an_interrupt(tmp_path: Path) -> 
         ({"act": "client.disconnect()"}, "detach the listener"),
         ({"act": "syntax error"}, "scene"),
     ],
+    (0, 3),
 )
 def test_a_broken_scene_is_one_line(tmp_path: Path, options: dict[str, str], words: str) -> None:
     write_scene(tmp_path, **options)

@@ -17,6 +17,7 @@ from sonic_bullet.records.errors import FileError
 from sonic_bullet.render import render_log
 from sonic_bullet.soundtrack.score.scoring import read_animation, score_scene
 from tests.cli.test_commands import error_of, run
+from tests.few_cases import parametrize_few
 from tests.made.animations import EDGES_M, box_mesh, dropped, keyframes, write_glb
 
 REPO = Path(__file__).resolve().parents[2]
@@ -194,7 +195,7 @@ def test_a_log_that_cannot_be_written_does_not_take_the_sound_with_it(
     assert read_audio("a.partial.wav")[0].any()
 
 
-@pytest.mark.parametrize("at", [0.6, 0.9])
+@parametrize_few("at", [0.6, 0.9], 1)
 def test_a_scene_that_is_stopped_after_its_simulation_is_kept(place: Path, at: float) -> None:
     Path("hand.py").write_text(HAND)
 

@@ -16,6 +16,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Microphone
 from sonic_bullet.records.errors import CompareError
 from tests.comparing.made import scene
+from tests.few_cases import parametrize_few
 
 SR = 48_000
 
@@ -122,7 +123,7 @@ def test_recordings_name_no_cause_and_rates_are_compared_at_the_lower(tmp_path: 
     assert compare(tmp_path / "a.wav", tmp_path / "a.wav").same
 
 
-@pytest.mark.parametrize("decay_per_s", [0.0, 40.0])
+@parametrize_few("decay_per_s", [0.0, 40.0], 1)
 def test_recordings_that_have_nothing_in_common_are_said_to_have_nothing(decay_per_s: float) -> None:
     rng, n, sr = np.random.default_rng(35), 12_000, 48_000
     fade = np.exp(-decay_per_s * np.arange(n) / sr)

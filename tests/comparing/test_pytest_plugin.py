@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.comparing.made import scene
 
 REPO = Path(__file__).resolve().parents[2]
@@ -18,6 +20,7 @@ def run(place: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=place, check=False, capture_output=True, text=True, timeout=240)
 
 
+@pytest.mark.slow
 def test_a_scene_that_changed_fails_with_its_cause_and_leaves_a_folder(tmp_path: Path) -> None:
     (tmp_path / "pytest.ini").write_text("[pytest]\n")
     (tmp_path / "test_it.py").write_text('def test_bar(sonic_scene):\n    sonic_scene("a.py")\n')

@@ -8,6 +8,7 @@ import pytest
 from sonic_bullet.comparing.tolerance import SoundMeasures, as_tolerance, closeness, measure_sound
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import CompareError
+from tests.few_cases import parametrize_few
 
 SR = 48_000
 TIME_S = np.arange(SR // 2) / SR
@@ -22,7 +23,7 @@ def measures(*sounds: Array) -> SoundMeasures:
     return measure_sound(np.sum(sounds, axis=0)[None], SR)
 
 
-@pytest.mark.parametrize(("gain_db", "within"), [(0.4, True), (-0.4, True), (0.6, False), (-0.6, False)])
+@parametrize_few(("gain_db", "within"), [(0.4, True), (-0.4, True), (0.6, False), (-0.6, False)], (0, 3))
 def test_a_gain_is_within_its_decibels(gain_db: float, within: bool) -> None:
     found = closeness(measures(ring(1000)), measures(ring(1000) * 10 ** (gain_db / 20)), 0.5)
     assert found.within is within

@@ -13,6 +13,7 @@ from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, may
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
+from tests.few_cases import parametrize_few
 
 
 def candidate(*drop_db: float, control_db: float = 0.0) -> Candidate:
@@ -88,7 +89,7 @@ def test_a_suspect_has_hope_as_long_as_the_rest_may_make_up_for_it(
 
 
 @pytest.mark.parametrize("certain", [False, True])
-@pytest.mark.parametrize("strikes", [3, 4, 5, 8])
+@parametrize_few("strikes", [3, 4, 5, 8], (1, 3))
 def test_whatever_is_accepted_had_hope(strikes: int, certain: bool) -> None:
     """Gains drawn at random below what is open, on strikes of which some have far more open than others: to gain all of
     that on one would make the mean unsure.

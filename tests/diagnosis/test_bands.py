@@ -21,6 +21,7 @@ from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.estimator.lines.log_spectral import white, with_noise
 from sonic_bullet.records import Array
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import SR, plate, recorded, struck
 
 LOUDER = 4  # of the plate's modes: 1320 Hz, alone in its third octave
@@ -52,10 +53,10 @@ def one_mode_more(hz: float = 5600.0, decay_per_s: float = 120.0) -> Struck:
     return struck(plate(), lines, signals + level[:, None] * np.exp(-decay_per_s * t) * np.cos(2 * np.pi * hz * t))
 
 
-@pytest.mark.parametrize(("made", "from_hz", "to_hz"), [
+@parametrize_few(("made", "from_hz", "to_hz"), [
     (one_band_louder, 1.1e3, 1.6e3),
     (one_mode_more, 4.4e3, 7.1e3),
-], ids=["one band 6 dB louder", "a mode that is nobody's line"])  # fmt: skip
+], (1,), ids=["one band 6 dB louder", "a mode that is nobody's line"])  # fmt: skip
 def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], from_hz: float, to_hz: float) -> None:
     """By the mean alone both are `none`, the model suffices."""
     body = made()
@@ -72,7 +73,7 @@ def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], fr
     assert words["bands_off"][0]["strikes"] == 5
 
 
-@pytest.mark.parametrize("seed", [6, 7])
+@parametrize_few("seed", [6, 7], 1)
 def test_nothing_is_off_where_nothing_lacks(seed: int) -> None:
     body = recorded(seed=seed)
     end = closed(fitted(body), (body,), takes_of((body,)), (), BAND)

@@ -24,6 +24,7 @@ from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import SR, plate, recorded, struck
 from tests.made.problems import posed
 
@@ -48,13 +49,14 @@ def test_modes_are_in_phase_and_sidebands_are_not() -> None:
     assert of_no_body(takes_of((turning,)), {turning: predict(fitted(turning), turning)}) > 0.7
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "effect",
     [
         ContactTime(2.6e-4, 0.016, -0.2, "hertz"),
         ContactTime(1.5e-4, 0.016, 0.5, "hertz"),
         DampingLaw("constant-loss", 6e-3),
     ],
+    (1,),
     ids=["pulse", "pulses of many lengths", "law"],
 )
 def test_what_leaves_modes_real_leaves_them_in_phase(effect: Effect) -> None:
@@ -107,9 +109,10 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(
         assert "do not play it" in remainder(end, takes_of((body,)))["words"]
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("left_db", "gain_db", "verdict"),
     [(5.0, None, "explained"), (9.0, None, "unexplained"), (5.0, 4.0, "explained"), (9.0, 4.0, "unexplained")],
+    (0, 3),
 )
 def test_a_room_leaves_little_whatever_is_beside_it(
     monkeypatch: pytest.MonkeyPatch, left_db: float, gain_db: float | None, verdict: str

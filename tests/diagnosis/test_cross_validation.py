@@ -32,6 +32,7 @@ from sonic_bullet.effects.support_damping.support_subsets import _best, subsets
 from sonic_bullet.records import ModalModel
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.diagnosis.test_recording_chain import BENT
+from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded, struck
 from tests.made.problems import posed
 
@@ -81,7 +82,7 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     assert not accepted(found[0], lost, first=True)
 
 
-@pytest.mark.parametrize(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 1), 2), ((), 2)], ids=["all", "two", "none"])
+@parametrize_few(("spoils", "asked"), [((0, 1, 2, 3, 4), 2), ((0, 1), 2), ((), 2)], (1,), ids=["all", "two", "none"])
 def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple[int, ...], asked: int) -> None:
     """Fitted without the first two, it says nothing of them, or plays them far worse, and there is nothing open on the
     others that would make up for it.
@@ -110,7 +111,7 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
     takes, evidence, kinds = (
         takes_of((body,)),
         evidence_of(h, (body,), BAND),
-        (AmplitudeDamping, Radiation, SupportDamping, Idle),
+        (AmplitudeDamping, Radiation, Idle),
     )
     two = cross_validated(h, posed((body,), takes, *kinds, seed=3), evidence)
     monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
@@ -211,9 +212,10 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
     assert {who for who, _ in asked} == {"listens"}
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("dry", "costly", "asked"),
     [(True, True, ["tensor"]), (False, True, ["support-damping", "tensor"]), (True, False, ["support-damping"])],
+    2,
 )
 def test_in_a_room_dashpots_wait_for_a_tensor(
     dry: bool, costly: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch

@@ -10,6 +10,7 @@ import pytest
 from sonic_bullet.diagnosis.evidence.degenerate_pairs import separated
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import ModalModel
+from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded
 
 GROUP = [3, 4, 5]
@@ -35,7 +36,7 @@ def meshed(apart: float) -> Struck:
     return replace(body, model=model, line=line, correction=np.zeros(len(line)))
 
 
-@pytest.mark.parametrize("apart", [0.005, 0.008])
+@parametrize_few("apart", [0.005, 0.008], 1)
 def test_two_lines_part_a_group_of_three(apart: float) -> None:
     body = meshed(apart)
     told = separated(body)

@@ -34,6 +34,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
+from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, GAIN, plate, recorded
 
 BAND = (50.0, 7_500.0)
@@ -90,7 +91,7 @@ def close(found: Effect, planted: Effect, within: dict[str, float]) -> None:
         assert told[name] == pytest.approx(true[name], rel=share), name
 
 
-@pytest.mark.parametrize(("effect", "within"), PLANTED, ids=lambda e: getattr(e, "id", ""))
+@parametrize_few(("effect", "within"), PLANTED, (0, 2, 6), ids=lambda e: getattr(e, "id", ""))
 def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) -> None:
     """With its own numbers, and it brings what is played nearer to the recordings than the best of the baseline."""
     body = recorded(effect)
@@ -109,7 +110,7 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     assert after - floor < 0.35 * (before - floor)
 
 
-@pytest.mark.parametrize("number", [1, 3], ids=["support-damping", "foreign-mode"])
+@parametrize_few("number", [1, 3], 1, ids=["support-damping", "foreign-mode"])
 def test_a_planted_effect_is_named(number: int) -> None:
     effect, within = PLANTED[number]
     end = ended(recorded(effect))
@@ -138,6 +139,7 @@ def test_an_effect_of_somebody_else_is_tried_and_named() -> None:
     assert end.added[0].effect.parameters()["q"] == pytest.approx(20.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_effect_of_somebody_else_may_move_and_mix_modes() -> None:
     """Its traits are all that the host knows: modes are paired with lines anew, and corrections come after it."""
     theirs = of_somebody_else()

@@ -18,6 +18,7 @@ from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.estimator.lines.log_spectral import floor_between
+from tests.few_cases import parametrize_few
 from tests.made.body import SR, plate, recorded, struck, truth
 from tests.made.problems import posed
 
@@ -47,7 +48,7 @@ def upper(off: float) -> np.ndarray:
     return found
 
 
-@pytest.mark.parametrize("off", [0.022, -0.022])
+@parametrize_few("off", [0.022, -0.022], 1)
 def test_upper_modes_two_percent_off_are_the_meshs(off: float) -> None:
     body, h, takes = misjudged(upper(off))
     far, most = beyond(h, posed((body,), takes))
@@ -64,7 +65,7 @@ def test_upper_modes_two_percent_off_are_the_meshs(off: float) -> None:
     assert end.after_db == end.before_db  # what is played knows nothing of it
 
 
-@pytest.mark.parametrize("off", [np.r_[np.full(3, 0.02), np.zeros(15)], upper(1.6 * FAR)], ids=["low modes", "too far"])
+@parametrize_few("off", [np.r_[np.full(3, 0.02), np.zeros(15)], upper(1.6 * FAR)], 1, ids=["low modes", "too far"])
 def test_what_no_mesh_does_stays_open(off: np.ndarray) -> None:
     """Long waves are what meshes get right; and nothing is moved by more than FAR, or to a line of another pattern."""
     body, h, takes = misjudged(off)

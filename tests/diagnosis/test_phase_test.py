@@ -21,6 +21,7 @@ from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.rebound import Rebound
 from sonic_bullet.effects.room import Room
+from tests.few_cases import parametrize_few
 from tests.made.body import recorded, truth
 
 BAND = (50.0, 7_500.0)
@@ -98,7 +99,7 @@ def test_what_lines_alone_have_named_needs_no_strike_to_speak_for_it() -> None:
     assert simplest([one], (recorded(LOW),), evidence_of(truth(), (recorded(LOW),), BAND)) is one
 
 
-@pytest.mark.parametrize("exponent", [-0.2, 0.0])
+@parametrize_few("exponent", [-0.2, 0.0], 1)
 def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: float) -> None:
     """Of a pulse so short that hardly anything rolls off: longer for a soft blow, or not; and files may begin a little
     late, all alike.

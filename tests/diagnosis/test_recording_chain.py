@@ -15,6 +15,7 @@ from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.records import Array
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, plate, recorded, struck
 
 BENT = AmplitudePitch(0.08, "velocity")
@@ -34,7 +35,7 @@ def true_decay(freq_hz: Array) -> Array:
     return np.asarray((ALPHA + BETA * (2 * np.pi * own[at]) ** 2) / 2)
 
 
-@pytest.mark.parametrize("link", LINKS)
+@parametrize_few("link", LINKS, 1)
 def test_a_bent_mode_is_one_line_with_the_decay_it_has(link: tuple[float, float, bool]) -> None:
     lines = lines_of(BENT)
     assert len(lines.freq_hz) > 1.3 * len(plate().freq_hz)
@@ -86,7 +87,7 @@ def test_every_line_is_in_one_group() -> None:
         assert all((np.diff(lines.decay_per_s[g]) >= 0).all() for g in groups)
 
 
-@pytest.mark.parametrize("measure", ["velocity", "displacement"])
+@parametrize_few("measure", ["velocity", "displacement"], 1)
 def test_the_bend_and_its_measure_are_read_off_the_modes_that_show_it(measure: str) -> None:
     """By displacement only the lowest modes bend; the others say nothing for or against it."""
     true = AmplitudePitch(0.08 if measure == "velocity" else 2.0e6, measure)

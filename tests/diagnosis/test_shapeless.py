@@ -17,6 +17,7 @@ from sonic_bullet.estimator.fit.held_out_takes import predicted_take
 from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.records import Array
+from tests.few_cases import parametrize_few
 from tests.made.body import SR, recorded
 
 FLAT = Hypothesis(30.0, 4e-8, 1.0)
@@ -72,7 +73,7 @@ def test_a_held_out_strike_is_its_place_or_the_mean_over_all() -> None:
     assert there == pytest.approx(np.exp(np.log(heard).mean(axis=0)), rel=1e-5)
 
 
-@pytest.mark.parametrize("place", ["each its own", "one", "unknown"])
+@parametrize_few("place", ["each its own", "one", "unknown"], (0, 2))
 @pytest.mark.parametrize("impulse", ["known", "unknown"])
 def test_what_a_diagnosis_begins_from_is_what_fit_plays(place: str, impulse: str) -> None:
     def change(r: CaseRecording, _: int) -> CaseRecording:

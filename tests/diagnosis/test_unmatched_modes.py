@@ -11,10 +11,11 @@ from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, with_noise
 from sonic_bullet.records import Array
+from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded, struck, truth
 
 
-@pytest.mark.parametrize("off", [0.004, -0.007])
+@parametrize_few("off", [0.004, -0.007], 1)
 def test_a_mode_without_a_line_is_put_where_it_sounds(off: float) -> None:
     """The mesh has the fourth mode elsewhere, and its line is missing: it comes back to a hundredth of its half width;
     modes with lines stay.

@@ -22,6 +22,7 @@ from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.protocol import Evidence
 from sonic_bullet.records import ModalModel
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, GAIN, SR, plate, recorded
 
 PAIR = (3, 4)
@@ -47,7 +48,7 @@ def assert_nearer_than_the_meshs(
     assert own is not None and mesh is not None and own < mesh
 
 
-@pytest.mark.parametrize(("damping_growth", "power"), [(2.0, 1.0), (5.0, 1.0), (4.0, 2.0)])
+@parametrize_few(("damping_growth", "power"), [(2.0, 1.0), (5.0, 1.0), (4.0, 2.0)], (1,))
 def test_choke_and_decays_are_told_to_a_few_percent(damping_growth: float, power: float) -> None:
     """However weak, as decays are no longer picked from a grid; and with what power of the level."""
     body = recorded(AmplitudeDamping(damping_growth, "velocity", power=power))

@@ -25,6 +25,7 @@ from sonic_bullet.effects.room import Room
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.diagnosis.test_recording_chain import true_decay
 from tests.effects.test_amplitude_damping import PAIR, assert_nearer_than_the_meshs, with_twins
+from tests.few_cases import parametrize_few
 from tests.made.body import GAIN, plate, recorded
 
 BENT = AmplitudePitch(0.35, "velocity")
@@ -95,7 +96,7 @@ def test_a_bend_by_impulse_is_told_by_what_the_pulse_leaves_of_it() -> None:
     assert found.bend == pytest.approx(bend, rel=0.15)
 
 
-@pytest.mark.parametrize("bend", [0.35, 1.0])
+@parametrize_few("bend", [0.35, 1.0], 1)
 def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: float) -> None:
     bent = AmplitudePitch(bend, "velocity")
     body = made(bend)
@@ -151,7 +152,7 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     assert split is not None and split.turn_rad == ()
 
 
-@pytest.mark.parametrize("off_per_s", [-5.0, 5.0])
+@parametrize_few("off_per_s", [-5.0, 5.0], 1)
 def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float) -> None:
     """By what it is played with that is a third off, their decay is told to 5 %, and by that to 2 %; the line itself is
     farther off.
@@ -211,7 +212,7 @@ def test_in_a_room_no_line_is_one_modes_alone() -> None:
     assert at_rest(h, (body,), (told,)).correction == h.correction
 
 
-@pytest.mark.parametrize("bend", [0.35, 1.0])
+@parametrize_few("bend", [0.35, 1.0], 1)
 def test_lines_of_a_modes_own_chain_are_no_neighbours(bend: float) -> None:
     body = made(bend)
     told = evidence_of(fitted(body), (body,), BAND).observed[0]
@@ -230,7 +231,7 @@ def test_phases_are_whole_turns_apart_however_few_the_frames_are() -> None:
     assert turned.max() > np.pi
 
 
-@pytest.mark.parametrize(("reach_hz", "off_hz"), [(7.5, 0.0), (20.0, 15.0)])
+@parametrize_few(("reach_hz", "off_hz"), [(7.5, 0.0), (20.0, 15.0)], (1,))
 def test_a_mode_at_rest_is_not_taken_for_its_neighbour(reach_hz: float, off_hz: float) -> None:
     """What is played there may be the neighbour's alone, 15 Hz away: with less than that in reach nothing is moved, nor
     to the end of the reach.

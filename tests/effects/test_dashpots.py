@@ -18,6 +18,7 @@ from sonic_bullet.effects.support_damping import LEAST, SupportDamping
 from sonic_bullet.effects.support_damping.dashpot_fit import LEVEL, MISSED, MUTE, Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import sought
 from sonic_bullet.records import Array, ModalModel
+from tests.few_cases import parametrize_few
 from tests.made.body import GAIN, plate, recorded, truth
 
 SPOT, OTHER = (0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0)
@@ -105,7 +106,7 @@ def paired_plate() -> ModalModel:
     return replace(x, freq_hz=freq, decay_per_s=np.full(len(freq), 5.0))
 
 
-@pytest.mark.parametrize("c", [1.0, 40.0, 300.0])
+@parametrize_few("c", [1.0, 40.0, 300.0], (1,))
 def test_poles_and_turns_are_the_equation_solved(c: float) -> None:
     """Σ (b·q)(c·q)(1 + id/ω) e^{st} is the velocity after an impulse, by the matrix exponential."""
     lam, own, phi, loss = some(c)
@@ -165,9 +166,10 @@ def test_runs_are_cut_where_frequencies_lie_apart() -> None:
     assert max(len(run) for run in apart(np.linspace(1, 2, 57), 10)) <= 10
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "law",
     [DampingLaw("constant-loss", 6e-3), DampingLaw("relaxation", 5e-4, strength=0.03, tau_s=3e-5)],
+    1,
     ids=lambda e: str(e.law),
 )
 def test_two_dashpots_are_read_off_pairs_beside_a_law_that_is_not_rayleighs(law: DampingLaw) -> None:

@@ -16,6 +16,7 @@ from sonic_bullet.effects.orthotropy.tensor_search import Tensor, _judged, isotr
 from sonic_bullet.effects.orthotropy.tensors import reduced
 from sonic_bullet.effects.protocol import Elastic, ObjectEvidence
 from sonic_bullet.records import Array, Material
+from tests.few_cases import parametrize_few
 from tests.made.body import recorded, truth
 
 BAND = (50.0, 7_500.0)
@@ -65,7 +66,7 @@ LONG = (
 )
 
 
-@pytest.mark.parametrize(("pulse", "lines"), LONG)
+@parametrize_few(("pulse", "lines"), LONG, 1)
 def test_modes_that_nobody_hears_tell_a_long_contact(pulse: ContactTime, lines: int) -> None:
     """A soft hammer leaves two or three lines: a pulse far longer would say as much of those, and one far shorter as
     much of the silence above.

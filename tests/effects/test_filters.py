@@ -16,6 +16,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain, butterworth
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import SR, recorded
 
 
@@ -28,9 +29,10 @@ def test_the_response_is_the_digital_filters(kind: str, order: int) -> None:
         assert butterworth(freq, corner, order, kind == "highpass", SR) == pytest.approx(np.abs(told), rel=1e-6)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "planted",
     [MeasurementChain(high_pass_hz=4_200.0, high_order=2), MeasurementChain(low_pass_hz=3_500.0, low_order=2)],
+    1,
 )
 def test_a_corner_near_nyquist_is_found_where_it_is(planted: MeasurementChain) -> None:
     body = recorded(planted)

@@ -19,10 +19,11 @@ from sonic_bullet.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines import joint_lines as line_fit
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import SR, recorded
 
 
-@pytest.mark.parametrize("hits", [2, 3, 8])
+@parametrize_few("hits", [2, 3, 8], (1,))
 def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     """A train cut short is not a longer one of less restitution."""
     true = Rebound(0.0131, 0.016, 0.6, 0.0, 0.6, hits)
@@ -36,7 +37,7 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)
 
 
-@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0, -0.2])
+@parametrize_few("exponent", [0.0, 0.5, 1.0, -0.2], 1)
 def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     """Its gap, and how that goes with strength, whatever delays each strike alone would be as content with."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, exponent, 0.25, 2))
@@ -49,7 +50,7 @@ def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     assert found.restitution == pytest.approx(0.25, rel=0.05)
 
 
-@pytest.mark.parametrize("lacks", [(), (AmplitudePitch(0.02, "velocity"),), (Room(0.9, 0.8, 11),)])
+@parametrize_few("lacks", [(), (AmplitudePitch(0.02, "velocity"),), (Room(0.9, 0.8, 11),)], 1)
 def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, ...]) -> None:
     body = recorded(*lacks)
     assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]) is None
@@ -64,7 +65,7 @@ def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
         assert Rebound._of_all(replace(observed, impulse_n_s=level)) is None
 
 
-@pytest.mark.parametrize("e", [0.31, 0.437, 0.72])
+@parametrize_few("e", [0.31, 0.437, 0.72], (1,))
 def test_a_restitution_between_the_tried_ones_is_found_by_the_third_hits_phases(e: float) -> None:
     n, gap = 6_000, np.array([0.0131, 0.0262])
     t = np.arange(n) / SR
@@ -79,6 +80,7 @@ def test_a_restitution_between_the_tried_ones_is_found_by_the_third_hits_phases(
     assert found == pytest.approx(e, abs=0.25 / 3_890 / gap.max())
 
 
+@pytest.mark.slow
 def test_long_gaps_that_hardly_shrink() -> None:
     """Hits that ring on beyond what is looked at count for what is inside."""
     body = recorded(Rebound(0.15, 0.016, 0.6, 0.0, 0.9, 4))

@@ -14,6 +14,7 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Evidence
 from sonic_bullet.records import ModalModel
+from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded, truth
 
 BAND = (50.0, 7_500.0)
@@ -44,7 +45,7 @@ def told(body: Struck, correction: dict[int, float]) -> ModeSplitting:
     return found
 
 
-@pytest.mark.parametrize("correction", [{}, {3: 0.006, 4: -0.006}, {3: -0.006, 4: 0.006, 9: 0.0045}])
+@parametrize_few("correction", [{}, {3: 0.006, 4: -0.006}, {3: -0.006, 4: 0.006, 9: 0.0045}], (2,))
 def test_the_turn_is_the_meshs_whatever_corrections_say(correction: dict[int, float]) -> None:
     found = told(recorded(split(), model=degenerate(), seconds=1.0), correction)
     assert found.split == pytest.approx((0.012, 0.009), rel=0.02)
@@ -132,7 +133,7 @@ def rough(body: Struck, f: float, gain: list[float]) -> Evidence:
     return replace(every, observed=(replace(one, amplitude=amplitude, foreign_amplitude=foreign),))
 
 
-@pytest.mark.parametrize("plain", [1, 3])
+@parametrize_few("plain", [1, 3], (1,))
 def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
     """The plate with two or four pairs, of which the second's patterns are its modes' but for a factor of 0.35 at one
     strike and 1.7 at another.

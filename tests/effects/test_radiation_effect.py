@@ -14,6 +14,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.score import least_db, mean_db, predict_takes
 from sonic_bullet.effects.radiation import SOUND, Radiation
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import GAIN, recorded
 
 
@@ -26,7 +27,7 @@ def test_efficiency_is_the_pulsating_and_the_oscillating_spheres(degree: int, or
     assert told == pytest.approx(1 / (x**2 * np.abs(slope) ** 2), rel=1e-9)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "planted",
     [
         Radiation(0.04, 4.0, 0.0, 2),
@@ -34,6 +35,7 @@ def test_efficiency_is_the_pulsating_and_the_oscillating_spheres(degree: int, or
         Radiation(0.05, 3.0, 0.5, 4),
         Radiation(0.04, 6.0, 0.5, 2),
     ],
+    (0, 2),
 )
 def test_how_steeply_a_body_radiates_is_read_off_its_decays(planted: Radiation) -> None:
     body = recorded(planted)

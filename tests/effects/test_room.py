@@ -19,6 +19,7 @@ from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.protocol import Sound, Stage
 from sonic_bullet.effects.room import RT60, Room, _one, late
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, recorded, truth
 
 
@@ -124,7 +125,7 @@ def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ..
     assert _one(read, 1) == room
 
 
-@pytest.mark.parametrize("rt60", [0.5, 1.6])
+@parametrize_few("rt60", [0.5, 1.6], 1)
 def test_the_rate_of_a_room(rt60: float) -> None:
     """Three rooms: how wet one sounds to a dozen lines is a matter of its taps, by a third."""
     found = [
@@ -138,13 +139,14 @@ def test_the_rate_of_a_room(rt60: float) -> None:
     )
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "effect",
     [
         DampingLaw("constant-loss", 6e-3),
         ForeignMode((1000.0, 2610.0), (11.0, 25.0), (1.2, 0.9), (0.3, -1.0)),
         MeasurementChain(hum_hz=50.0, hum_amplitude=(0.01, 0.005), hum_phase_rad=(0.0, 1.0)),
     ],
+    1,
     ids=lambda e: e.id,
 )
 def test_no_room_where_none_is(effect: object) -> None:
@@ -152,9 +154,10 @@ def test_no_room_where_none_is(effect: object) -> None:
     assert late(object_evidence(predict(refitted(fitted(body), (body,)), body))) is None
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("other", "parameter", "within"),
     [(ContactTime(4e-4, 0.016, 0.0, "half-sine"), "tau_s", 0.15), (DampingLaw("constant-loss", 8e-3), "eta", 0.2)],
+    1,
     ids=["contact-time", "damping-law"],
 )
 def test_another_effect_is_told_beside_a_room(other: ContactTime | DampingLaw, parameter: str, within: float) -> None:

@@ -13,6 +13,7 @@ from sonic_bullet.effects.orthotropy.tensor_search import CAP, STEP, WIDTHS, _ho
 from sonic_bullet.effects.orthotropy.tensors import constants, stiffness
 from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
+from tests.few_cases import parametrize_few
 
 MODES, STRIKES, LINES = 90, 5, 60
 EVIDENCE = Evidence((), 0.0, 0.0, 1.0, (), (20.0, 20_000.0))
@@ -54,7 +55,7 @@ def lines(seed: int) -> BodyLines:
     )
 
 
-@pytest.mark.parametrize("seed", range(3))
+@parametrize_few("seed", range(3), 1)
 def test_a_wood_is_told_from_an_isotropic_start(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tensor_search, "body_lines_of", lambda _: [lines(seed)])
     both = search(EVIDENCE)
@@ -62,7 +63,7 @@ def test_a_wood_is_told_from_an_isotropic_start(seed: int, monkeypatch: pytest.M
     assert np.abs(constants(both[1].p) / constants(far(seed)) - 1)[[0, 1, 6, 7, 8]].max() < 0.1
 
 
-@pytest.mark.parametrize("seed", range(3))
+@parametrize_few("seed", range(3), 1)
 def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(seed: int) -> None:
     told, guess = [lines(seed)], isotropic_p(plank(seed))
     rng = np.random.default_rng(seed)

@@ -12,6 +12,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.listener.quiet import quiet_stdout
+from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, WOOD
 from tests.made.worlds import plate_model
 
@@ -115,7 +116,7 @@ def test_a_vector_in_one_process(expected: list[np.ndarray]) -> None:
     check_vector(gymnasium.vector.SyncVectorEnv([sounding, sounding]), expected)
 
 
-@pytest.mark.parametrize("context", ["fork", "spawn"])
+@parametrize_few("context", ["fork", "spawn"], 1)
 def test_a_vector_of_processes(context: str, expected: list[np.ndarray]) -> None:
     assert context in multiprocessing.get_all_start_methods()
     check_vector(gymnasium.vector.AsyncVectorEnv([sounding, sounding], context=context), expected)

@@ -13,6 +13,7 @@ from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 
 SR = 16_000
 TIME = np.arange(SR) / SR
@@ -32,7 +33,7 @@ def take(seed: int, modes: tuple[tuple[float, float, float], ...] = MODES, room:
     return np.asarray(sound + slap + reverberation + 1e-4 * rng.standard_normal(len(TIME)))
 
 
-@pytest.mark.parametrize("room", [0.0, 0.003])
+@parametrize_few("room", [0.0, 0.003], (1,))
 def test_an_attack_makes_no_lines(room: float) -> None:
     lines = joint_lines(take(1, room=room)[None], SR, band_hz=BAND, shaped=True)
     assert len(lines.freq_hz) == len(MODES)
@@ -61,7 +62,7 @@ def test_spreads_are_those_of_many_draws() -> None:
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 2.0
 
 
-@pytest.mark.parametrize("seed", range(5))
+@parametrize_few("seed", range(5), 2)
 def test_noise_has_no_lines(seed: int) -> None:
     noise = np.random.default_rng(seed).standard_normal(SR)[None]
     assert len(ringing_lines(noise, SR, BAND, signed=True).freq_hz) <= 1

@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood
 from sonic_bullet.estimator.lines.extraction import extract
+from tests.few_cases import parametrize_few
 
 SR = 44_100
 
@@ -61,7 +62,7 @@ def test_residual_moments_and_information_agree_with_differences() -> None:
     assert np.abs((likelihood.information(modes, SR, 3000) - wanted) / scale / scale[:, None]).max() < 1e-6
 
 
-@pytest.mark.parametrize("law", ["uniform", "logarithmic"])
+@parametrize_few("law", ["uniform", "logarithmic"], 1)
 @pytest.mark.parametrize("phase", ["any", "sine"])
 def test_a_hundred_sinusoids_without_noise_come_back_exactly(law: str, phase: str) -> None:
     """The paper's own test (its errors: 4e-4 and 5.3e-3 on average): worst error of f and d, each mode found once."""
@@ -104,7 +105,7 @@ def test_onset_to_the_sample(noise: float, phase: float | None) -> None:
         assert round(extract(x + noise * rng.standard_normal(len(x)), SR).onset_s * SR) == before
 
 
-@pytest.mark.parametrize(("db", "least"), [(20.0, 0.90), (40.0, 0.98), (60.0, 0.99)])
+@parametrize_few(("db", "least"), [(20.0, 0.90), (40.0, 0.98), (60.0, 0.99)], (1,))
 def test_mixtures_in_noise_near_the_bound(db: float, least: float) -> None:
     """Found, false and error against the single mode's Cramér-Rao bound √(8d³/(fs·a²/2σ²)); pairs closer than their
     width are in it.

@@ -19,6 +19,7 @@ from sonic_bullet.estimator.fit.recorded import gather, observed
 from sonic_bullet.files.cases import Case, read_case
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import AudioError, MeshError, SonicBulletError
+from tests.few_cases import parametrize_few
 from tests.made.case import Planted, make, write_box
 
 BRASS = Material.isotropic("made", youngs_pa=1.04e11, poisson=0.345, density_kg_m3=8500, alpha_per_s=6.0, beta_s=3e-8)
@@ -183,7 +184,7 @@ def _two_materials(case: dict[str, Any], folder: Path) -> None:
     case["recordings"].append({"features": [{"freq_hz": 500.0}], "object": "other", "split": "fit"})
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("edit", "error", "word"),
     [
         (_millimetres, MeshError, "143 m across"),
@@ -195,6 +196,7 @@ def _two_materials(case: dict[str, Any], folder: Path) -> None:
         (_two_rates, AudioError, "rates"),
         (_two_materials, SonicBulletError, "several materials"),
     ],
+    (0, 2, 4),
 )
 def test_what_contradicts_itself_is_one_line(
     planted: Planted, tmp_path: Path, edit: Any, error: type[Exception], word: str

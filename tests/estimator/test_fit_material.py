@@ -169,6 +169,7 @@ def test_bad_evidence_is_one_line(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_practice_01(shared_path: Path) -> None:
     case = read_case(shared_path / "practice" / "practice-01")

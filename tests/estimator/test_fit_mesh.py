@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.few_cases import parametrize_few
+
 
 @pytest.mark.shared
-@pytest.mark.parametrize(("name", "words"), [("pyrfda-main-lines", "8909 Hz"), ("spruce-plates", "Rayleigh's law")])
+@parametrize_few(("name", "words"), [("pyrfda-main-lines", "8909 Hz"), ("spruce-plates", "Rayleigh's law")], 1)
 def test_measured_objects_get_a_verdict(
     shared_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
 ) -> None:

@@ -22,6 +22,7 @@ from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.estimator.residual.recorded_strikes import case_strikes
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Array, Material
+from tests.few_cases import parametrize_few
 from tests.made.case import make
 
 SR = 24_000
@@ -51,9 +52,9 @@ def test_takes_that_differ_by_gain_alone_have_no_spread() -> None:
     assert np.allclose(np.abs(found.amplitude) / np.abs(found.amplitude[0]), one, rtol=1e-9)
 
 
-def case_of(folder: Path, holdouts: int, noise: float = 1e-4) -> Path:
+def case_of(folder: Path, holdouts: int, noise: float = 1e-4, *, seconds: float = 1.0) -> Path:
     """A case of takes of one object without a mesh, each as loud as chance has it."""
-    rng, n = np.random.default_rng(11), SR
+    rng, n = np.random.default_rng(11), round(seconds * SR)
     t = np.arange(n) / SR
     rows = []
     for i in range(3 + holdouts):
@@ -110,7 +111,7 @@ def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make(folder, brass, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3).folder
 
 
-@pytest.mark.parametrize(("factor", "worse"), [(1.0, False), (3e3, True), (3e4, True)])
+@parametrize_few(("factor", "worse"), [(1.0, False), (3e3, True), (3e4, True)], (1,))
 def test_what_is_farther_than_silence_is_said_and_ends_with_one(
     placed: Path, tmp_path: Path, factor: float, worse: bool
 ) -> None:

@@ -20,6 +20,7 @@ from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.presets import total_damping
 from sonic_bullet.records.errors import FileError
+from tests.few_cases import parametrize_few
 from tests.made.case import write_box
 
 LINES = [
@@ -28,7 +29,7 @@ LINES = [
 ]
 
 
-@pytest.mark.parametrize("sensor", ["pressure", "velocity"])
+@parametrize_few("sensor", ["pressure", "velocity"], 1)
 def test_the_bar_sounds_as_recorded(tmp_path: Path, sensor: str) -> None:
     """The bar of scenes/bar.py, at a microphone and at a vibrometer."""
     (bar,) = (t for t in round_trip.subjects(None, tmp_path) if t.name == "bar")
@@ -56,7 +57,7 @@ def fitted_lines(folder: Path, *, mesh: bool = True, **more: Any) -> Any:
     return fit_case(read_case(folder))
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("more", "medium", "radiation"),
     [
         ({"sensor": {"type": "microphone"}}, "air", "apart"),
@@ -67,6 +68,7 @@ def fitted_lines(folder: Path, *, mesh: bool = True, **more: Any) -> Any:
         ({}, "unknown", "damping"),
         ({"sensor": {"type": "microphone"}, "mesh": False}, "air", "damping"),
     ],
+    (0, 2, 6),
 )
 def test_damping_says_what_it_includes(tmp_path: Path, more: dict[str, Any], medium: str, radiation: str) -> None:
     """Taken off where mesh and medium are known; else the preset says that damping is total.

@@ -19,6 +19,7 @@ from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array, Material
 from tests.cli.test_commands import run
 from tests.estimator.test_held_out_takes import DECAY, HZ, case_of
+from tests.few_cases import parametrize_few
 from tests.made.case import make
 
 
@@ -34,7 +35,7 @@ def bar(tmp_path_factory: pytest.TempPathFactory) -> CaseFit:
     return fit_case(read_case(made.folder))
 
 
-@pytest.mark.parametrize("material", [None, "steel", "glass"])
+@parametrize_few("material", [None, "steel", "glass"], 2)
 def test_no_constant_is_printed_that_nobody_gave(
     material: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -101,7 +102,7 @@ def test_the_guess_on_the_shape_is_held_beside_the_fit(bar: CaseFit, taps: CaseF
     assert all(np.isnan(take.plausible_db) for take in taps.takes)
 
 
-@pytest.mark.parametrize("name", ["steel", "glass", "wood"])
+@parametrize_few("name", ["steel", "glass", "wood"], 1)
 def test_a_guess_without_damping_takes_that_of_the_nearest_preset(name: str) -> None:
     own = load_material(name)
     bare = Material.isotropic("x", youngs_pa=7e10, poisson=0.2, density_kg_m3=2500)

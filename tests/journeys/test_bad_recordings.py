@@ -12,6 +12,7 @@ import soundfile
 
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 
 SR = 48_000
 MODES = ((1680.0, 8.0, 0.3), (2900.0, 12.0, 0.2), (3360.0, 25.0, 0.2))
@@ -132,7 +133,7 @@ def test_what_went_bad_in_a_case_is_one_line(capfd: pytest.CaptureFixture[str]) 
         Path("mine/x.wav").unlink()
 
 
-@pytest.mark.parametrize("dead", [np.zeros(SR // 2), np.full(SR // 2, 0.01), 1e-5 * draw(4).standard_normal(SR // 2)])
+@parametrize_few("dead", [np.zeros(SR // 2), np.full(SR // 2, 0.01), 1e-5 * draw(4).standard_normal(SR // 2)], 1)
 def test_a_dead_channel_is_named_and_the_live_one_used(dead: Array, capfd: pytest.CaptureFixture[str]) -> None:
     status, err, found = walk(pair(dead, tap()), capfd)
     assert status == 0 and "2 channels: channel 0 is dead, channel 1 is used, counted from 0" in err
@@ -148,9 +149,10 @@ def test_a_dead_channel_that_is_asked_for_is_refused(capfd: pytest.CaptureFixtur
     assert status == 0 and "2 channels: the first is used, channel 0" in err
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "sound",
     [speech(120, 1), speech(210, 2), speech(95, 3), rain(700, 5), rain(2000, 6), 0.1 * draw(7).standard_normal(SR)],
+    (0, 3),
     ids=["speech", "high speech", "low speech", "rain", "downpour", "noise"],
 )
 def test_speech_rain_and_noise_are_said_to_be_no_impact(sound: Array, capfd: pytest.CaptureFixture[str]) -> None:
@@ -159,8 +161,11 @@ def test_speech_rain_and_noise_are_said_to_be_no_impact(sound: Array, capfd: pyt
     assert "x.wav: " in err and ("one impact alone does not" in err or "not an impact" in err)
 
 
-@pytest.mark.parametrize(
-    "notes", [(220, 277.2, 329.6, 440), (523.3, 392), (98, 110, 130.8), (440,)], ids=["chord", "two", "low", "one"]
+@parametrize_few(
+    "notes",
+    [(220, 277.2, 329.6, 440), (523.3, 392), (98, 110, 130.8), (440,)],
+    (0, 3),
+    ids=["chord", "two", "low", "one"],
 )
 def test_music_is_no_impact_and_that_is_said(notes: tuple[float, ...], capfd: pytest.CaptureFixture[str]) -> None:
     status, err, found = walk(music(*notes), capfd)
@@ -173,7 +178,7 @@ def test_fit_says_that_music_is_no_impact(capfd: pytest.CaptureFixture[str]) -> 
     assert "one impact alone does not" in check_fit(capfd)[1]
 
 
-@pytest.mark.parametrize("gain", [3.0, -4.0])
+@parametrize_few("gain", [3.0, -4.0], 1)
 def test_a_tap_that_clips_is_said(gain: float, capfd: pytest.CaptureFixture[str]) -> None:
     status, err, found = walk(np.clip(gain * tap(), -0.9, 0.9)[: SR // 3], capfd)
     assert status == 0 and "samples are clipped" in err and found["verdict"] != "features"
@@ -195,9 +200,10 @@ def test_any_rate_gives_the_same_modes(sr: int, said: str, capfd: pytest.Capture
     assert said in check_fit(capfd)[1]
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     "sound",
     [speech(120, 1), speech(210, 2), speech(110, 9), speech(230, 7), rain(700, 5)],
+    (1, 4),
     ids=["speech", "high speech", "last syllable", "higher speech", "rain"],
 )
 def test_fit_of_what_is_no_impact_writes_no_preset(sound: Array, capfd: pytest.CaptureFixture[str]) -> None:

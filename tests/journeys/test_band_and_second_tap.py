@@ -12,6 +12,7 @@ import soundfile
 
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 
 SR, SECONDS = 48_000, 1.5
 TIME = np.arange(int(SECONDS * SR)) / SR
@@ -61,18 +62,19 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("name", ["clean", "rumble"])
+@parametrize_few("name", ["clean", "rumble"], (1,))
 def test_rumble_below_the_band_hides_no_mode(shared_path: Path, name: str) -> None:
     check_modes(features(shared_path / f"faults/02-rumble-hides-every-mode/{name}.wav", "--band", "200,20000"), 0.5)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("beside", "band"),
     [
         (0.2 + wind(0.05), "400,20000"),
         (0.2 * np.sin(2 * np.pi * 12_000 * TIME + 1), "200,10000"),
         (sum(0.05 / k * np.sin(2 * np.pi * 60 * k * TIME + k) for k in (1, 2, 3)), "200,20000"),
     ],
+    1,
     ids=["offset and wind", "tone above", "hum"],
 )
 def test_what_lies_outside_the_band_changes_nothing(beside: Array, band: str) -> None:

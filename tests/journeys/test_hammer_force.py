@@ -15,6 +15,7 @@ from sonic_bullet.estimator.hammer_pulse import measure_pulse
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 from tests.made.case import sound, write_box
 
 SR = 48_000
@@ -60,7 +61,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SONIC_BULLET_PROGRESS", "0")
 
 
-@pytest.mark.parametrize(("impulse", "contact_s"), [(0.1, 4e-4), (0.01, 2e-4), (0.3, 2e-3)])
+@parametrize_few(("impulse", "contact_s"), [(0.1, 4e-4), (0.01, 2e-4), (0.3, 2e-3)], 1)
 def test_the_impulse_is_read_off_the_force(impulse: float, contact_s: float, capfd: pytest.CaptureFixture[str]) -> None:
     write("a.wav", half_sine(0.1003, SR // 2, impulse, contact_s))
     (strike,) = strikes("a.wav", "--force-channel", "1", "--force-newton", "500")

@@ -13,6 +13,7 @@ import soundfile
 from sonic_bullet.estimator.lines.standing_hum import find_standing_hum
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 
 SR = 44_100
 TIME = np.arange(int(0.7 * SR)) / SR
@@ -48,7 +49,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SONIC_BULLET_PROGRESS", "0")
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("beside", "said"),
     [
         (hum(50, 0.05), "hum at 50 Hz"),
@@ -56,6 +57,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (hum(49.95, 0.02, (2, 4, 6)), "hum at 50 Hz"),
         (hum(50.03, 0.002, (1, 3)), "hum at 50 Hz"),
     ],
+    (1, 3),
     ids=["50 Hz", "60 Hz, a multiple at a mode", "of a rectifier", "weak"],
 )
 def test_hum_is_said_and_no_mode(

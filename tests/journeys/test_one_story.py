@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Array, Material
 from tests.cli.test_commands import run
 from tests.estimator.test_held_out_takes import SR, case_of
+from tests.few_cases import parametrize_few
 from tests.made.case import make
 
 AGREE_DB = 0.1
@@ -39,7 +41,7 @@ def attack(i: int, n: int) -> Array:
 
 def with_sound(folder: Path, beside: Beside) -> Path:
     """A case of taps with something more in its takes."""
-    case_of(folder, 2)
+    case_of(folder, 1, seconds=0.6)
     for i, path in enumerate(sorted(folder.glob("take*.wav"))):
         sound, sr = soundfile.read(path)
         soundfile.write(path, sound + beside(i, len(sound)), sr, subtype="FLOAT")
@@ -73,8 +75,9 @@ def check_agree(folder: Path) -> None:
 
 
 def test_on_a_mesh_struck_by_unknown_impulses_too(tmp_path: Path) -> None:
+    shorter: dict[str, Any] = {"seconds": 0.4, "band_hz": [20, 6000]}
     brass = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
-    folder = make(tmp_path, brass, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3).folder
+    folder = make(tmp_path, brass, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3, **shorter).folder
     case = json.loads((folder / "case.json").read_text())
     for entry in case["recordings"]:
         del entry["strike"]["impulse"]
@@ -87,7 +90,7 @@ def test_on_a_case_of_another_laboratory_too(shared_path: Path, tmp_path: Path) 
     check_agree(shutil.copytree(shared_path / "practice" / "practice-03", tmp_path / "case"))
 
 
-@pytest.mark.parametrize("factor", [3e3, 1e4, 1e-4])
+@parametrize_few("factor", [3e3, 1e4, 1e-4], (1, 2))
 def test_both_say_worse_than_silence(factor: float, tmp_path: Path) -> None:
     """The impulses of the takes held out are stated so many times too large; or those of the others."""
     folder = case_of(tmp_path, 1)

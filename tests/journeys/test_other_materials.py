@@ -14,6 +14,7 @@ import soundfile
 from sonic_bullet import presets, scene
 from sonic_bullet.files import read_log
 from tests.cli.test_commands import error_of, run
+from tests.few_cases import parametrize_few
 from tests.made.lines import line_at
 
 SCENE = """
@@ -99,7 +100,7 @@ def preset(name: str, **changes: Any) -> str:
     return name
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("words", "bar", "ball"),
     [
         (("--material", "bar=glass"), "glass", "steel"),
@@ -107,6 +108,7 @@ def preset(name: str, **changes: Any) -> str:
         (("--material", "bar=glass", "--material", "wood"), "glass", "wood"),
         (("--material", "ball=brass", "--material", "bar=wood"), "wood", "brass"),
     ],
+    (2, 3),
 )
 def test_a_scene_and_its_log_are_overridden_alike(words: tuple[str, ...], bar: str, ball: str) -> None:
     """A material moves nothing in PyBullet: the log of steel, replayed in glass, is the scene in glass, bit for bit."""
@@ -120,7 +122,7 @@ def test_a_scene_and_its_log_are_overridden_alike(words: tuple[str, ...], bar: s
     assert "motion, masses and contact forces stay" in note and f"bar is {bar}" in note
 
 
-@pytest.mark.parametrize(("youngs", "density"), [(4.0, 1.0), (1.0, 2.0), (0.3, 0.8)])
+@parametrize_few(("youngs", "density"), [(4.0, 1.0), (1.0, 2.0), (0.3, 0.8)], (2,))
 def test_frequencies_of_a_log_go_as_the_root_of_stiffness_over_density(youngs: float, density: float) -> None:
     """λ = γ θ(ν)/L², γ = E/ρ, for an isotropic body [Hughes 1987, ch. 2.7]; heard as a line of that frequency."""
     steel = presets.load_material("steel")
@@ -138,7 +140,7 @@ def test_frequencies_of_a_log_go_as_the_root_of_stiffness_over_density(youngs: f
 
 
 @pytest.mark.parametrize("source", ["scene.py", "log.npz"])
-@pytest.mark.parametrize("law", [{"eta": 4e-3}, {"eta": 1e-3}])
+@parametrize_few("law", [{"eta": 4e-3}, {"eta": 1e-3}], 1)
 def test_a_preset_with_an_effect_is_honoured(source: str, law: dict[str, float]) -> None:
     """Decays of the played sound are the preset's, d = ηω/2, and those that the log lists."""
     effect = {"id": "damping-law", "law": "constant-loss", **law}
@@ -197,7 +199,7 @@ def test_a_name_that_the_scripts_own_listener_never_adds_is_said(
     assert f"add it there, or name who is added: {added}" in said
 
 
-@pytest.mark.parametrize("silent", ["bar", "ball"])
+@parametrize_few("silent", ["bar", "ball"], 1)
 def test_a_silent_body_is_left_out_of_the_sound_alone(silent: str) -> None:
     """Scene and log give the same bytes, and what is missing of the mix is that body's stem."""
     from_scene = heard("scene.py", "--silent", silent, "--no-supports")
@@ -245,7 +247,7 @@ def test_a_name_is_that_of_one_link_or_of_a_whole_body(who: str) -> None:
 
 
 @pytest.mark.parametrize("source", ["scene.py", "log.npz", "script.py"])
-@pytest.mark.parametrize("option", [("--material", "bowl=steel"), ("--silent", "bowl"), ("--silent", "ba")])
+@parametrize_few("option", [("--material", "bowl=steel"), ("--silent", "bowl"), ("--silent", "ba")], 1)
 def test_an_unknown_name_lists_those_there_are(
     source: str, option: tuple[str, str], capfd: pytest.CaptureFixture[str]
 ) -> None:

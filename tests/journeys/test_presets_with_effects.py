@@ -25,6 +25,7 @@ from sonic_bullet.files import read_log
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 from tests.made.lines import line_at
 
 SCENE = """
@@ -122,7 +123,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("law", LAWS)
+@parametrize_few("law", LAWS, 1)
 def test_a_damping_law_is_in_the_sound_and_in_the_modes(folder: Path, law: str) -> None:
     numbers, decay = LAWS[law]
     played = Played(folder, BAR_M, effects=[{"id": "damping-law", "law": law, **numbers}], damping=total())
@@ -169,7 +170,7 @@ def test_a_split_pair_sounds_as_two_lines(folder: Path) -> None:
         assert level > 0.2 * plain.line(pair, 0.1, 0.4, width_s=0.025)[2]
 
 
-@pytest.mark.parametrize(("measure", "bend"), [("velocity", 6.0), ("velocity", -4.0), ("displacement", 2.5e8)])
+@parametrize_few(("measure", "bend"), [("velocity", 6.0), ("velocity", -4.0), ("displacement", 2.5e8)], 2)
 def test_pitch_that_goes_with_level_early_and_late(folder: Path, measure: str, bend: float) -> None:
     """f = f₀ (1 + b L²) with L the peak velocity (or displacement) of the mode at the surface."""
     played = Played(
@@ -190,7 +191,7 @@ def test_pitch_that_goes_with_level_early_and_late(folder: Path, measure: str, b
     assert abs(rise[0]) > 3e-3 and abs(rise[0]) > 5 * abs(rise[2])
 
 
-@pytest.mark.parametrize(("power", "growth"), [(1, 25.0), (2, 25.0), (1, 8.0)])
+@parametrize_few(("power", "growth"), [(1, 25.0), (2, 25.0), (1, 8.0)], 1)
 def test_damping_that_goes_with_level_early_and_late(folder: Path, power: int, growth: float) -> None:
     """d = d₀ (1 + (c L)^p)."""
     effect = {"id": "amplitude-damping", "choke": growth, "measure": "velocity", "power": power}

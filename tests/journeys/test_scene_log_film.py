@@ -10,6 +10,7 @@ import soundfile
 
 from sonic_bullet.files import read_audio, read_audio_scale
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 
 SCENE = """
 SECONDS = 0.3
@@ -38,14 +39,14 @@ def inside(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(place)
 
 
-@pytest.mark.parametrize("words", [(), ("--pascals",), ("--tail", "0"), ("--peak-dbfs", "-6", "--tail", "-30")])
+@parametrize_few("words", [(), ("--pascals",), ("--tail", "0"), ("--peak-dbfs", "-6", "--tail", "-30")], (2, 3))
 def test_scene_and_log_give_the_same_bytes_with_equal_options(words: tuple[str, ...]) -> None:
     assert run("render", "scene.py", "-o", "a.wav", *words) == 0
     assert run("render", "log.npz", "-o", "b.wav", *words) == 0
     assert Path("a.wav").read_bytes() == Path("b.wav").read_bytes()
 
 
-@pytest.mark.parametrize("words", [(), ("--pascals",), ("--tail", "0")])
+@parametrize_few("words", [(), ("--pascals",), ("--tail", "0")], 1)
 def test_stems_have_the_mixs_gain_and_length_and_add_up_to_it(words: tuple[str, ...]) -> None:
     assert run("render", "log.npz", "-o", "with.wav", "--stems", "stems", "--cues", *words) == 0
     stems, mix = sorted(Path("stems").glob("*.wav")), soundfile.read("with.wav")[0]

@@ -14,6 +14,7 @@ from sonic_bullet import modal, presets
 from sonic_bullet.files.uff.reader import read_uff
 from sonic_bullet.records import Array, Material
 from tests.cli.test_commands import run
+from tests.few_cases import parametrize_few
 from tests.made import responses as made
 from tests.made.case import write_box
 
@@ -55,7 +56,7 @@ def told(name: str = "f.json") -> dict[str, Any]:
     return json.loads(Path(name).read_text())
 
 
-@pytest.mark.parametrize("roving", ["hammer", "sensor"])
+@parametrize_few("roving", ["hammer", "sensor"], 1)
 def test_modes_come_back_within_their_spreads(roving: str, capfd: pytest.CaptureFixture[str]) -> None:
     made.write_uff(Path("test.uff"), *three_modes(roving=roving))
     assert run("case", "new", "mine", "test.uff") == 0

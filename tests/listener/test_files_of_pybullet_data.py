@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from tests.few_cases import parametrize_few
 from tests.made.robots import CANNOT_BE_LOADED, ONE_A_KIND, STEPS, all_files
 
 BOUND_S, CODE_S, BOUND_MB = 60, 120, 2000
@@ -32,7 +33,7 @@ def heard(name: str, *how: str) -> None:
         assert told["memory_mb"] <= KNOWN_MB.get(name, BOUND_MB * min(max(told["links"], 1), 2))
 
 
-@pytest.mark.parametrize("name", ONE_A_KIND)
+@parametrize_few("name", ONE_A_KIND, (3, 7, 11))
 def test_one_file_a_kind(name: str) -> None:
     heard(name)
 

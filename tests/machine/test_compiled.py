@@ -16,6 +16,7 @@ import pytest
 
 from sonic_bullet.machine import compiled, user_folder
 from sonic_bullet.machine.user_folder import private_folder
+from tests.few_cases import parametrize_few
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
 KERNEL = """
@@ -186,7 +187,7 @@ def test_a_folder_that_is_another_users_or_behind_anothers_link_is_not_used(tmp_
         assert private_folder(tmp_path / "folder") is private_folder(tmp_path / "mine") is None
 
 
-@pytest.mark.parametrize("home", ["/dev/null", "", "not/absolute"])
+@parametrize_few("home", ["/dev/null", "", "not/absolute"], 1)
 def test_without_a_place_kernels_are_compiled_in_every_process(folder: Path, home: str) -> None:
     before = {path.name for path in folder.iterdir()}
     assert hits(folder, HOME=home, XDG_CACHE_HOME=home or "/proc/none") == 0

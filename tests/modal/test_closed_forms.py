@@ -11,6 +11,7 @@ import trimesh
 from sonic_bullet.modal import analyse
 from sonic_bullet.modal import closed_forms as exact
 from sonic_bullet.records import Material, Shape
+from tests.few_cases import parametrize_few
 
 E, NU, RHO = 200e9, 0.3, 7850.0
 LENGTH, SIDE = 0.4, 0.02
@@ -44,7 +45,7 @@ def test_ball_multiplets_are_lambs() -> None:
     assert eta["S2"] == pytest.approx(2.640, abs=1e-3)
 
 
-@pytest.mark.parametrize("made", ["named", "twelve triangles", "turned, fine mesh"])
+@parametrize_few("made", ["named", "twelve triangles", "turned, fine mesh"], (1, 2))
 def test_ten_modes_of_a_slender_bar(steel: Material, made: str) -> None:
     mesh = trimesh.creation.box((LENGTH, SIDE, SIDE))
     if made == "turned, fine mesh":
@@ -55,7 +56,7 @@ def test_ten_modes_of_a_slender_bar(steel: Material, made: str) -> None:
     assert np.abs(found / bar_hz() - 1).max() < 5e-3
 
 
-@pytest.mark.parametrize("ratio", [0.01, 0.005])
+@parametrize_few("ratio", [0.01, 0.005], 1)
 def test_ten_modes_of_a_thin_plate(steel: Material, ratio: float) -> None:
     shape = (
         as_mesh(trimesh.creation.box((0.2, 0.2, 0.2 * ratio)))

@@ -16,6 +16,7 @@ import trimesh
 from sonic_bullet.modal import analyse, read_mesh
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Material, Shape
+from tests.few_cases import parametrize_few
 
 AGREE = 1e-3
 ASKED = 1e-2  # of elements: each may be as far off as that
@@ -54,7 +55,7 @@ def test_a_body_of_elements_without_a_mode_in_the_band_has_none() -> None:
     assert analyse((Shape("mesh", vertex_m=ball.vertices, face=ball.faces),), BRASS, cache=None).mode_count == 0
 
 
-@pytest.mark.parametrize("path", ASSETS, ids=lambda path: path.stem)
+@parametrize_few("path", ASSETS, 1, ids=lambda path: path.stem)
 def test_scene_and_diagnosis_agree_on_what_comes_with_the_project(path: Path) -> None:
     assert apart(read_mesh(path), 10_000.0) < AGREE
 
@@ -81,7 +82,7 @@ print(hashlib.sha256(model.freq_hz.tobytes() + model.shape.tobytes() + model.ver
 """
 
 
-@pytest.mark.parametrize(("body", "edge_m"), [(wedge, 0.008), (crossed, 0.01)])
+@parametrize_few(("body", "edge_m"), [(wedge, 0.008), (crossed, 0.01)], 1)
 def test_the_same_bytes_on_one_thread_or_two_beside_other_processes(body: Callable[[], Shape], edge_m: float) -> None:
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(3)]
     try:

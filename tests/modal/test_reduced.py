@@ -15,6 +15,7 @@ from sonic_bullet.modal import closed_forms as exact
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.modal.revolution import rings, section
 from sonic_bullet.records import Array, Material, Shape
+from tests.few_cases import parametrize_few
 
 GAMMA, NU = 2.5e7, 0.3
 
@@ -50,7 +51,7 @@ def test_a_slender_bar_by_polynomials_bends_as_timoshenko_says() -> None:
     )
 
 
-@pytest.mark.parametrize("size", [(0.2, 0.13, 0.01), (0.1, 0.02, 0.006), (0.05, 0.05, 0.05), (0.08, 0.06, 0.025)])
+@parametrize_few("size", [(0.2, 0.13, 0.01), (0.1, 0.02, 0.006), (0.05, 0.05, 0.05), (0.08, 0.06, 0.025)], (0, 2))
 def test_more_polynomials_change_nothing(size: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch) -> None:
     shape, top = Shape("box", np.array(size)), 3_000 / max(size)
     usual = family(shape, gamma_m2_s2=GAMMA, poisson=NU, to_hz=top, cache=None)

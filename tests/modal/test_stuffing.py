@@ -9,6 +9,7 @@ import trimesh
 from sonic_bullet.modal.meshing.solid import TET_FACE, corner_volume_m3, largest_component
 from sonic_bullet.modal.meshing.stuffing import stuffed, winding_number
 from sonic_bullet.records.errors import MeshError
+from tests.few_cases import parametrize_few
 
 BOX = trimesh.creation.box((0.1, 0.05, 0.03))
 BALL = trimesh.creation.icosphere(3, 0.05)
@@ -18,7 +19,7 @@ def given(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     return np.array(mesh.vertices), np.array(mesh.faces)
 
 
-@pytest.mark.parametrize(("mesh", "edge_m"), [(BALL, 0.01), (BOX, 0.01), (BOX, 0.006)])
+@parametrize_few(("mesh", "edge_m"), [(BALL, 0.01), (BOX, 0.01), (BOX, 0.006)], (0, 1))
 def test_elements_fit_together_without_a_gap(mesh: trimesh.Trimesh, edge_m: float) -> None:
     """Every face belongs to one or two elements, the boundary is closed, and no element is flat."""
     node, tet = stuffed(*given(mesh), edge_m)

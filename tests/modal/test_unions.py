@@ -11,6 +11,7 @@ from sonic_bullet.modal import analyse
 from sonic_bullet.modal.meshing.surfaces import pieces_of_faces, prepared
 from sonic_bullet.modal.meshing.unions import joined
 from sonic_bullet.records import Material, Shape
+from tests.few_cases import parametrize_few
 
 
 def two_boxes(gap_m: float) -> tuple[np.ndarray, np.ndarray]:
@@ -26,7 +27,7 @@ def united(vertex: np.ndarray, face: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return joined(vertex, face, pieces_of_faces(face))
 
 
-@pytest.mark.parametrize("overlap_m", [0.02, 0.05])
+@parametrize_few("overlap_m", [0.02, 0.05], 1)
 def test_overlapping_pieces_count_their_common_volume_once(overlap_m: float) -> None:
     vertex, face, said = united(*two_boxes(-overlap_m))
     assert geometry.is_closed(face)

@@ -13,6 +13,7 @@ from sonic_bullet.modal import analyse
 from sonic_bullet.presets import load_material
 from sonic_bullet.radiation import compact, far_field, radiated
 from sonic_bullet.records import Air, ModalModel, Shape
+from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, box_model
 
 
@@ -29,7 +30,7 @@ TUBES = {
 }
 
 
-@pytest.mark.parametrize("material", ["glass", "plastic", "wood", "steel"])
+@parametrize_few("material", ["glass", "plastic", "wood", "steel"], 1)
 @pytest.mark.parametrize("name", TUBES)
 def test_a_tube_radiates_in_every_material(name: str, material: str) -> None:
     model = analyse((TUBES[name],), load_material(material), count=6)
@@ -66,13 +67,14 @@ def nested(outer: trimesh.Trimesh, inner: trimesh.Trimesh, motion: np.ndarray) -
     return made[0], made[1]
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("outer", "inner"),
     [
         (trimesh.creation.icosphere(2, 0.1), trimesh.creation.icosphere(2, 0.09)),
         (trimesh.creation.box((0.2, 0.1, 0.05)).subdivide().subdivide(), trimesh.creation.box((0.18, 0.08, 0.03))),
         (trimesh.creation.cylinder(0.05, 0.2), trimesh.creation.cylinder(0.045, 0.19)),
     ],
+    1,
 )
 def test_a_cavity_is_not_heard(outer: trimesh.Trimesh, inner: trimesh.Trimesh) -> None:
     """Nested shells: the air inside is shut in, and its near field has no answer ("Singular matrix")."""

@@ -17,6 +17,7 @@ from sonic_bullet.estimator.perceptual.metric import Constants
 from sonic_bullet.modal import analyse
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import RecordError
+from tests.few_cases import parametrize_few
 
 SR = 48000
 # γ in units of γ₀
@@ -81,7 +82,7 @@ def recorded(
 
 
 @pytest.mark.parametrize("planted", FIGURE_9)
-@pytest.mark.parametrize("full_scale", [74.0, 94.0, 114.0])
+@parametrize_few("full_scale", [74.0, 94.0, 114.0], 1)
 def test_planted_materials(planted: tuple[float, ...], full_scale: float) -> None:
     lambda_hat, amplitude_hat = plate()
     truth = np.array(planted) * np.array([1, 1, GAMMA_0, 1])
@@ -90,7 +91,7 @@ def test_planted_materials(planted: tuple[float, ...], full_scale: float) -> Non
     assert np.abs(fast(asked).parameters / truth - 1).max() < 1e-6
 
 
-@pytest.mark.parametrize("planted", FIGURE_9)
+@parametrize_few("planted", FIGURE_9, 1)
 def test_planted_materials_from_their_sound_alone(planted: tuple[float, ...]) -> None:
     """Silence before, features extracted, onset found: the whole way from a recording to the four numbers."""
     lambda_hat, amplitude_hat = plate()
@@ -110,9 +111,7 @@ def test_planted_material_under_noise() -> None:
     assert found.gamma_m2_s2 == pytest.approx(truth[2], rel=2e-4)
 
 
-@pytest.mark.parametrize(
-    "constants", [Constants(), Constants(bark_step=1.0, levels=3), Constants(per_bark=1.0, power=0.6)]
-)
+@parametrize_few("constants", [Constants(), Constants(bark_step=1.0, levels=3), Constants(per_bark=1.0, power=0.6)], 1)
 def test_the_metric_alone_leads_to_the_planted_material(constants: Constants) -> None:
     """The minimum of Π is the truth whatever its constants: a start off in all four numbers, features only in Π_MRP."""
     lambda_hat, amplitude_hat = plate()

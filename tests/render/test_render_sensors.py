@@ -16,6 +16,7 @@ from sonic_bullet.render import render_log
 from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.synth import bank
 from sonic_bullet.synth.pulse import pulse_spectrum
+from tests.few_cases import parametrize_few
 from tests.made.banks import Force, advance
 from tests.made.models import STEEL, ball_body, box_body, row, step, wall_body
 from tests.made.pulses import cumulated_force, jerk_of
@@ -277,7 +278,7 @@ def test_static_bodies_ring() -> None:
     assert np.abs(sound).max() > 1e-4
 
 
-@pytest.mark.parametrize("radius", [0.004, 0.01, 0.1])
+@parametrize_few("radius", [0.004, 0.01, 0.1], (0, 2))
 @pytest.mark.parametrize("freq", [100.0, 2000.0])
 def test_a_force_that_swings_moves_a_rigid_body_as_the_sphere_law_says(radius: float, freq: float) -> None:
     """Steady force: p = 2K w² s/((s+w)² + w²) · F/m at 1 m, w = c/a: the transfer function of Kirchhoff's sphere."""

@@ -11,6 +11,7 @@ import sonic_bullet as sb
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.soundtrack.sound_events import IMPACT, SoundEvent, find_sound_events
+from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, box_model
 from tests.made.soundtracks import MICROPHONES
 
@@ -88,9 +89,10 @@ def test_a_body_at_rest_is_not_struck(shape: str, restitution: float, step_s: fl
     assert hits(events, 1.7) == []
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("shape", "restitution", "step_hz"),
     [("bar", 0.7, 1000), ("box", 0.7, 1000), ("plate", 0.7, 1000), ("plate", 0.8, 1000), ("plate", 0.8, 500)],
+    (0, 2),
 )
 def test_what_hardly_loses_speed_comes_to_silence_too(shape: str, restitution: float, step_hz: int) -> None:
     """A plate of restitution 0.8 jitters at 70 mm/s, and was struck as long as a ball would have bounced on."""

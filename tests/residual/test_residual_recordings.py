@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from benchmarks import residual_table
+from tests.few_cases import parametrize_few
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize(("case", "farther"), [("practice-01", 0.1), ("practice-02", 0.0)])
+@parametrize_few(("case", "farther"), [("practice-01", 0.1), ("practice-02", 0.0)], 1)
 def test_held_out_strikes_of_a_case_are_nearer(shared_path: Path, case: str, farther: float) -> None:
     """Nothing is lacking in practice-01, so nothing may be spoilt; practice-02's damping is not Rayleigh's."""
     rows = list(residual_table.of_case(shared_path / "practice" / case))

@@ -14,6 +14,7 @@ from sonic_bullet.residual.invert import ITERATIONS, inconsistency, invert, magn
 from sonic_bullet.residual.offline import transferred_clip
 from sonic_bullet.residual.spectrogram import Power, inverse, power, transform
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, shifted_hz, transfer
+from tests.few_cases import parametrize_few
 from tests.made.residuals import SR, banded, modes
 
 REPO = Path(__file__).resolve().parents[2]
@@ -132,7 +133,7 @@ def centroid_hz(per_hz: np.ndarray, freq_hz: np.ndarray) -> float:
     return float((weight * freq_hz).sum() / weight.sum())
 
 
-@pytest.mark.parametrize("band", [1210.0, 1450.0, 2350.0, 3700.0])
+@parametrize_few("band", [1210.0, 1450.0, 2350.0, 3700.0], (0, 3))
 @pytest.mark.parametrize("size", [2.0, 0.5])
 def test_a_larger_body_sounds_lower_and_longer(band: float, size: float) -> None:
     """Bands at or between modes go to f/s; they last as the modes' decays say; residual and modes keep the ratio of

@@ -11,6 +11,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.cli import cli
 from sonic_bullet.scene import render_scene
+from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, box_model
 from tests.made.worlds import EDGES_M, ball, box, floor, plate_model
 
@@ -52,7 +53,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@parametrize_few("name", SCENES, 2)
 def test_a_mute_body_is_named_once(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text, wanted = SCENES[name]
     (tmp_path / "scene.py").write_text(HEAD + text)

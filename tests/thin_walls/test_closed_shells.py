@@ -12,6 +12,7 @@ from benchmarks.thin_walls.bodies import BODIES, BRASS, PORCELAIN, STEEL
 from benchmarks.thin_walls.reference import truth
 from sonic_bullet.modal import closed_forms
 from sonic_bullet.records import Array
+from tests.few_cases import parametrize_few
 
 
 def known(name: str) -> Array:
@@ -60,9 +61,10 @@ def test_a_ring_is_loves() -> None:
         has("ring", frequency_hz, rel)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("name", "size", "orders", "rel"),
     [("tube-0.01", (0.03, 0.0003, 0.2), (2, 3, 4), 5e-3), ("tube-0.05", (0.02, 0.001, 0.3), (2, 3), 8e-3)],
+    1,
 )
 def test_a_thin_tube_is_rayleighs_and_loves(
     name: str, size: tuple[float, float, float], orders: tuple[int, ...], rel: float
@@ -72,9 +74,10 @@ def test_a_thin_tube_is_rayleighs_and_loves(
             has(name, shells.free_cylinder_hz(*size, **asdict(BODIES[name].stuff), n=n, tilting=tilting), rel)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("name", "radius_m", "thickness_m", "half_deg", "stuff"),
     [("bowl", 0.07, 0.003, 90.0, PORCELAIN), ("dome", 0.2, 0.002, 50.0, STEEL)],
+    1,
 )
 def test_a_cap_bends_nearly_without_stretching(
     name: str, radius_m: float, thickness_m: float, half_deg: float, stuff: object

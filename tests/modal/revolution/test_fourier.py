@@ -13,6 +13,7 @@ from sonic_bullet.modal import analyse, read_mesh
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.modal.revolution import section
 from sonic_bullet.records import Material, ModalModel, Shape
+from tests.few_cases import parametrize_few
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 RHO, YOUNG = 7850.0, 2e11
@@ -111,7 +112,7 @@ def steel_disc() -> ModalModel:
     return analyse((Shape("cylinder", [0.1, 0.002, 0]),), steel(0.3), count=5, cache=None)
 
 
-@pytest.mark.parametrize("name", ["bowl", "plate", "tumbler"])
+@parametrize_few("name", ["bowl", "plate", "tumbler"], 1)
 def test_scene_and_diagnosis_agree(name: str) -> None:
     """`analyse` and `family` to other limits, with sections of their own."""
     shape = read_mesh(ASSETS / f"{name}.obj")
@@ -125,7 +126,7 @@ def named_error(note: str) -> float:
     return float(re.findall(r"about ([\d.e-]+) %", note)[0]) / 100
 
 
-@pytest.mark.parametrize("name", ["bowl", "tumbler"])
+@parametrize_few("name", ["bowl", "tumbler"], 1)
 def test_the_estimate_is_the_error_within_a_factor_of_two(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a section coarse enough for its error to be seen, against one four times finer."""
     shape = read_mesh(ASSETS / f"{name}.obj")

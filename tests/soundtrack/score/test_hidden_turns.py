@@ -12,6 +12,7 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.scoring import score_animation
+from tests.few_cases import parametrize_few
 from tests.made.animations import FLOOR_M, floor_body
 
 STICK, COIN, DIE, WHEEL = (0.3, 0.02, 0.02), (0.04, 0.04, 0.003), (0.04, 0.04, 0.04), (0.2, 0.2, 0.02)
@@ -46,9 +47,10 @@ def given_n_s(animation: Animation) -> tuple[float, tuple[str, ...]]:
     return up, found.notes
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("edges", "fps", "turns_a_s", "axis"),
     [(STICK, 24, 15, (0, 1, 0)), (COIN, 25, 16, (1, 0, 0)), (DIE, 30, 19, (0, 0, 1)), (WHEEL, 12, 7, (1, 0, 0))],
+    2,
 )
 def test_who_turns_unseen_above_the_floor_is_not_struck(edges: Any, fps: float, turns_a_s: float, axis: Any) -> None:
     """It flies past the floor, nearer than half its length, and falls all the time."""

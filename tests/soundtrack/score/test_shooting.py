@@ -9,6 +9,7 @@ from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
+from tests.few_cases import parametrize_few
 from tests.made.animations import MASS_KG, RADIUS_M, ball_animation, bounce_m
 
 GRAVITY, DROP_M, REBOUND = 9.81, 0.08, 0.7
@@ -25,7 +26,7 @@ def found(animation: Animation) -> tuple[np.ndarray, np.ndarray]:
     return np.arange(len(steps))[kept] * step_s, impulse[kept]
 
 
-@pytest.mark.parametrize("fps", [24.0, 25.0, 60.0])
+@parametrize_few("fps", [24.0, 25.0, 60.0], 1)
 def test_a_bounce_is_found(fps: float) -> None:
     """m (1 + e) √(2 g h) within a twentieth, within two steps of √(2 h / g): a step changes the speed by 4 cm/s."""
     fall_s = np.sqrt(2 * DROP_M / GRAVITY)
