@@ -1,6 +1,6 @@
 """The command line on the real run time: what it makes, and how it ends where the input is bad.
 
-One process a call, as a shell does it.
+The first in a process of its own, as a shell does it; how a process ends: test_endings.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,11 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import read_audio, read_log, read_model
+from tests.cli.called_here import call_here
+from tests.few_cases import parametrize_few
 
 MAIN = "from sonic_bullet.cli import main; main()"
+Call = Callable[..., subprocess.CompletedProcess[str]]
 BUILT = """
 SECONDS = 0.2
 def build(client):
@@ -81,8 +85,8 @@ def call(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def good(folder: Path, *words: str) -> str:
-    done = call(folder, *words)
+def good(folder: Path, *words: str, run: Call = call_here) -> str:
+    done = run(folder, *words)
     assert done.returncode == 0, done.stderr
     said = [
         line
@@ -98,7 +102,7 @@ def good(folder: Path, *words: str) -> str:
 def refused(folder: Path, *words: str, names: str) -> None:
     """Exit 2, one line that names the thing, no traceback, nothing new in the folder but a file called partial."""
     before = {path.name for path in folder.iterdir()}
-    done = call(folder, *words)
+    done = call_here(folder, *words)
     assert done.returncode == 2, (done.returncode, done.stderr)
     lines = [line for line in done.stderr.splitlines() if "pybullet build time" not in line]
     assert len(lines) == 1, lines
@@ -129,6 +133,7 @@ def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sou
             "--picture",
             "a.png",
             "--json",
+            run=call,
         )
     )
     sound, sr = read_audio(folder / "a.wav")
@@ -171,7 +176,7 @@ def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sou
 
 def test_a_plain_script_with_a_window_and_no_end_sounds(folder: Path) -> None:
     (folder / "plain.py").write_text(PLAIN)
-    done = call(
+    done = call_here(
         folder, "render", "plain.py", "-o", "plain.wav", "--seconds", "0.2", "--material", "wood", "--tail", "0"
     )
     assert done.returncode == 0, done.stderr
@@ -239,7 +244,7 @@ def test_materials_and_doctor(folder: Path) -> None:
     assert all(finding["what"] and finding["remedy"] for finding in found)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("words", "names"),
     [
         (("render", "nowhere.py", "-o", "a.wav"), "nowhere.py"),
@@ -252,12 +257,13 @@ def test_materials_and_doctor(folder: Path) -> None:
         (("modes", "block.obj", "--material", "unobtainium"), "unobtainium"),
         (("modes", "block.obj", "--young", "-1", "--poisson", "0.3", "--density", "8000"), "young"),
     ],
+    (0, 8),
 )
 def test_a_bad_request_is_one_line(folder: Path, words: tuple[str, ...], names: str) -> None:
     refused(folder, *words, names=names)
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("name", "content"),
     [
         ("empty.obj", ""),
@@ -265,13 +271,14 @@ def test_a_bad_request_is_one_line(folder: Path, words: tuple[str, ...], names: 
         ("nan.obj", BLOCK.replace("0.2", "nan")),
         ("point.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n"),
     ],
+    (1,),
 )
 def test_a_broken_mesh_is_one_line(folder: Path, name: str, content: str) -> None:
     (folder / name).write_text(content)
     refused(folder, "modes", name, "-o", "m.npz", names=name if name != "point.obj" else "mesh")
 
 
-@pytest.mark.parametrize(
+@parametrize_few(
     ("how", "names"),
     [
         (scene(act="1 / 0"), "ZeroDivisionError"),
@@ -284,6 +291,7 @@ def test_a_broken_mesh_is_one_line(folder: Path, name: str, content: str) -> Non
         (scene().replace("bar: {", "bar + 7: {"), "body 8"),
         (scene(act="client.disconnect()"), "connect"),
     ],
+    (0, 2),
 )
 def test_a_broken_scene_is_one_line(folder: Path, how: str, names: str) -> None:
     (folder / "scene.py").write_text(how)

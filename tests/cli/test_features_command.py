@@ -13,15 +13,22 @@ import pytest
 import soundfile
 
 from sonic_bullet.cli.line_table import decay_values
+from tests.cli.called_here import call_here
+from tests.few_cases import parametrize_few
 
 
 def features(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [str(Path(sys.executable).with_name("sonic-bullet")), "features", *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return call_here(Path(), "features", *map(str, words))
+
+
+def test_the_installed_command_is_this_one(tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "silent.wav", np.zeros(48_000), 48_000)
+    words = ["features", str(tmp_path / "silent.wav")]
+    command = [str(Path(sys.executable).with_name("sonic-bullet")), *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    here = features(*words[1:])
+    assert (done.returncode, done.stdout, done.stderr) == (here.returncode, here.stdout, here.stderr)
+    assert done.returncode == 2 and "silent.wav is silent" in done.stderr
 
 
 def test_a_tap_in_stereo(tmp_path: Path) -> None:
@@ -87,7 +94,7 @@ def test_what_is_no_recording_gets_one_line(tmp_path: Path) -> None:
         assert len(done.stderr.strip().splitlines()) == 1 and "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize(("freq_hz", "decay_per_s"), [(700.0, 12.0), (180.0, 3.0), (5200.0, 60.0)])
+@parametrize_few(("freq_hz", "decay_per_s"), [(700.0, 12.0), (180.0, 3.0), (5200.0, 60.0)], 1)
 def test_t60_loss_factor_and_q_stand_beside_the_decay(tmp_path: Path, freq_hz: float, decay_per_s: float) -> None:
     """T60 = ln(1000)/d, η = d/(πf) = 1/Q, each to its spread, in the table, the JSON and the CSV."""
     time = np.arange(24_000) / 48_000

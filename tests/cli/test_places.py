@@ -4,8 +4,6 @@ meanwhile.
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,8 +11,8 @@ import pytest
 from sonic_bullet.files import check_output, read_audio, write_audio
 from sonic_bullet.presets import named_preset, write_preset
 from sonic_bullet.records.errors import FileError
+from tests.cli.called_here import call_here
 
-MAIN = "from sonic_bullet.cli import main; main()"
 SCENE = """
 import os, pathlib
 pathlib.Path({ran!r}).touch()
@@ -47,25 +45,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def call(folder: Path, *words: str | bytes) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", MAIN, *words],
-        cwd=folder,
-        check=False,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        timeout=250,
-    )
-
-
 def write_scene(folder: Path, act: str = "") -> None:
     (folder / "scene.py").write_text(SCENE.format(ran=str(folder / "ran"), act=act))
 
 
 def test_a_scene_that_changes_the_folder_does_not_move_its_outputs(folder: Path) -> None:
     write_scene(folder)
-    done = call(
+    done = call_here(
         folder,
         "render",
         "scene.py",
@@ -89,7 +75,7 @@ def test_a_scene_that_changes_the_folder_does_not_move_its_outputs(folder: Path)
 
 def test_what_an_error_leaves_stays_where_it_was_asked_for(folder: Path) -> None:
     write_scene(folder, "def act(client, time_s):\n    if time_s > 0.02: 1 / 0")
-    done = call(folder, "render", "scene.py", "-o", "a.wav")
+    done = call_here(folder, "render", "scene.py", "-o", "a.wav")
     assert done.returncode == 2
     assert "are in a.partial.wav" in done.stderr
     assert read_audio(folder / "a.partial.wav")[0].size > 0
@@ -141,7 +127,7 @@ def test_a_name_that_cannot_be_written_ends_before_the_scene_runs(
     folder: Path, words: tuple[str | bytes, ...], says: str
 ) -> None:
     write_scene(folder)
-    done = call(folder, "render", "scene.py", *words)
+    done = call_here(folder, "render", "scene.py", *words)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert says in done.stderr
@@ -153,7 +139,7 @@ def test_a_name_that_cannot_be_written_ends_before_the_scene_runs(
 def test_a_name_of_250_characters_is_written(folder: Path) -> None:
     assert len(LONG) == 250
     write_scene(folder, "def act(client, time_s):\n    if time_s > 0.02: 1 / 0")
-    done = call(folder, "render", "scene.py", "-o", LONG)
+    done = call_here(folder, "render", "scene.py", "-o", LONG)
     assert done.returncode == 2
     kept = [path for path in folder.iterdir() if path.name.endswith(".partial.wav")]
     assert len(kept) == 1
@@ -161,7 +147,7 @@ def test_a_name_of_250_characters_is_written(folder: Path) -> None:
     assert read_audio(kept[0])[0].size > 0
     write_audio(folder / LONG, read_audio(kept[0])[0], 48_000)
     assert read_audio(folder / LONG)[0].size > 0
-    assert call(folder, "materials", "--json", "y" * 245 + ".json").returncode == 0
+    assert call_here(folder, "materials", "--json", "y" * 245 + ".json").returncode == 0
 
 
 def test_a_place_is_tried_and_nothing_is_left_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

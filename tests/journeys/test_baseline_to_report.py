@@ -8,10 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.cli.called_here import call_here
 from tests.comparing.made import scene
 
 REPO = Path(__file__).resolve().parents[2]
-COMMAND = [sys.executable, "-c", "from sonic_bullet.cli import main; main()"]
 TEST = 'def test_bar(sonic_scene):\n    sonic_scene("scenes/bar.py")\n'
 
 
@@ -35,7 +35,7 @@ def test_a_scene_its_baseline_a_change_and_the_report(tmp_path: Path) -> None:
     git(tmp_path, "commit", "-qm", "A bar is struck")
     pytest = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
 
-    kept = run(tmp_path, *COMMAND, "baseline", "scenes/bar.py", "--runs", "0", "--reason", "as tuned")
+    kept = call_here(tmp_path, "baseline", "scenes/bar.py", "--runs", "0", "--reason", "as tuned")
     assert kept.returncode == 0, kept.stderr
     passes = run(tmp_path, *pytest)
     assert passes.returncode == 0, passes.stdout
@@ -50,13 +50,13 @@ def test_a_scene_its_baseline_a_change_and_the_report(tmp_path: Path) -> None:
     assert "2 bodies (bar, ball), 1 event, 0.1208 s, tolerance 1 dB" in close.stdout
 
     words = ("compare", "scenes/bar.py", "--ref", "HEAD")
-    told = run(tmp_path, *COMMAND, *words, "--report", "bar.html", "--json", "bar.json")
+    told = call_here(tmp_path, *words, "--report", "bar.html", "--json", "bar.json")
     assert told.returncode == 1, told.stderr
     assert "ball: mass 0.004 → 0.0041 kg" in told.stdout
     assert "ball: mass" in (tmp_path / "bar.html").read_text("utf-8")
     (pair,) = json.loads((tmp_path / "bar.json").read_text())["pairs"]
     assert [one["what"] for one in pair["differences"] if one["cause"]] == ["mass"]
-    within = run(tmp_path, *COMMAND, *words, "--tolerance-db", "1")
+    within = call_here(tmp_path, *words, "--tolerance-db", "1")
     assert within.returncode == 0, within.stdout
     assert "within 1 dB: octave levels differ most at" in within.stdout
     assert "compared: 2 bodies (bar, ball), 1 event" in within.stdout

@@ -5,8 +5,6 @@ no number gets in.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.contacts import ROW_FIELDS
 from sonic_bullet.records.errors import SceneWarning
+from tests.cli.called_here import call_here
 from tests.made.worlds import box, floor, sounding_box
 from tests.session.test_session_robust import steps
 
@@ -76,8 +75,7 @@ def test_a_render_says_it_and_writes_the_others(tmp_path: Path) -> None:
         (tmp_path / f"{name}.py").write_text(SCENE.format(act=act))
         words = ["render", f"{name}.py", "-o", f"{name}.wav", "--contacts", f"{name}.npz", "--json", f"{name}.json"]
         words += ["--pascals", "--tail", "0"]
-        command = [sys.executable, "-c", "from sonic_bullet.cli import main; main()", *words]
-        said.append(subprocess.run(command, check=False, cwd=tmp_path, capture_output=True, text=True, timeout=250))
+        said.append(call_here(tmp_path, *words))
     broken, plain = said
     assert (broken.returncode, plain.returncode) == (0, 0), broken.stderr
     notes = [line for line in broken.stderr.splitlines() if "not a number" in line]
