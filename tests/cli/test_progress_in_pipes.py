@@ -126,6 +126,7 @@ def test_a_render_says_what_it_does_and_sounds_the_same(tmp_path: Path) -> None:
     assert (tmp_path / "a.wav").read_bytes() == (tmp_path / "b.wav").read_bytes()
 
 
+@pytest.mark.slow
 def test_modes_announce_the_mesh_and_leave_json_clean(tmp_path: Path) -> None:
     bowl(tmp_path)
     late_s = start_s()
@@ -148,6 +149,7 @@ def test_a_fit_says_what_it_listens_to(tmp_path: Path, shared_path: Path) -> Non
     assert any("listening to 5 recordings" in line for _, line in run.progress), run.text
 
 
+@pytest.mark.slow
 def test_add_in_a_script_names_the_body_that_takes_long(tmp_path: Path) -> None:
     """No command and no supervisor: a thread speaks, from 2 s on."""
     bowl(tmp_path)

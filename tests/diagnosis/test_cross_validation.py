@@ -104,6 +104,7 @@ def test_what_could_not_earn_its_keep_any_more_is_asked_no_further(spoils: tuple
     assert not accepted(found, 1.0, first=True)
 
 
+@pytest.mark.slow
 def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Number for number."""
     body = recorded(AmplitudeDamping(5.0, "velocity"))

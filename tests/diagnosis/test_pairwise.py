@@ -94,6 +94,7 @@ def room_anew(planted: tuple[Effect, ...], candidate: Effect) -> tuple[Hypothesi
     return in_a_room(h, found, posed((body,), takes))
 
 
+@pytest.mark.slow
 def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
     """The room found alone plays what the wrong modes lack: with that response the mass made everything worse."""
     two = room_anew((MASS, ROOM), MASS)
@@ -105,6 +106,7 @@ def test_a_mass_in_a_room_is_heard_with_a_response_of_its_own() -> None:
     assert found.mass_kg == pytest.approx(MASS.mass_kg, rel=0.3)
 
 
+@pytest.mark.slow
 def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor by cross-validation alone, were any two that leave less than all let through to it: the room identified again
     without the mass says more.

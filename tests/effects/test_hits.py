@@ -96,6 +96,7 @@ def test_a_bounce_that_is_not_there_is_not_found_again() -> None:
     assert Rebound.propose(replace(told, known=Rebound(0.2, 0.016, 0.6, 0.0, 1.0, 8))) is None
 
 
+@pytest.mark.slow
 def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: pytest.MonkeyPatch) -> None:
     """Hits that come after the onset take lines that would have begun far above it; they are none, and the modes are
     told once all is over.

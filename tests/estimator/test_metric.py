@@ -14,6 +14,7 @@ from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, level_o
 from sonic_bullet.estimator.perceptual.matching import match_ratio_product, points
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
+from tests.few_cases import parametrize_few
 
 SR = 48000
 
@@ -79,7 +80,7 @@ def test_bark_there_and_back() -> None:
     assert bark(600.0) == pytest.approx(6 * np.log(1 + np.sqrt(2)))
 
 
-@pytest.mark.parametrize("full_scale", [74.0, 94.0, 114.0])
+@parametrize_few("full_scale", [74.0, 94.0, 114.0], 1)
 def test_closed_form_equals_synthesis(full_scale: float) -> None:
     modes = some_modes(100)
     seen = image_of(modes, full_scale)

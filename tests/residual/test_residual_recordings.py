@@ -16,6 +16,7 @@ from tests.few_cases import parametrize_few
 
 @pytest.mark.shared
 @parametrize_few(("case", "farther"), [("practice-01", 0.1), ("practice-02", 0.0)], 1)
+@pytest.mark.slow
 def test_held_out_strikes_of_a_case_are_nearer(shared_path: Path, case: str, farther: float) -> None:
     """Nothing is lacking in practice-01, so nothing may be spoilt; practice-02's damping is not Rayleigh's."""
     rows = list(residual_table.of_case(shared_path / "practice" / case))
