@@ -29,6 +29,7 @@ from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, c
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.material_fit import choose_lines
 from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, recorded_signals
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cache import Place
@@ -87,7 +88,7 @@ def diagnose(
         case = read_case(case)
     say = progress or (lambda _: None)
     check_meshes(case, (r.object for r in case.recordings))
-    recorded = gather(case, cache=cache, progress=progress, clipped=True)
+    recorded = choose_lines(case, gather(case, cache=cache, progress=progress, clipped=True))
     start = baseline(case, recorded, cache=cache, progress=progress)
     found, bodies, takes = start.found, start.bodies, start.takes
     every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
-from sonic_bullet.estimator.lines.joint_lines import joint_lines
 from sonic_bullet.records import Array
 from tests.cli.test_commands import run
 from tests.few_cases import parametrize_few
@@ -35,7 +34,7 @@ def take(seed: int, modes: tuple[tuple[float, float, float], ...] = MODES, room:
 
 @parametrize_few("room", [0.0, 0.003], (1,))
 def test_an_attack_makes_no_lines(room: float) -> None:
-    lines = joint_lines(take(1, room=room)[None], SR, band_hz=BAND, shaped=True)
+    lines = ringing_lines(take(1, room=room)[None], SR, BAND, signed=True)
     assert len(lines.freq_hz) == len(MODES)
     for k, (freq, decay, _) in enumerate(MODES):
         assert abs(lines.freq_hz[k] - freq) < 4 * lines.freq_sd_hz[k] + 0.01

@@ -119,12 +119,14 @@ def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
 
 
 def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Lines | None:
-    """The lines of some strikes, by index, at all of them; None where those are too soft to tell."""
-    assert one.signals is not None
+    """The lines of some strikes, by index, at all of them; None where those are too soft to tell, or lines are
+    those after the attack.
+    """
+    if one.signals is None or one.ringing:
+        return None
     still = without_hum(one.signals, noise_rms(one.signals, one.sr), one.sr)
     try:
-        shaped = one.family is not None
-        some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed, shaped=shaped)
+        some = joint_lines(still[strikes], one.sr, band_hz=band_hz, signed=one.lines.signed)
         lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
     except (AudioError, np.linalg.LinAlgError):
         return None

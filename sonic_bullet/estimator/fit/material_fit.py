@@ -1,7 +1,8 @@
 """Recordings -> material: which mode each line is, γ and ν from the frequencies, α and β from the decays, σ from the
 amplitudes.
 
-    Evidence per object -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
+    Evidence per object -> lines, of two kinds (choose_lines)
+                        -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
                         -> d − Δd = ½(α + βλ) (rayleigh.py)   [Ren, Yeh, Lin 2013, eq. 6; Δd: radiation_share.py]
                         -> A_sj = σ J_s ψ_sj             [eq. 11, 13; observation.py]
     -> MaterialFit, one correction a mode (the mesh's error, at most 1 %), and a verdict
@@ -17,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.chance_pairs import paired_by_chance
 from sonic_bullet.estimator.fit.fit_verdict import finished
@@ -26,6 +28,8 @@ from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assi
 from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
+from sonic_bullet.estimator.lines.after_attack import ringing_lines
+from sonic_bullet.estimator.lines.joint_lines import FEWEST_LINES, HIGHEST, Lines, noise_rms
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.machine.progress import says_so
@@ -38,6 +42,7 @@ __all__ = [
     "POISSON_SD",
     "CaseFit",
     "ObjectFit",
+    "choose_lines",
     "fit_case",
     "fit_evidence",
     "gain_of",
@@ -52,8 +57,40 @@ def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands
     in the verdict instead.
     """
-    evidence = gather(case, cache=cache, progress=progress)
+    evidence = choose_lines(case, gather(case, cache=cache, progress=progress))
     return judged_by_takes(fit_evidence(case, evidence, cache=cache, progress=progress), progress)
+
+
+def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[RecordedObject, ...]:
+    """The evidence, with lines of what rings after the attack where those from the onset on find no more modes of their
+    shapes than by chance, and these do.
+
+    A real take's attack is no sum of lines: hundreds describe it, and hide the few that are modes. Where no shape is
+    known lines are only played again, and those from the onset on predict other takes better.
+    """
+    shaped = tuple(e for e in evidence if e.family is not None and e.signals is not None)
+    if not shaped or not _by_chance(case, shaped):
+        return evidence
+    after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
+    if any(len(e.lines.freq_hz) < FEWEST_LINES for e in after) or _by_chance(case, after):
+        return evidence
+    chosen = {id(e): other for e, other in zip(shaped, after, strict=True)}
+    return tuple(chosen.get(id(e), e) for e in evidence)
+
+
+def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
+    assert e.signals is not None
+    still = without_hum(e.signals, noise_rms(e.signals, e.sr), e.sr)
+    return ringing_lines(still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST * e.sr)), signed=e.lines.signed)
+
+
+def _by_chance(case: Case, shaped: tuple[RecordedObject, ...]) -> bool:
+    """Whether lines find as many modes of their shapes by chance."""
+
+    def place(some: tuple[RecordedObject, ...]) -> tuple[Pairs, ...]:
+        return _placed(some, case.band_hz)[0]
+
+    return paired_by_chance(shaped, place(shaped), place)
 
 
 def fit_evidence(

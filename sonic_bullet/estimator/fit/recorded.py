@@ -41,7 +41,7 @@ SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at le
 class RecordedObject:
     """One object's lines, its family and how its strikes are observed. family None: no mesh.
 
-    signals (s, n) from the onset, None for features.
+    signals (s, n) from the onset, None for features. ringing: lines are those after the attack.
     """
 
     thing: CaseObject
@@ -53,6 +53,7 @@ class RecordedObject:
     signals: Array | None
     sr: int
     notes: tuple[str, ...] = ()
+    ringing: bool = False
 
 
 class Sounds(NamedTuple):
@@ -139,8 +140,7 @@ def gather(
             say(f"listening to {len(played)} recordings of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             still = without_hum(signals, noise_rms(signals, sr), sr)
-            signed, shaped = case.onset_s is not None, body is not None
-            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=signed, modes=modes, shaped=shaped)
+            lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
             odd = []
             if case.onset_s is None:
                 odd = describe_no_impacts(signals, lines, sr, before, [str(r.file) for r in played])

@@ -26,7 +26,7 @@ import numpy as np
 from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import limit_band, without_drift
-from sonic_bullet.estimator.lines.joint_lines import OVER_NOISE, noise_rms
+from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
@@ -53,7 +53,8 @@ FRONT, FRONT_SHARE = 0.3, 0.75
 PINNED = 0.999  # of the fastest decay looked for
 CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
-ATTACK_S, QUIETEST = 0.02, 10**-2.6  # after which a real take is judged; noise over the signal there, at least
+# after which a real take is judged; noise over the signal there, at least; over that noise, what is no sum of lines
+ATTACK_S, QUIETEST, OVER_NOISE = 0.02, 10**-2.6, 10.0
 NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
@@ -95,11 +96,10 @@ def extract(
     if len(x) < LEAST_SAMPLES:
         raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
     doubts, hopeless = onset.describe_doubts(x, sr)
-    hits = part.describe_hits(sr)
-    notes = [f"{hits}: only what comes before the second, {len(x) / sr:.3g} s, is used"] if hits else []
-    if clipped:
-        notes.append(f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted")
-    notes += [*filter(None, [drift, describe_hum(hum_hz)]), *doubts]
+    if hits := part.describe_hits(sr):
+        hits += f": only what comes before the second, {len(x) / sr:.3g} s, is used"
+    cut = f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted" if clipped else ""
+    notes = [*filter(None, [hits, cut, drift, describe_hum(hum_hz)]), *doubts]
     found = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless

@@ -3,7 +3,6 @@ own.
 
     x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
     start:   shared_poles.py
-    after_attack.py, for a known shape, where these leave far more than the noise: a real take is no sum of lines
     refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
         [Golub & Pereyra 1973; Kaufman 1975]
     spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
@@ -16,13 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.pole_selection import apart, selected
 from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
-from sonic_bullet.estimator.lines.strike_times import find_strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -31,14 +28,11 @@ __all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_LINES = 160
 SECONDS_MAX = 8.0
+HIGHEST = 0.485  # of the sample rate
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
-# rms that poles leave of what is a sum of lines, at most: 20 dB; times that, what a room that is one later leaves
-OVER_NOISE, A_ROOM = 10.0, 2.0
-# poles from LATE_S on over those from the onset on: after hits that are over by then; in a room, of which none is over
-OVER, AS_DENSE = 0.4, 0.95
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -51,14 +45,10 @@ def joint_lines(
     band_hz: tuple[float, float] = (20.0, 20_000.0),
     signed: bool = True,
     modes: int | None = None,
-    shaped: bool = False,
 ) -> Lines:
     """Lines of signals (s, n), all starting at the onset of their strike.
 
     Raises AudioError where there is too little signal.
-
-    shaped: whether lines are to be paired with modes of a known shape. Those of a real take are then of what rings
-    after its attack; where lines are only played again, those from the onset on predict other takes better.
 
     modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of
     lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
@@ -72,39 +62,15 @@ def joint_lines(
         )
     if not (np.sqrt((signals**2).mean(axis=1)) > SILENT).all():
         raise AudioError("a recording is silent", "leave it out of the case")
-    low, high = max(band_hz[0], 5.0), min(band_hz[1], 0.485 * sr)
+    low, high = max(band_hz[0], 5.0), min(band_hz[1], HIGHEST * sr)
     noise = noise_rms(signals, sr)
     try:
         start = start_poles(signals / noise[:, None], sr, low, high)
-        if shaped and _attacked(signals, noise, sr, (low, high), start):
-            return ringing_lines(signals, sr, (low, high), signed=signed)
         return _identified(signals, noise, sr, (low, high), signed, modes, start, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
         ) from error
-
-
-def _attacked(signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], start: Array) -> bool:
-    """Whether signals (s, n) hold what no sum of lines is, and neither a room nor hits in a row explain."""
-    left = _over_noise(signals, noise, sr, start)
-    if left < OVER_NOISE:
-        return False
-    late = min(round(LATE_S[0] * sr), signals.shape[1] // 8)
-    rest = signals[:, late:]
-    noise = noise_rms(rest, sr)
-    fewer = start_poles(rest / noise[:, None], sr, *band_hz)
-    later = _over_noise(rest, noise, sr, fewer)
-    if later < OVER_NOISE and (left < A_ROOM * OVER_NOISE or len(fewer) < OVER * len(start)):
-        return False
-    if later < OVER_NOISE**2 and len(fewer) > AS_DENSE * len(start):
-        return False
-    return not any((find_strikes(signal, sr) > late / sr).any() for signal in signals)
-
-
-def _over_noise(signals: Array, noise: Array, sr: int, pole: Array) -> float:
-    """What poles leave of signals (s, n) over their noise (s,), the median over signals."""
-    return float(np.median(amplitudes_at(signals, noise, apart(pole), sr)[3] / noise))
 
 
 def _identified(
