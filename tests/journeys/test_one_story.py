@@ -85,6 +85,7 @@ def test_on_a_mesh_struck_by_unknown_impulses_too(tmp_path: Path) -> None:
     check_agree(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_on_a_case_of_another_laboratory_too(shared_path: Path, tmp_path: Path) -> None:
     check_agree(shutil.copytree(shared_path / "practice" / "practice-03", tmp_path / "case"))
