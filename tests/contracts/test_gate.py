@@ -150,9 +150,10 @@ def test_an_interrupt_tells_what_is_done_and_removes_the_trees(root: Path, scrip
     place = tmp_path / "tmp"
     place.mkdir()
     code = f"""
-import sys; sys.path.insert(0, {str(REPO)!r})
+import signal, sys; sys.path.insert(0, {str(REPO)!r})
 from pathlib import Path
 from tools import gate
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a script started in the background
 raise SystemExit(gate.main(["HEAD", "--only", "*/[br][le]*[1y]"], Path({str(root)!r}), Path({str(script)!r})))
 """
     process = subprocess.Popen(

@@ -68,7 +68,7 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
     A real take's attack is no sum of lines: hundreds describe it, and hide the few that are modes. Where no shape is
     known lines are only played again, and those from the onset on predict other takes better.
     """
-    shaped = tuple(e for e in evidence if e.family is not None and e.signals is not None)
+    shaped = tuple(e for e in evidence if e.family is not None and e.signals is not None and len(e.lines.freq_hz))
     if not shaped or not _by_chance(case, shaped):
         return evidence
     after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
