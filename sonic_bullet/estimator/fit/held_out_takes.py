@@ -28,6 +28,7 @@ from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.estimator.fit.typical_strike import strike_lines
 from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, power_spectra
 from sonic_bullet.files.cases import CaseRecording
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.residual.offline import residual_sound
@@ -56,6 +57,7 @@ def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = Non
     return replace(judged, fit=replace(found.fit, verdict=verdict))
 
 
+@one_thread()
 def predicted_takes(
     found: CaseFit, *, residual: Residual | None = None, progress: Callable[[str], None] | None = None
 ) -> tuple[TakeDistance, ...]:

@@ -33,6 +33,7 @@ from sonic_bullet.estimator.lines.joint_lines import FEWEST_LINES, HIGHEST, Line
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.machine.progress import says_so
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 
@@ -51,6 +52,7 @@ __all__ = [
 
 
 @says_so(text="progress")
+@one_thread()
 def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> CaseFit:
     """The material of a case, from its 'fit' strikes alone.
 
@@ -61,6 +63,7 @@ def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], 
     return judged_by_takes(fit_evidence(case, evidence, cache=cache, progress=progress), progress)
 
 
+@one_thread()
 def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[RecordedObject, ...]:
     """The evidence, with lines of what rings after the attack where those from the onset on find no more modes of their
     shapes than by chance, and these do.
@@ -93,6 +96,7 @@ def _by_chance(case: Case, shaped: tuple[RecordedObject, ...]) -> bool:
     return paired_by_chance(shaped, place(shaped), place)
 
 
+@one_thread()
 def fit_evidence(
     case: Case,
     evidence: tuple[RecordedObject, ...],

@@ -1,5 +1,4 @@
-"""One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4; and what has been
-learnt since].
+"""One recorded impact -> its damped sinusoids, each with its spread [Ren, Yeh, Lin 2013, section 4, and later work].
 
     recording -> onset.py (which part is one impact)
     -> exact_modes.py     where there is no noise: the rank of the Hankel matrix tells all modes at once
@@ -31,6 +30,7 @@ from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
 from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -59,13 +59,13 @@ NEAR = 4.0  # decays within which one mode can do another's work
 STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
 
+@one_thread()
 def extract(
     signal: Array, sr: int, *, onset_s: float | None = None, band_hz: tuple[float, float] | None = None
 ) -> Features:
     """Features of a recording (n,), full scale 1, at sr Hz. onset_s: where it is known; else it is found.
 
-    What makes the numbers doubtful stands in the note. Raises AudioError: silence, NaN, fewer than 512 samples of
-    sound.
+    What makes the numbers doubtful stands in the note. Raises AudioError: silence, NaN, fewer than 512 samples.
     """
     signal = np.ascontiguousarray(signal, np.float64)
     if signal.ndim != 1:

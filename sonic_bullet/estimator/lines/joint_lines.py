@@ -20,6 +20,7 @@ from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.pole_selection import apart, selected
 from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -38,6 +39,7 @@ FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
 
+@one_thread()
 def joint_lines(
     signals: Array,
     sr: int,
@@ -219,6 +221,7 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
     return pole
 
 
+@one_thread()
 def lines_of(signals: Array, noise: Array, pole: Array, sr: int, signed: bool) -> Lines:
     """Lines of signals (s, n) over white noise (s,) at poles (k,) in 1/s that are known already."""
     k, none = len(pole), np.zeros(0)

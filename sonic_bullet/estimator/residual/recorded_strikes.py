@@ -25,6 +25,7 @@ from sonic_bullet.estimator.fit.typical_strike import ringing
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.estimator.perceptual.loudness import bark
 from sonic_bullet.estimator.perceptual.matching import energy
+from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import damped, residual_record
@@ -116,6 +117,7 @@ def strikes_of(
     return Strikes(signals, left, sr, freq, decay, amplitude, share, hz, mode_decay, played, residual)
 
 
+@one_thread()
 def case_strikes(found: CaseFit) -> Strikes:
     """The residual of a fitted case, of the object with the most strikes: beside what a fit plays of them, which is the
     modes of a shape struck at known places, or else the lines.
@@ -162,6 +164,7 @@ def _played_modes(found: CaseFit, o: ObjectFit) -> tuple[Array, Array, Array]:
     return o.freq_hz[use], o.decay_per_s[use], amplitude[:, use]
 
 
+@one_thread()
 def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) -> Strikes:
     """The residual of one recording (n,) whose shape is not known: its features stand in for modes.
 
