@@ -4,8 +4,9 @@
     lines (f_k e^{δ_c}), clusters c moved at random -> pairs, `DRAWS` times     n_1 … n_D
     by chance: n ≤ max n_i
 
-The moved lines are searched through the same γ and ν as those recorded, so that the freedom of the search is in n_i. A
-body of which every strong line is a mode needs no such test: nothing speaks against its mesh.
+The moved lines are searched through the same γ and ν as those recorded, so that the freedom of the search is in n_i. No
+such test is made where most strong lines are modes, and nothing speaks against the mesh; nor of so few lines that γ and
+ν meet any.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.records import Array
 
 STRONG = 1e-3  # of the strongest line's energy
+PAIRED = 0.6  # share of the strong lines that are to be modes
+UNKNOWNS = 2
 DRAWS = 8
 MOVED = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
 CLUSTER = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
@@ -35,8 +38,8 @@ def strong_lines(lines: Lines) -> Array:
 
 def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], place: Placing) -> bool:
     """Whether lines moved at random find as many modes as those recorded. place: how a search pairs objects' lines."""
-    found = _strong_paired(shaped, pairs)
-    if found == sum(int(strong_lines(e.lines).sum()) for e in shaped):
+    found, strong = _strong_paired(shaped, pairs), sum(int(strong_lines(e.lines).sum()) for e in shaped)
+    if found >= PAIRED * strong or strong <= UNKNOWNS:
         return False
     random = np.random.default_rng(0)
     for _ in range(DRAWS):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
-from sonic_bullet.estimator.fit.chance_pairs import strong_lines
+from sonic_bullet.estimator.fit.chance_pairs import PAIRED, strong_lines
 from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
 from sonic_bullet.estimator.fit.dimension_tolerance import add_dimension_tolerance, scale_tolerance
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
@@ -25,7 +25,6 @@ DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their s
 AMPLITUDE_MISFIT = 0.25
 GAMMA_MOVES = 0.01  # by elements: what is worth a warning
 FREQUENCY_MISFIT = 0.01
-PAIRED = 0.6  # share of strong lines that must be modes
 
 
 def finished(
