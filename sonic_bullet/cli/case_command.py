@@ -277,7 +277,7 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 def run_case_check(folder: str) -> None:
     """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
-    from sonic_bullet.estimator.fit.takes.clipped_take import refuse_clipped
+    from sonic_bullet.estimator.fit.takes.usable_take import refuse_clipped, refuse_short
 
     case = read_case(folder)
     warn(case.warnings)
@@ -289,9 +289,10 @@ def run_case_check(folder: str) -> None:
         if not recording.file.is_file() and recording.split != "fit":
             missing += 1
             continue
-        sound, _, which = read_channel(recording.file, recording.channel)
+        sound, sr, which = read_channel(recording.file, recording.channel)
         if recording.split == "fit":
             refuse_clipped(sound, recording.file.name)
+            refuse_short(len(sound), sr, recording.file.name)
         warn([f"{recording.file.name}: {which}"] if which else [])
     splits = [r.split for r in case.recordings]
     listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))

@@ -82,6 +82,8 @@ def _summary(found: Any) -> str:
     from sonic_bullet.diagnosis.remainder import NOTHING
     from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 
+    splits = {r.split for r in found.case.recordings}
+
     def missing(split: str) -> str:
         return "not compared" if split in found.not_compared else "no audio"
 
@@ -109,7 +111,7 @@ def _summary(found: Any) -> str:
             ),
         )
         for split in ("fit", "holdout", "transfer")
-        if split in found.errors["before"]
+        if split in found.errors["before"] and split in splits
     ]
     text.append(table(("log-spectral distance", "before", "after"), rows))
     if found.errors["floor"] is not None:

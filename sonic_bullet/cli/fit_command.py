@@ -125,7 +125,8 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
     if missing:
         raise FileError(
-            f"{' and '.join(missing)} missing", "a recording alone has no shape; see 'sonic-bullet fit --help'"
+            f"{' and '.join(missing)} missing",
+            "give them, or make a case of the recording, which may leave them open: 'sonic-bullet case new'",
         )
     from sonic_bullet.presets import load_material
 
@@ -224,22 +225,25 @@ def line_rows(found: Any) -> list[dict[str, Any]]:
 
 def _summary(found: Any) -> str:
     from sonic_bullet.estimator.fit.dimension_tolerance import GAMMA_PER_SCALE, lines_sd
+    from sonic_bullet.estimator.fit.fitted_preset import preset_of
     from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
-    fit = found.fit
+    fit, preset = found.fit, preset_of(found)
     sd = np.sqrt(np.diag(fit.covariance))
+    damping = preset.damping
 
-    def shown(value: float, spread: float, relative: bool = True) -> tuple[str, str]:
-        return f"{value:.6g}", f"{spread * (value if relative else 1):.2g}" if np.isfinite(
-            spread
-        ) else "not identifiable"
+    def shown(value: float | None, spread: float, relative: bool = True) -> tuple[str, str]:
+        assert value is not None  # a fit's preset holds Rayleigh's pair, E and ν
+        known = f"{spread * (value if relative else 1):.2g}" if np.isfinite(spread) else "not identifiable"
+        return f"{value:.6g}", known
 
-    rows = [("alpha in 1/s", *shown(fit.alpha_per_s, sd[0])), ("beta in s", *shown(fit.beta_s, sd[1]))]
+    youngs, poisson = preset.elasticity.youngs_pa, preset.elasticity.poisson
+    rows = [("alpha in 1/s", *shown(damping.alpha_per_s, sd[0])), ("beta in s", *shown(damping.beta_s, sd[1]))]
     rows += [
-        ("E/density in m²/s²", *shown(fit.gamma_m2_s2, sd[2])),
-        ("E in Pa", *shown(found.youngs_pa, sd[2])),
+        ("E/density in m²/s²", *shown(youngs / found.density_kg_m3 if youngs else None, sd[2])),
+        ("E in Pa", *shown(youngs, sd[2])),
         ("density in kg/m³", f"{found.density_kg_m3:.6g}", "the guess's"),
-        ("Poisson's ratio", *shown(fit.poisson_ratio, sd[4], False)),
+        ("Poisson's ratio", *shown(poisson, sd[4], False)),
         ("sigma", *shown(fit.sigma, sd[3])),
     ] * found.has_material
     paired = sum(int((o.line >= 0).sum()) for o in found.objects)
@@ -258,6 +262,8 @@ def _summary(found: Any) -> str:
             f"spread of E: lines {own:.2g}, dimensions {GAMMA_PER_SCALE * found.dimension_tolerance:.2g} of it, "
             f"as they are known to {found.dimension_tolerance:.2%} (--dimension-tolerance)"
         )
+    if preset.provenance is not None and preset.provenance.assumed:
+        text.append(f"what the preset takes from elsewhere: {'; '.join(preset.provenance.assumed)}")
     cells = [
         (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
         for row in line_rows(found)

@@ -13,7 +13,7 @@ from sonic_bullet.cli.line_table import take_tables
 from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
 from sonic_bullet.files import read_channel
 from sonic_bullet.records import Residual
-from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.errors import AudioError, FileError
 
 UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
 
@@ -89,7 +89,10 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
     observed, sr, which = read_channel(source, one["channel"])
     warn(f"{source}: {words}" for words in [which] if words)
     progress("looking for modes")
-    strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
+    try:
+        strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
+    except AudioError as error:
+        raise AudioError(f"{source}: {error.what}", error.remedy) from error
     return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes, ()
 
 

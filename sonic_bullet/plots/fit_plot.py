@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.case_fit import CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.held_out_takes import predicted_take
 from sonic_bullet.estimator.fit.prediction_of_lines import predicted
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
@@ -39,12 +40,10 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
     o = found.objects[0] if found.objects else None
     if o is not None and o.evidence.signals is not None:
         sound, sr = o.evidence.signals[0], o.evidence.sr
-        made = predicted(o, np.nan_to_num(o.pattern[0]), found.fit.sigma, len(sound), sr)
+        made, words = _played(found, o)
         top = _levels(sound).max()
         both = [figure.add_subplot(grid[0, i]) for i in (0, 1)]
-        for axes, title, samples in zip(
-            both, ("recording, first strike", "synthesis of that strike, modes alone"), (sound, made), strict=True
-        ):
+        for axes, title, samples in zip(both, ("recording, first strike", words), (sound, made), strict=True):
             extent = (0, len(sound) / sr, 0, sr / 2000)
             image = axes.imshow(
                 _levels(samples) - top,
@@ -61,6 +60,21 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
     _plane(axes, found)
     with replacing(path) as file:
         figure.savefig(file, format=kind, dpi=110)
+
+
+def _played(found: CaseFit, o: ObjectFit) -> tuple[Array, str]:
+    """What the fit plays of an object's first strike (n,), and in words: its modes, or where nobody knows its place the
+    lines as they were struck on average, at the recording's energy.
+    """
+    e = o.evidence
+    assert e.signals is not None
+    sound = e.signals[0]
+    if found.plays_modes(e) and np.isfinite(o.pattern[0]).all():
+        made = predicted(o, o.pattern[0], found.fit.sigma, len(sound), e.sr)
+        return made, "synthesis of that strike, modes alone"
+    made, _ = predicted_take(found, e, e.recordings[0], len(sound), e.sr)
+    gain = np.linalg.norm(sound) / max(float(np.linalg.norm(made)), 1e-300)
+    return gain * made, "lines as struck on average, at that energy"
 
 
 def _plane(axes: Axes, found: CaseFit) -> None:
@@ -95,13 +109,14 @@ def _plane(axes: Axes, found: CaseFit) -> None:
     if not found.objects:
         axes.plot(fit.freq_hz / 1000, fit.decay_per_s, "o", ms=4, label="lines")
     freq = np.linspace(0, 1.05 * fit.freq_hz.max(initial=1000.0), 600)
-    axes.plot(
-        freq / 1000,
-        circle(freq, fit.alpha_per_s, fit.beta_s),
-        "k-",
-        lw=1,
-        label=f"circle: α = {fit.alpha_per_s:.4g} 1/s, β = {fit.beta_s:.4g} s",
-    )
+    if np.isfinite(np.diag(fit.covariance)[:2]).any():
+        axes.plot(
+            freq / 1000,
+            circle(freq, fit.alpha_per_s, fit.beta_s),
+            "k-",
+            lw=1,
+            label=f"circle: α = {fit.alpha_per_s:.4g} 1/s, β = {fit.beta_s:.4g} s",
+        )
     axes.set(xlabel="frequency in kHz", ylabel="decay in 1/s", yscale="log", xlim=(0, freq[-1] / 1000))
     axes.set_title(fill(f"{found.case.name}: {fit.verdict}", 130, max_lines=3, placeholder=" …"), fontsize=10)
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -276,3 +276,13 @@ def test_what_cannot_be_cut_is_named_and_leaves_nothing(place: Path, capfd: pyte
     assert not (place / "mine").exists()
     assert run("case", "new", "mine", "a.wav", "--split") == 0
     assert json.loads((place / "mine" / "case.json").read_text())["recordings"][0]["file"] == "a.wav"
+
+
+def test_check_refuses_a_take_that_is_too_short(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    sound, sr = soundfile.read(place / "a.wav")
+    soundfile.write(place / "a.wav", sound[:100], sr, subtype="FLOAT")
+    assert run("case", "new", "mine", "--material", "steel", "a.wav") == 0
+    capfd.readouterr()
+    assert run("case", "check", "mine") == run("fit", "mine", "-o", "f.json") == 2
+    said = capfd.readouterr().err.strip().splitlines()
+    assert sum("ms after the onset, less than 20 ms" in line for line in said) == 2

@@ -13,6 +13,7 @@ from sonic_bullet.estimator.fit.chance_pairs import CLUSTER, MOVED, _moved
 from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.plots.fit_plot import _played
 from sonic_bullet.records import Material
 from tests.made.case import make, write_box
 
@@ -38,6 +39,9 @@ def test_a_mesh_of_another_object_is_said(tmp_path: Path, size_m: tuple[float, f
     found = fitted(tmp_path, size_m)
     assert "as many as by chance (another object's?)" in found.fit.verdict
     assert np.isnan(found.fit.covariance).all()
+    made, words = _played(found, found.objects[0])
+    assert words.startswith("lines as struck") and found.evidence[0].signals is not None
+    assert np.linalg.norm(made) == pytest.approx(np.linalg.norm(found.evidence[0].signals[0]))
 
 
 def test_its_own_mesh_is_not_doubted(tmp_path: Path) -> None:

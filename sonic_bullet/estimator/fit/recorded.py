@@ -15,8 +15,8 @@ import numpy as np
 
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
-from sonic_bullet.estimator.fit.takes.clipped_take import refuse_clipped
 from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
+from sonic_bullet.estimator.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.estimator.lines.band_limit import LOWEST_HZ, limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
@@ -32,8 +32,7 @@ from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
 MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
 MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
-# after an onset; of the usual length: that much shorter is worth a word
-LEAST_SAMPLES, LEAST_S, SHORTER = 256, 0.02, 0.5
+SHORTER = 0.5  # of the usual length: that much shorter is worth a word
 SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
 
 
@@ -177,7 +176,9 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     if not MESH_M[0] < across < MESH_M[1]:
         raise MeshError(
             f"object '{thing.name}' is {across:.3g} m across",
-            "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)",
+            "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)"
+            if thing.scale == 1
+            else f"its mesh is scaled by {thing.scale:g}: leave --scale or units out where it is in metres",
         )
     gamma = guess.youngs_pa / guess.density_kg_m3
     high = case.band_hz[1]
@@ -267,11 +268,7 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in limited]
     lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
     length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
-    if length < max(LEAST_SAMPLES, LEAST_S * sr):
-        raise AudioError(
-            f"{which} holds {1000 * max(length, 0) / sr:.0f} ms after the onset",
-            "all are read as far as the shortest: leave it out, or give the whole",
-        )
+    refuse_short(length, sr, which)
     if length < SHORTER * np.median(lengths):
         remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
     signals = np.stack([(x - hum)[start : start + length] for x, hum, start in zip(sounds, hums, starts, strict=True)])

@@ -175,7 +175,7 @@ def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) 
     found = extract(sample, sr, onset_s=onset_s)
     if not len(found.freq_hz):
         raise AudioError(
-            f"{name} has no damped sinusoid above its noise", "record a louder strike, nearer, in a quieter place"
+            "no damped sinusoid stands above the noise", "record a louder strike, nearer, in a quieter place"
         )
     signal = np.asarray(sample, float)[round(found.onset_s * sr) :]
     # a sin(ωt + φ) = Re a e^{i(φ - π/2)} e^{iωt}

@@ -1,4 +1,4 @@
-"""Whether a take stands at its peak: a fit of it would be of the limiter."""
+"""Whether a take can be fitted: long enough, and not at its peak, for a fit of it would be of the limiter."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
 CLIPPED = 8  # samples in a row at the file's peak
+LEAST_SAMPLES, LEAST_S = 256, 0.02  # after an onset
 CLIPPED_RUNS = 4  # or as many rows of three: a sound that decays has one highest peak
 
 
@@ -21,4 +22,14 @@ def refuse_clipped(sound: Array, name: object) -> None:
         raise AudioError(
             f"{name} is clipped: rows of samples stand at its peak",
             "leave it out, or record at a lower level; a fit of it would be of the limiter",
+        )
+
+
+def refuse_short(count: int, sr: int, name: object) -> None:
+    """Raise AudioError where so many samples after an onset are too few."""
+    least = max(LEAST_SAMPLES, LEAST_S * sr)
+    if count < least:
+        raise AudioError(
+            f"{name} holds {1000 * max(count, 0) / sr:.0f} ms after the onset, less than {1000 * least / sr:.0f} ms",
+            "all are read as far as the shortest: leave it out, or give the whole",
         )
