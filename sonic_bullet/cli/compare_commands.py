@@ -155,11 +155,16 @@ def _kept(found: Any, page: bool) -> dict[str, Any]:
 def _against_baseline(a: Path, b: Path, tell: Callable[[str], None], tolerance_db: float | None) -> dict[str, Any]:
     """A scene held against what it sounded like."""
     from sonic_bullet.comparing.baselines import check_baseline, read_baseline
+    from sonic_bullet.comparing.tolerance import sameness_words
 
     checked = check_baseline(read_baseline(a), b, tell, tolerance_db)
     judged = [one.words for one in (checked.audible, checked.closeness) if one is not None]
     words = [*checked.words, *judged, *([f"compared: {checked.compared}"] if checked.passed else [])]
-    head = "same: all samples are as the baseline's" if checked.same else f"differs from {a.name}"
+    head = f"differs from {a.name}"
+    if checked.same:
+        head = "same: all samples are as the baseline's"
+    elif checked.passed:
+        head = f"{sameness_words(checked.closeness)}: samples differ from those of {a.name}"
     described = {
         "same": checked.same,
         "passed": checked.passed,

@@ -44,8 +44,8 @@ def level_options(command: Any) -> Any:
                 type=float,
                 default=TAIL_DB,
                 metavar="DB",
-                help="Ring on after the last step, without physics, until DB below the peak, at most 10 s; 0: not. "
-                "[default: -60]",
+                help="Ring on after the last step, without physics, at most 10 s, until it is that far below the peak: "
+                "-60; 0: not. [default: -60]",
             ),
             click.option("--scale-json", is_flag=True, help="Also write the scale as JSON, to NAME.EXT.json."),
         )
@@ -72,7 +72,7 @@ class LevelWish:
         if self.pascals and not (self.peak_dbfs is None and self.lufs is None):
             raise AudioError("--pascals does not scale, and a level is given", "give one of both")
         check_levels(self.peak_dbfs, self.lufs)
-        as_tail_db(self.tail_db)
+        as_tail_db(self.tail_db, "--tail")
 
     def json_path(self, output: str) -> str | None:
         """Where the JSON goes, if it is asked for."""

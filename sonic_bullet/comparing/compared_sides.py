@@ -55,7 +55,10 @@ def compared(a: Side, b: Side, tell: Tell) -> Comparison:
     """Two sides that are known. Raises CompareError."""
     same = a.sr == b.sr and same_sound(a.sound, b.sound)
     if a.log is None or b.log is None:
-        return Comparison(a, b, same, (), () if same else _of_recordings(a, b), notes=(*_notes(a, b), *_levels(a, b)))
+        effects = () if same else _of_recordings(a, b)
+        unrelated = any(one.kind == "unrelated" for one in effects)
+        notes = (*(() if unrelated else _notes(a, b)), *_levels(a, b))
+        return Comparison(a, b, same, (), effects, notes=notes)
     match = matched(a.log, b.log)
     if not same:
         require_kin(a.log, b.log, match)
@@ -175,8 +178,11 @@ def _of_sounds(a: Side, b: Side) -> list[Consequence]:
 def _of_recordings(a: Side, b: Side) -> tuple[Consequence, ...]:
     one, other, sr = at_common_rate(a.sound.samples(), b.sound.samples(), a.sr, b.sr)
     effects = _of_sounds(a, b)
-    return (*(x for x in effects if x.kind in ("rate", "length")), *recording_effects(one, other, sr),
-            *(x for x in effects if x.kind not in ("rate", "length")))  # fmt: skip
+    became = recording_effects(one, other, sr)
+    head = [x for x in effects if x.kind in ("rate", "length")]
+    if any(x.kind == "unrelated" for x in became):
+        return (*head, *became)
+    return (*head, *became, *(x for x in effects if x not in head))
 
 
 def _levels(a: Side, b: Side) -> tuple[str, ...]:

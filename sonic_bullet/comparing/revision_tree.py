@@ -26,6 +26,8 @@ from typing import Any
 import sonic_bullet
 
 INSTALLED = ("site-packages", "dist-packages")
+METADATA = (".egg-info", ".dist-info")
+"""Folders in which Python looks up what is installed, wherever a package itself lies."""
 OF_SYSTEM = ("/proc", "/dev", "/sys", "/etc", "/usr", "/lib", "/run", "/bin", "/opt")
 MOST_NAMED = 8
 
@@ -120,7 +122,9 @@ def _is_installed(path: Path) -> bool:
 
     library = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "platstdlib")]
     homes: list[Path] = [*library, *_PACKAGE, *cache_folders()]
-    return any(part in INSTALLED for part in path.parts) or any(path.is_relative_to(one) for one in homes)
+    return any(part in INSTALLED or part.endswith(METADATA) for part in path.parts) or any(
+        path.is_relative_to(one) for one in homes
+    )
 
 
 _PACKAGE = tuple(Path(one).resolve() for one in sonic_bullet.__path__)

@@ -91,6 +91,13 @@ def passes(same: bool, within: Closeness | None, audible: Audibility | None) -> 
     return same or (within is not None and within.within) or (audible is not None and not audible.beyond_chance)
 
 
+def sameness_words(within: Closeness | None) -> str:
+    """How two sounds are the same that count as the same but have other samples."""
+    if within is None or not within.within:
+        return "the same but for chance"
+    return f"the same within {within.tolerance_db:g} dB"
+
+
 def compared_words(side: Side, same: bool, within: Closeness | None) -> str:
     """What was looked at, in one line: bodies, events, seconds, tolerance."""
     tolerance_db = None if same or within is None else within.tolerance_db

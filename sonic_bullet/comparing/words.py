@@ -11,6 +11,7 @@ from sonic_bullet.comparing.inputs.input_differences import Asked
 from sonic_bullet.comparing.inputs.log_differences import Logged
 from sonic_bullet.comparing.inputs.matched_logs import NO_NAME
 from sonic_bullet.comparing.sides import Side
+from sonic_bullet.comparing.tolerance import sameness_words
 from sonic_bullet.listener.calls import Call, InputFile, Who, same
 
 if TYPE_CHECKING:
@@ -197,10 +198,11 @@ def verdict(found: Comparison) -> str:
             "" if not rest else f"; {len(rest)} input{'s differ' if len(rest) > 1 else ' differs'} and change no sample"
         )
         return f"same: all samples are equal{tail}"
+    head = f"{sameness_words(found.closeness)}: samples differ" if found.passed else "differs"
     if found.causes and found.exact:
         names = "; ".join(one.words for one in found.causes)
-        return f"{names}: put back, the scene is A to the bit"
+        return f"{f'{head}; ' if found.passed else ''}{names}: put back, the scene is A to the bit"
     if found.differences:
         names = "; ".join(one.words for one in found.differences[:3])
-        return f"differs; inputs that differ: {names}"
-    return "differs; no input is known to differ"
+        return f"{head}; inputs that differ: {names}"
+    return f"{head}; no input is known to differ"

@@ -28,6 +28,12 @@ class SonicBulletError(Exception):
         super().__init__(f"{self.what}; {self.remedy}" if self.remedy else self.what)
 
 
+def exception_words(error: BaseException) -> str:
+    """Kind and message of any exception, without a full stop at its end: the remedy follows."""
+    words = f"{type(error).__name__}: {error}".rstrip()
+    return words if words.endswith("..") else words.removesuffix(".")
+
+
 def excerpt(text: str, most: int) -> str:
     """``text``, or its start and end where it has more than ``most`` characters."""
     return text if len(text) <= most else f"{text[: 2 * most // 3]} … {text[len(text) - (most // 3 - 3) :]}"

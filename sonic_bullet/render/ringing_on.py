@@ -35,12 +35,12 @@ STEP_S = 1 / 240
 """Steps of a tail are no shorter: nothing happens in them."""
 
 
-def as_tail_db(tail_db: object) -> float | None:
-    """A tail's end in dB re the peak, below 0; None and 0: no tail. Raises AudioError."""
+def as_tail_db(tail_db: object, name: str = "tail_db") -> float | None:
+    """A tail's end in dB re the peak, below 0; None and 0: no tail. name: what errors call it. Raises AudioError."""
     if tail_db is None:
         return None
-    remedy = "give dB below the peak, -60 say, or 0 for none"
-    return as_number(tail_db, "tail_db", remedy, least=-200, most=0, error=AudioError) or None
+    remedy = "give at most 0: -60 ends it 60 dB below the peak, 0 leaves it out"
+    return as_number(tail_db, name, remedy, least=-200, most=0, error=AudioError) or None
 
 
 def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:

@@ -69,8 +69,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     """
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
-    # a partner that never moves makes no sound in any case
-    alone = [b for i in added if i not in touched and ((b := log.bodies[i]).model is not None or b.mass_kg > 0)]
+    alone = [b for i in added if i not in touched and _can_sound(b := log.bodies[i])]
     models = [(log.bodies[i], model) for i in added if (model := log.bodies[i].model) is not None and len(model.face)]
     dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
     notes = []
@@ -87,6 +86,11 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     return tuple(notes)
 
 
+def _can_sound(body: Body) -> bool:
+    """Whether it may ring or click: ground, which has no modes and never moves, makes no sound in any case."""
+    return body.model is not None or body.mass_kg > 0
+
+
 def why_silent(log: ContactLog) -> str | None:
     """The reason why a log has no sound, with its remedy, in one line; None where something in it should be heard."""
     if not log.sensors:
@@ -99,9 +103,12 @@ def why_silent(log: ContactLog) -> str | None:
     mine = np.flatnonzero(added[rows.a] | added[rows.b])
     if not len(mine):
         return _untouched(log, rows, added)
-    silenced = np.array([body.silent for body in log.bodies], bool)
-    if not (added & ~silenced)[np.concatenate([rows.a[mine], rows.b[mine]])].any():
-        return f"all that was touched is silent as asked: {_names(body for body in log.bodies if body.silent)}"
+    silenced = [body for body in log.bodies if body.silent]
+    heard = np.array(
+        [one and not body.silent and _can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
+    )
+    if silenced and not heard[np.concatenate([rows.a[mine], rows.b[mine]])].any():
+        return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]
     return _mute(log, resonators) or _at_rest(log, rows, mine) or _arrives_late(log, mine)

@@ -62,7 +62,16 @@ class MaterialChoice:
                 known = list(dict.fromkeys(names))
                 more = f" and {len(known) - LISTED_NAMES} more" if len(known) > LISTED_NAMES else ""
                 listed = ", ".join(known[:LISTED_NAMES]) + more
-                raise SceneError(f"no body of {where} is called {shown(one)}", f"its bodies are: {listed or 'none'}")
+                remedy = f"its bodies are: {listed or 'none'}{self._quoted(one, known)}"
+                raise SceneError(f"no body of {where} is called {shown(one)}", remedy)
+
+    def _quoted(self, one: str, known: Sequence[str]) -> str:
+        """How the last name with a space is given in a shell, where there is one: "body 1=glass"."""
+        spaced = [name for name in known if " " in name]
+        if not spaced:
+            return ""
+        rest = f"={self.named[one].name}" if one in self.named else ""
+        return f'; quotes hold a name with a space together: "{spaced[-1]}{rest}"'
 
     def check_added(self, added: Collection[str], scene: str) -> None:
         """Raise SceneError where a name that was given a material is nobody's whom a scene's own listener added."""

@@ -12,7 +12,7 @@ from typing import Any
 
 from sonic_bullet.files.reading import refuse_lfs_pointer
 from sonic_bullet.machine.worker import stop_word
-from sonic_bullet.records.errors import SceneError, SonicBulletError, interrupts
+from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words, interrupts
 
 
 def defines_build(path: Path) -> bool:
@@ -46,7 +46,7 @@ def user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
             raise KeyboardInterrupt(stop_word()) from error
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
         where = f" line {lines[-1]}" if lines else ""
-        raise SceneError(f"scene '{path.name}'{where}: {type(error).__name__}: {error}", "mend the scene") from error
+        raise SceneError(f"scene '{path.name}'{where}: {exception_words(error)}", "mend the scene") from error
 
 
 def scene_module(path: Path) -> ModuleType:

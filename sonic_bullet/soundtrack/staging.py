@@ -35,6 +35,7 @@ COLOURS = {
     "rubber": (0.25, 0.25, 0.27),
 }
 OTHER_COLOUR = (0.75, 0.72, 0.66)
+HOW_IT_IS_DRAWN = "film the scene, or, of an animation that was scored, give it a material in the table of score"
 WIDE_M = 20.0
 """A figure wider than this is ground, which a camera need not take in."""
 ELEVATION_RAD = np.radians(30)
@@ -84,14 +85,14 @@ def staged(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Sta
         known = places.get((body.body_id, body.link))
         figure = _figure(body) or (known.figure if known is not None else None)
         if figure is None:
-            notes.append(f"{body.name} is not drawn: the log has no shape of it; film the scene")
+            notes.append(f"{body.name} is not drawn: the log has no shape of it; {HOW_IT_IS_DRAWN}")
             continue
         figures.append(figure)
         index.append(i)
     logged = {(body.body_id, body.link) for body in log.bodies}
     still = [one for one in standing if (one.body_id, one.link) not in logged]
     if not figures and not still:
-        raise SceneError("there is nothing to draw: no body has a shape", "film the scene itself, or add bodies")
+        raise SceneError("there is nothing to draw: no body has a shape", HOW_IT_IS_DRAWN)
     position, turned, shown, step = _poses(log, fps, pictures, np.array(index, np.int64))
     count = len(still)
     position = np.concatenate([position, np.tile(_stack([x.position_m for x in still], 3), (pictures, 1, 1))], axis=1)

@@ -120,3 +120,16 @@ def test_a_baseline_into_a_file_is_one_line(tmp_path: Path) -> None:
     assert isinstance(done.exception, FileError)
     assert "cannot make the folder" in str(done.exception)
     assert (tmp_path / "there").read_text() == "kept"
+
+
+def test_what_passes_within_a_tolerance_is_called_the_same(tmp_path: Path) -> None:
+    a, b = scene(tmp_path, "a.py"), scene(tmp_path, "b.py", ("(0.0, -0.4, 0.3)", "(0.0, -0.41, 0.3)"))
+    assert shell("baseline", a, "-o", tmp_path, "--runs", 0).exit_code == 0
+    for old, head in (
+        (tmp_path / "a.json", "the same within 3 dB: samples differ from those of a.json\n"),
+        (a, "the same within 3 dB: samples differ; microphone 1 moved by 1 cm"),
+    ):
+        done = shell("compare", old, b, "--tolerance-db", 3)
+        assert done.exit_code == 0, done.output
+        assert done.output.startswith(head)
+        assert "compared 1: 1 the same, 0 differ" in done.output

@@ -10,6 +10,7 @@ import pytest
 
 from sonic_bullet.comparing import SceneSide, compare
 from sonic_bullet.comparing.outcome.recording_effects import recording_effects
+from sonic_bullet.comparing.outcome.sound_effects import sound_effects
 from sonic_bullet.comparing.sides import Side, run
 from sonic_bullet.files import write_audio
 from sonic_bullet.files.contact_log import ContactLog
@@ -132,3 +133,23 @@ def test_recordings_that_have_nothing_in_common_are_said_to_have_nothing(decay_p
     x = fade * rng.normal(size=(1, n))
     noise = rng.normal(size=(1, n)) * np.sqrt(np.square(x).mean() * 10)
     assert recording_effects(x, x + noise, sr)[0].kind == "noise"  # 10 dB above what is in common
+
+
+def test_of_unrelated_recordings_no_more_is_said(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    write_audio(str(tmp_path / "a.wav"), ringing(), SR)
+    write_audio(str(tmp_path / "b.wav"), rng.normal(0, 0.1, (2, SR // 4)), SR)
+    found = compare(tmp_path / "a.wav", tmp_path / "b.wav")
+    assert [one.kind for one in found.effects] == ["length", "unrelated"]
+    assert "nothing in common" in found.lines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("first", "said"), [(0, "differ from the first sample on"), (480, "equal for the first 10 ms")]
+)
+def test_since_when_sounds_differ_is_said(first: int, said: str) -> None:
+    x = ringing()
+    y = x.copy()
+    y[:, first] += 0.1
+    effect = sound_effects(x, y, SR)[0]
+    assert effect.kind == "sample" and said in effect.words

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.comparing.revision_tree import MOST_NAMED, unpinned_words
+from sonic_bullet.comparing.revision_tree import MOST_NAMED, RevisionTree, unpinned, unpinned_words
 from sonic_bullet.comparing.revisions import at_revision
 from tests.comparing.made import SCENE, scene
 from tests.comparing.test_compare_command import shell
@@ -127,6 +127,16 @@ def test_what_no_revision_holds_is_named(tmp_path: Path, monkeypatch: pytest.Mon
     assert "untracked.txt (git does not know it)" in note
     assert note.count("(") == 3, note
     assert unpinned_words({f"{i}" for i in range(MOST_NAMED + 2)})[0].endswith(", and 2 more")
+
+
+def test_what_python_reads_of_an_installed_package_is_not_named(tmp_path: Path) -> None:
+    place = tmp_path / "else.egg-info" / "entry_points.txt"
+    place.parent.mkdir()
+    for path in (place, tmp_path / "else.txt"):
+        path.write_text("")
+    revision = RevisionTree(tmp_path / "top", tmp_path / "tree")
+    found = unpinned({str(place), str(tmp_path / "else.txt")}, revision, old=True)
+    assert found == {f"{tmp_path / 'else.txt'} (outside the repository)"}
 
 
 def test_the_tree_is_whole_and_leaves_nothing_in_the_repository(tmp_path: Path) -> None:

@@ -97,8 +97,8 @@ def test_a_silent_render_is_not_scaled(capfd: pytest.CaptureFixture[str]) -> Non
     [
         (("--pascals", "--peak-dbfs", "-3"), "--pascals"),
         (("--pascals", "--lufs", "-23"), "--pascals"),
-        (("--tail", "3"), "tail_db"),
-        (("--tail", "nan"), "tail_db"),
+        (("--tail", "60"), "--tail is 60.0; give at most 0"),
+        (("--tail", "nan"), "--tail is nan"),
     ],
 )
 def test_what_contradicts_itself_is_said_first(

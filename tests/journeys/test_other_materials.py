@@ -13,6 +13,8 @@ import soundfile
 
 from sonic_bullet import presets, scene
 from sonic_bullet.files import read_log
+from sonic_bullet.records.errors import SceneError
+from sonic_bullet.session.material_choice import as_choice
 from tests.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 from tests.made.lines import line_at
@@ -216,7 +218,7 @@ def test_a_silent_body_is_left_out_of_the_sound_alone(silent: str) -> None:
 
 def test_all_silent_is_said(capfd: pytest.CaptureFixture[str]) -> None:
     assert not heard("log.npz", "--silent", "bar", "--silent", "ball").any()
-    assert "silent as asked" in capfd.readouterr().err
+    assert "every sounding body that was touched is silenced by --silent" in capfd.readouterr().err
 
 
 def test_what_the_scene_adds_to_nobody_is_made_to_sound_by_name() -> None:
@@ -294,3 +296,13 @@ def test_bodies_of_our_own_scenes_have_names(name: str, monkeypatch: pytest.Monk
     names = [how["name"] for how in cast.values()]
     assert len(names) == len(set(names)) >= 2
     assert not any(one.startswith(("link", "body")) for one in names)
+
+
+def test_a_name_with_a_space_is_shown_in_quotes() -> None:
+    names = ["body 0", "body 1"]
+    with pytest.raises(SceneError, match=r'bodies are: body 0, body 1; quotes hold .* together: "body 1=glass"$'):
+        as_choice(materials={"bar": "glass"}).check_names(names, "log.npz")
+    with pytest.raises(SceneError, match=r'together: "body 1"$'):
+        as_choice(silent=["bar"]).check_names(names, "log.npz")
+    with pytest.raises(SceneError, match=r"its bodies are: cup$"):
+        as_choice(silent=["bar"]).check_names(["cup"], "log.npz")

@@ -13,7 +13,8 @@ import pytest
 from pybullet_utils.bullet_client import BulletClient
 
 from sonic_bullet.listener import own_clients, run_script
-from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.errors import SceneError, exception_words
+from sonic_bullet.session.scene_file import scene_module
 
 RAW = """
 import pybullet as p, time
@@ -164,3 +165,13 @@ def test_listening_leaves_stdout_alone() -> None:
 def test_importing_the_project_leaves_pybullet_out() -> None:
     code = "import sys, sonic_bullet, sonic_bullet.listener; assert 'pybullet' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_message_that_ends_with_a_full_stop_loses_it_before_the_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "missing.py"
+    path.write_text("import pybullet as p\np.connect(p.DIRECT)\np.loadURDF('none.urdf')\n")
+    with pytest.raises(SceneError, match=r"line 3: error: Cannot load URDF file; mend the scene$"):
+        run_script(path, lambda client: None, 0.1)
+    with pytest.raises(SceneError, match=r"line 3: error: Cannot load URDF file; mend the scene$"):
+        scene_module(path)
+    assert exception_words(ValueError("and so on...")) == "ValueError: and so on..."

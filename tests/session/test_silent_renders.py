@@ -105,6 +105,17 @@ def test_a_log_without_steps_and_a_faint_sound(tmp_path: Path) -> None:
     assert "does not say why" in unknown
 
 
+def test_a_log_whose_sounding_bodies_are_silenced_says_so(tmp_path: Path) -> None:
+    """The floor has a material, but no modes, and never moves: it is no sounding body."""
+    log = render_scene(scene(tmp_path, LOUD), sr=8000).log
+    concrete = sb.load_material("concrete")
+    ground = [replace(body, material=concrete) if body.model is None else body for body in log.bodies]
+    assert len(ground) == 2 and why_silent(replace(log, bodies=tuple(ground))) is None
+    silenced = replace(log, bodies=tuple(replace(body, silent=body.model is not None) for body in ground))
+    (note,) = silence_notes(sb.render_log(silenced), silenced)
+    assert "every sounding body that was touched is silenced by --silent: body 1" in note
+
+
 def test_the_command_line_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -76,7 +76,8 @@ def test_a_body_is_seen_while_it_is_there() -> None:
         assert found.shown[: until // 4, k].all() and not found.shown[until // 4 + 1 :, k].any()
     late = next(k for k, i in enumerate(found.body) if log.bodies[i].since_step == 60 and log.bodies[i].model)
     assert not found.shown[:15, late].any() and found.shown[16:, late].all()
-    assert any("not drawn" in note for note in found.notes)  # the silent partner, of which the log has no shape
+    (note,) = (one for one in found.notes if "not drawn" in one)  # the silent partner, of which the log has no shape
+    assert "film the scene, or, of an animation" in note and "a material in the table of score" in note
 
 
 def test_lengths_are_exact_and_what_is_too_long_is_refused() -> None:

@@ -47,7 +47,8 @@ def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     where = np.flatnonzero((a[:, :n] != b[:, :n]).any(axis=0))
     if len(where):
         first = int(where[0])
-        found.append(Consequence("sample", f"A and B are equal for the first {first / sr * 1e3:.4g} ms", first / sr))
+        equal = f"are equal for the first {first / sr * 1e3:.4g} ms" if first else "differ from the first sample on"
+        found.append(Consequence("sample", f"A and B {equal}", first / sr))
     if a.shape[1] != b.shape[1]:
         found.append(Consequence("length", f"A lasts {a.shape[1] / sr:.4g} s, B {b.shape[1] / sr:.4g} s", n / sr))
     found += [one for one in (_levels(a, b, sr), _onsets(a, b, sr), _decay(a, b, sr), _loudness(a, b, sr)) if one]

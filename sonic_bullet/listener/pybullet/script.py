@@ -26,7 +26,7 @@ from sonic_bullet.listener.pybullet.clients import disconnect as end
 from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.machine.worker import mark_step, stop_word
-from sonic_bullet.records.errors import SceneError, SonicBulletError
+from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words
 
 ClientHook = Callable[[int], None]
 MOST_CLIENTS = 1024
@@ -110,7 +110,7 @@ def run_script(
                 return names
             lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
             raise SceneError(
-                f"scene '{path.name}' line {lines[-1] if lines else 1}: {type(error).__name__}: {error}",
+                f"scene '{path.name}' line {lines[-1] if lines else 1}: {exception_words(error)}",
                 "mend the scene",
             ) from error
     return names
