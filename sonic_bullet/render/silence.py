@@ -104,10 +104,10 @@ def why_silent(log: ContactLog) -> str | None:
     if not len(mine):
         return _untouched(log, rows, added)
     silenced = [body for body in log.bodies if body.silent]
-    heard = np.array(
+    sounding = np.array(
         [one and not body.silent and _can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
     )
-    if silenced and not heard[np.concatenate([rows.a[mine], rows.b[mine]])].any():
+    if silenced and not sounding[np.concatenate([rows.a[mine], rows.b[mine]])].any():
         return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}"
     touched = np.unique(np.concatenate([rows.a[mine], rows.b[mine]]))
     resonators = [build_resonator(log.bodies[i], log.sensors, log.sr, log.air) for i in touched if added[i]]

@@ -127,7 +127,7 @@ def test_what_passes_within_a_tolerance_is_called_the_same(tmp_path: Path) -> No
     assert shell("baseline", a, "-o", tmp_path, "--runs", 0).exit_code == 0
     for old, head in (
         (tmp_path / "a.json", "the same within 3 dB: samples differ from those of a.json\n"),
-        (a, "the same within 3 dB: samples differ; microphone 1 moved by 1 cm"),
+        (a, "the same within 3 dB: samples differ; microphone 1 moved by 10 mm"),
     ):
         done = shell("compare", old, b, "--tolerance-db", 3)
         assert done.exit_code == 0, done.output
