@@ -262,7 +262,9 @@ def _summary(found: Any) -> str:
             f"spread of E: lines {own:.2g}, dimensions {GAMMA_PER_SCALE * found.dimension_tolerance:.2g} of it, "
             f"as they are known to {found.dimension_tolerance:.2%} (--dimension-tolerance)"
         )
-    if preset.provenance is not None and preset.provenance.assumed:
+    if not found.has_material:
+        text.append("the preset plays the observed lines; all else in it is steel's, as nobody says what was struck")
+    elif preset.provenance is not None and preset.provenance.assumed:
         text.append(f"what the preset takes from elsewhere: {'; '.join(preset.provenance.assumed)}")
     cells = [
         (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))

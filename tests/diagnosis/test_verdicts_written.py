@@ -63,7 +63,7 @@ def test_every_verdict_can_be_written(
     body = made()
     takes, base = takes_of((body,)), truth() if made is spoiled else fitted(body)
     end = closed(base, (body,), takes, effects, BAND)
-    case: Any = SimpleNamespace(name="made", warnings=())
+    case: Any = SimpleNamespace(name="made", warnings=(), recordings=())
     material = SimpleNamespace(gamma_m2_s2=np.float64("nan"), poisson_ratio=0.3, covariance=np.full((5, 5), np.nan))
     fit: Any = SimpleNamespace(fit=material, has_material=True, objects=(body,), evidence=())
     errors: dict[str, Any] = {"before": {"fit": None}, "after": {"fit": np.float64(1.0)}, "floor": np.nan}
