@@ -172,6 +172,8 @@ def test_a_message_that_ends_with_a_full_stop_loses_it_before_the_remedy(tmp_pat
     path.write_text("import pybullet as p\np.connect(p.DIRECT)\np.loadURDF('none.urdf')\n")
     with pytest.raises(SceneError, match=r"line 3: error: Cannot load URDF file; mend the scene$"):
         run_script(path, lambda client: None, 0.1)
+    while pybullet.isConnected():
+        pybullet.disconnect()
     path.write_text("raise ValueError('it broke.')\n")
     with pytest.raises(SceneError, match=r"line 1: ValueError: it broke; mend the scene$"):
         scene_module(path)
