@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import pybullet
 import pybullet as p
 import pytest
 from pybullet_utils.bullet_client import BulletClient
