@@ -40,9 +40,8 @@ _OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Linear algebra on one thread while this lasts: the same bits on every machine's number of cores and with every
-    setting of its threads, as fast on matrices of hundreds, and far faster beside other work, for which threads that
-    wait for one another wait too. Whatever turns recordings or meshes into numbers begins with it.
+    """Linear algebra on one thread while this lasts: as fast on matrices of hundreds, and the same bits on every
+    machine's number of cores and with every setting of its threads. Whatever turns recordings into numbers begins so.
     """
     import scipy.linalg  # noqa: F401  its library has threads apart from numpy's, and must be there to be told
     from threadpoolctl import threadpool_limits

@@ -83,12 +83,13 @@ def run_fit(
 
             shapes = modal_shapes(found)
             write_uff(uff_to, shapes, mobilities(found, shapes))
-        write_preset(str(to), preset_of(found))
+        preset = preset_of(found)
+        write_preset(str(to), preset)
         if picture is not None:
             from sonic_bullet.plots.fit_plot import write_fit_picture
 
             write_fit_picture(picture, found)
-        say(_summary(found))
+        say(_summary(found, preset))
     warn(found.warnings)
     write_csv(csv_to, line_rows(found), COLUMNS)
     write_json(json_to, described(found))
@@ -223,27 +224,24 @@ def line_rows(found: Any) -> list[dict[str, Any]]:
     return rows
 
 
-def _summary(found: Any) -> str:
+def _summary(found: Any, preset: Any) -> str:
+    """What a fit and the preset of it say, for people."""
     from sonic_bullet.estimator.fit.dimension_tolerance import GAMMA_PER_SCALE, lines_sd
-    from sonic_bullet.estimator.fit.fitted_preset import preset_of
     from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
-    fit, preset = found.fit, preset_of(found)
+    fit, elasticity, damping = found.fit, preset.elasticity, preset.damping
     sd = np.sqrt(np.diag(fit.covariance))
-    damping = preset.damping
 
-    def shown(value: float | None, spread: float, relative: bool = True) -> tuple[str, str]:
-        assert value is not None  # a fit's preset holds Rayleigh's pair, E and ν
+    def shown(value: float, spread: float, relative: bool = True) -> tuple[str, str]:
         known = f"{spread * (value if relative else 1):.2g}" if np.isfinite(spread) else "not identifiable"
         return f"{value:.6g}", known
 
-    youngs, poisson = preset.elasticity.youngs_pa, preset.elasticity.poisson
     rows = [("alpha in 1/s", *shown(damping.alpha_per_s, sd[0])), ("beta in s", *shown(damping.beta_s, sd[1]))]
     rows += [
-        ("E/density in m²/s²", *shown(youngs / found.density_kg_m3 if youngs else None, sd[2])),
-        ("E in Pa", *shown(youngs, sd[2])),
+        ("E/density in m²/s²", *shown(elasticity.youngs_pa / found.density_kg_m3, sd[2])),
+        ("E in Pa", *shown(elasticity.youngs_pa, sd[2])),
         ("density in kg/m³", f"{found.density_kg_m3:.6g}", "the guess's"),
-        ("Poisson's ratio", *shown(poisson, sd[4], False)),
+        ("Poisson's ratio", *shown(elasticity.poisson, sd[4], False)),
         ("sigma", *shown(fit.sigma, sd[3])),
     ] * found.has_material
     paired = sum(int((o.line >= 0).sum()) for o in found.objects)
@@ -264,7 +262,7 @@ def _summary(found: Any) -> str:
         )
     if not found.has_material:
         text.append("the preset plays the observed lines; all else in it is steel's, as nobody says what was struck")
-    elif preset.provenance is not None and preset.provenance.assumed:
+    elif preset.provenance.assumed:
         text.append(f"what the preset takes from elsewhere: {'; '.join(preset.provenance.assumed)}")
     cells = [
         (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))

@@ -92,7 +92,7 @@ def staged(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Sta
     logged = {(body.body_id, body.link) for body in log.bodies}
     still = [one for one in standing if (one.body_id, one.link) not in logged]
     if not figures and not still:
-        raise SceneError("there is nothing to draw: no body has a shape", HOW_IT_IS_DRAWN)
+        raise SceneError("there is nothing to draw: no body has a shape", "film the scene itself, or add bodies")
     position, turned, shown, step = _poses(log, fps, pictures, np.array(index, np.int64))
     count = len(still)
     position = np.concatenate([position, np.tile(_stack([x.position_m for x in still], 3), (pictures, 1, 1))], axis=1)

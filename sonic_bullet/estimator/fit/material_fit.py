@@ -72,10 +72,12 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
     known lines are only played again, and those from the onset on predict other takes better.
     """
     shaped = tuple(e for e in evidence if e.family is not None and e.signals is not None and len(e.lines.freq_hz))
-    if not shaped or not _by_chance(case, shaped):
+    if not shaped or not _by_chance(case, shaped, _placed(shaped, case.band_hz)[0]):
         return evidence
     after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
-    if any(len(e.lines.freq_hz) < FEWEST_LINES for e in after) or _by_chance(case, after):
+    if any(len(e.lines.freq_hz) < FEWEST_LINES for e in after):
+        return evidence
+    if _by_chance(case, after, _placed(after, case.band_hz)[0]):
         return evidence
     chosen = {id(e): other for e, other in zip(shaped, after, strict=True)}
     return tuple(chosen.get(id(e), e) for e in evidence)
@@ -87,13 +89,9 @@ def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     return ringing_lines(still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST * e.sr)), signed=e.lines.signed)
 
 
-def _by_chance(case: Case, shaped: tuple[RecordedObject, ...]) -> bool:
-    """Whether lines find as many modes of their shapes by chance."""
-
-    def place(some: tuple[RecordedObject, ...]) -> tuple[Pairs, ...]:
-        return _placed(some, case.band_hz)[0]
-
-    return paired_by_chance(shaped, place(shaped), place)
+def _by_chance(case: Case, shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...]) -> bool:
+    """Whether lines find as many modes of their shapes by chance as these pairs are."""
+    return paired_by_chance(shaped, pairs, lambda moved: _placed(moved, case.band_hz)[0])
 
 
 @one_thread()
@@ -120,7 +118,7 @@ def fit_evidence(
     chance = False
     if shaped:
         pairs, information, scatter = _placed(shaped, case.band_hz)
-        chance = paired_by_chance(shaped, pairs, lambda moved: _placed(moved, case.band_hz)[0])
+        chance = _by_chance(case, shaped, pairs)
         log_gamma, poisson = pairs[0].log_gamma, pairs[0].poisson
     else:
         pairs, information, scatter = (), np.zeros((2, 2)), np.nan

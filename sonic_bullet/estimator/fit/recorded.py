@@ -238,13 +238,15 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
                 f"{r.file} breaks off after {len(whole) / sr:.3g} s: the digital silence behind is no "
                 "decay, and is left out"
             )
-        above, drift = without_drift(whole, sr)
-        limited.append(above)
         if case.band_hz[0] > LOWEST_HZ:
-            above, drift = limit_band(whole, sr, (case.band_hz[0], np.inf)), ""
-            limited[-1] = limit_band(whole, sr, case.band_hz)
+            drift = ""
+            sounds.append(limit_band(whole, sr, (case.band_hz[0], np.inf)))
+            limited.append(limit_band(whole, sr, case.band_hz))
+        else:
+            above, drift = without_drift(whole, sr)
+            sounds.append(above)
+            limited.append(above)
         rates.append(sr)
-        sounds.append(above)
         known = None if case.onset_s is None else round(case.onset_s * sr)
         one = span(limited[-1], sr) if known is None else until_next_hit(limited[-1], sr, known)
         if one.later:

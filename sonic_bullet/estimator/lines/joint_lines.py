@@ -67,8 +67,7 @@ def joint_lines(
     low, high = max(band_hz[0], 5.0), min(band_hz[1], HIGHEST * sr)
     noise = noise_rms(signals, sr)
     try:
-        start = start_poles(signals / noise[:, None], sr, low, high)
-        return _identified(signals, noise, sr, (low, high), signed, modes, start, crowd=True)
+        return _identified(signals, noise, sr, (low, high), signed, modes, crowd=True)
     except np.linalg.LinAlgError as error:
         raise AudioError(
             "lines of the recording cannot be told apart: no decaying sound", "give a recording of one impact"
@@ -76,19 +75,12 @@ def joint_lines(
 
 
 def _identified(
-    signals: Array,
-    noise: Array,
-    sr: int,
-    band_hz: tuple[float, float],
-    signed: bool,
-    modes: int | None,
-    start: Array,
-    *,
-    crowd: bool,
+    signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
 ) -> Lines:
     """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one
     after another, where these say plainly more.
     """
+    start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
         if signals.shape[1] >= 8 * late and FEWEST_LINES <= len(
@@ -144,9 +136,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
     try:
-        noise = noise_rms(rest, sr)
-        start = start_poles(rest / noise[:, None], sr, *band_hz)
-        lines = _identified(rest, noise, sr, band_hz, signed, None, start, crowd=False)
+        lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
     except np.linalg.LinAlgError:
         return None
     alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
