@@ -263,7 +263,7 @@ def _summary(found: Any, preset: Any) -> str:
     if not found.has_material:
         text.append("the preset plays the observed lines; all else in it is steel's, as nobody says what was struck")
     elif preset.provenance.assumed:
-        text.append(f"what the preset takes from elsewhere: {'; '.join(preset.provenance.assumed)}")
+        text.append(f"assumed: {'; '.join(preset.provenance.assumed)}")
     cells = [
         (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
         for row in line_rows(found)
