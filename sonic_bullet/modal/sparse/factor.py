@@ -62,8 +62,9 @@ def factorise(matrix: Any) -> Factor:
     from scipy.sparse import tril
 
     lower = tril(matrix, format="csc")
+    del matrix  # a caller's sum: as large as K
     lower.sort_indices()
-    left: dict[int, list[tuple[Array, Array]]] = {}  # parent -> rows and rest of its children
+    left: dict[int, list[tuple[Array, Array]]] = {}  # parent -> rows of its children, and their rest, packed
     made = []
     try:
         for number, (start, end, row, parent) in enumerate(_supernodes(lower)):
@@ -72,13 +73,17 @@ def factorise(matrix: Any) -> Factor:
             entry = slice(lower.indptr[start], lower.indptr[end])
             each = np.repeat(np.arange(width), np.diff(lower.indptr[start : end + 1]))
             column[np.searchsorted(index, lower.indices[entry]), each] = lower.data[entry]
-            for child_row, child_rest in left.pop(number, ()):
+            children = left.pop(number, [])
+            while children:  # each is freed once it is added
+                child_row, child_rest = children.pop(0)
                 _add_rest(child_rest, np.searchsorted(index, child_row), column, rest)
+                del child_rest
             root = cholesky(column[:width], lower=True, check_finite=False)
             below = dtrsm(1.0, root, column[width:], side=1, lower=1, trans_a=1)
             if len(row):
                 rest = dsyrk(-1.0, below, beta=1.0, c=rest, lower=1, overwrite_c=1)
-                left.setdefault(parent, []).append((row, rest))
+                left.setdefault(parent, []).append((row, _packed(rest)))
+            del column, rest
             made.append(Supernode(start, row, root, below))
     except (LinAlgError, MemoryError) as error:
         raise ModalError(
@@ -127,13 +132,27 @@ def _supernodes(lower: Any) -> list[tuple[int, int, Array, int]]:
 
 
 @njit(nogil=True)
+def _packed(rest):
+    """Columns of a lower triangle (c, c), one after the other: half the memory."""
+    size = len(rest)
+    made = np.empty(size * (size + 1) // 2)
+    at = 0
+    for j in range(size):
+        made[at : at + size - j] = rest[j:, j]
+        at += size - j
+    return made
+
+
+@njit(nogil=True)
 def _add_rest(child, place, column, rest):
-    """Add a child's rest (c, c), a lower triangle, at its ``place`` (c,) among its parent's rows."""
+    """Add a child's rest, a packed triangle of c rows, at its ``place`` (c,) among its parent's rows."""
     width = column.shape[1]
+    at = 0
     for j in range(len(place)):
         if place[j] < width:
             for i in range(j, len(place)):
-                column[place[i], place[j]] += child[i, j]
+                column[place[i], place[j]] += child[at + i - j]
         else:
             for i in range(j, len(place)):
-                rest[place[i] - width, place[j] - width] += child[i, j]
+                rest[place[i] - width, place[j] - width] += child[at + i - j]
+        at += len(place) - j
