@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.records.units import MAINS_HZ
 
-MAINS = (50.0, 60.0)
 MOST = 8  # multiples
 ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
@@ -53,7 +53,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     floor = (shape**2).sum() * np.median(noise) ** 2
     best: tuple[float, int, Array] | None = None
     multiple = np.arange(1, MOST + 1)
-    for mains in [known_hz] if known_hz else MAINS:
+    for mains in [known_hz] if known_hz else MAINS_HZ:
         near = np.flatnonzero(np.abs(hz - mains) < (hz[1] if known_hz else 1.2 * mains / 50))
         if not len(near):
             continue

@@ -16,9 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
@@ -28,7 +30,7 @@ BAND_HZ, PASSED, STOPPED, OVERSAMPLED = 400.0, 0.5, 1.5, 2.0  # of a band's widt
 STOP_DB = 100.0
 ROWS, COLUMNS, MOST = 240, 800, 40  # of a band's data matrix; poles looked for
 OWN = 0.5
-AROUND = np.concatenate([-np.arange(2.0, 8.0), np.arange(2.0, 8.0)])  # widths from a line
+AROUND = 7  # widths, from two on, above and below a line
 FALSE_ALARMS = 0.05  # of a recording of noise alone
 FEWEST_CYCLES = 3.0  # in which it falls by e
 
@@ -48,11 +50,11 @@ class _Band:
 
 def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, signed: bool) -> Lines:
     """Lines of signals (s, n) that start at the onset; none where nothing rings."""
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     late = round(ATTACK_S * sr)
     rest = signals[:, late : late + int(SECONDS * sr)]
-    least = float(chi2.isf(FALSE_ALARMS / (1.5 * rest.shape[1]), 2 * len(signals)) / 2)
+    least = float(chdtri(2 * len(signals), FALSE_ALARMS / (1.5 * rest.shape[1])) / 2)
     found = parallel_map(lambda band: _lines_of(band, sr, least), _bands(rest, sr, band_hz))
     pole, amplitude, spread, amplitude_sd, energy = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
     back = np.exp(-pole * late / sr)
@@ -60,10 +62,9 @@ def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, sign
     quiet = (np.abs(amplitude) <= np.abs(signals).max(axis=1, keepdims=True)).all(axis=0)
     keep = np.flatnonzero(quiet)[np.argsort(pole.imag[quiet])]
     pole, amplitude = pole[keep], amplitude[:, keep]
-    time = np.arange(rest.shape[1]) / sr
     left = rest.copy()
     for p, a in zip(pole, (amplitude / back[keep]).T, strict=True):
-        left -= np.real(a[:, None] * np.exp(p * time))
+        left -= np.real(a[:, None] * _rings(np.array([p / sr]), rest.shape[1])[:, 0])
     return Lines(
         pole.imag / (2 * np.pi),
         -pole.real,
@@ -79,21 +80,21 @@ def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, sign
 
 def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]:
     """The bands of signals (s, n), each from the sample on at which its filter is full."""
-    from scipy.signal import firwin, kaiser_beta
+    from scipy.fft import fft, ifft, next_fast_len
 
-    n = signals.shape[1]
-    whole = 1 << int(np.ceil(np.log2(2 * n)))
-    spectrum = np.fft.fft(signals, whole, axis=1)
     step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
-    count = int((STOP_DB - 7.95) / (2.285 * 2 * np.pi * (STOPPED - PASSED) * BAND_HZ / sr)) | 1  # [Kaiser 1974, eq. 20]
-    cutoff = (STOPPED + PASSED) / 2 * BAND_HZ
-    taps = firwin(count, cutoff, window=("kaiser", kaiser_beta(STOP_DB)), fs=sr)
-    weight = np.fft.fft(taps, whole)
+    taps = low_pass(PASSED * BAND_HZ / sr, STOPPED * BAND_HZ / sr, STOP_DB)
+    count = max(0, -(-(signals.shape[1] - len(taps) + 1) // step))
+    points = next_fast_len(-(-(signals.shape[1] + len(taps)) // step))
+    whole = points * step
+    spectrum = fft(signals, whole, axis=1)
+    weight = fft(np.roll(np.pad(taps, (0, whole - len(taps))), 1 - len(taps))) / step  # its first sample is a full one
     floors = [floor_between([signal]).variance for signal in signals]
     made = []
     for low in np.arange(band_hz[0], band_hz[1], BAND_HZ):
         at = round((low + BAND_HZ / 2) / sr * whole)
-        series = np.fft.ifft(np.roll(spectrum, -at, axis=1) * weight, axis=1)[:, count - 1 : n : step]
+        band = np.roll(spectrum, -at, axis=1) * weight  # every step-th sample: what lies a rate apart adds up
+        series = ifft(band.reshape(len(band), step, points).sum(axis=1), axis=1)[:, :count]
         place = np.linspace(low, low + BAND_HZ, 16) / (sr / 2)
         noise = np.array([np.interp(place, np.linspace(0, 1, len(floor)), floor).mean() for floor in floors])
         noise = np.sqrt(noise * (taps**2).sum())
@@ -115,7 +116,7 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
             break
     amplitude, left, gram, matrix = _solved(y, pole)[:4]
     if len(pole):
-        ring = np.abs(np.exp(np.outer(np.arange(y.shape[1]), pole))) ** 2
+        ring = np.abs(_rings(pole, y.shape[1])) ** 2
         level = (np.abs(left) ** 2) @ ring / ring.sum(axis=0)  # (s, k): what is left about each
         energy = (np.abs(amplitude) ** 2).sum(axis=0) * ring.sum(axis=0)
         spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix, hermitian=True))) / 2 * level.mean(axis=0))
@@ -140,22 +141,29 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
 
 def _candidates(y: Array) -> Array:
     """Poles (k,) per sample of series (s, m)."""
+    from scipy.linalg import eigh
+    from scipy.linalg.blas import zherk
+
     m = y.shape[1]
     rows = min(ROWS, m // 3)
     if rows < 8:
         return np.zeros(0, complex)
-    first = np.arange(0, m - rows + 1, 1 + (m - rows) // COLUMNS)
-    data = np.concatenate([row[first[:, None] + np.arange(rows)] for row in y])
-    vector = np.linalg.eigh(data.T @ data.conj())[1][:, -min(MOST, rows // 2) :]
+    data = np.concatenate([sliding_window_view(row, rows)[:: 1 + (m - rows) // COLUMNS] for row in y])
+    most = min(MOST, rows // 2)
+    gram = zherk(1.0, data.T, lower=1)
+    vector = eigh(gram, subset_by_index=(rows - most, rows - 1), check_finite=False)[1]
+    last = vector[-1]  # of orthonormal columns: V₁ᴴV₁ = I − v̄ vᵀ, by which the shift needs no least squares
+    shift = vector[:-1].conj().T @ vector[1:]
+    shift += np.outer(last.conj(), last @ shift) / max(1 - float(np.vdot(last, last).real), 1e-12)
     with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.linalg.eigvals(np.linalg.lstsq(vector[:-1], vector[1:], rcond=None)[0])))
+        return np.asarray(np.log(np.linalg.eigvals(shift)))
 
 
 def _selected(y: Array, pole: Array, least: float) -> Array:
     """Which poles (k,) are lines of series (s, m), in the order in which they take most."""
     if not len(pole):
         return np.zeros(0, int)
-    ring = np.exp(np.outer(np.arange(y.shape[1]), pole))
+    ring = _rings(pole, y.shape[1])
     whole, moment = ring.conj().T @ ring, y @ ring.conj()
     own = np.diag(whole).real
     free, found = np.ones(len(pole), bool), list[int]()
@@ -188,7 +196,7 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
         free[k] = False
         chosen = [k]
         if not stands(k, taken, without([*found, k])):  # two close ones may, each beside the other
-            near = free & (np.abs(pole.imag - pole[k].imag) < AROUND[-1] * _width(pole[k], len(ring)))
+            near = free & (np.abs(pole.imag - pole[k].imag) < AROUND * _width(pole[k], len(ring)))
             second, more, *rest = strongest(rest[0], rest[1], near)
             if second < 0:
                 continue
@@ -202,6 +210,11 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
     return np.array(found, int)
 
 
+def _rings(pole: Array, count: int) -> Array:
+    """e^{p t} (count, k) of poles (k,) per sample."""
+    return np.vander(np.exp(pole), count, increasing=True).T
+
+
 def _width(pole: complex, samples: int) -> float:
     """Of a line in the spectrum of so many samples, in radians a sample."""
     return float(np.hypot(-pole.real, np.pi / samples))
@@ -209,8 +222,14 @@ def _width(pole: complex, samples: int) -> float:
 
 def _level_around(left: Array, ring: Array, pole: complex) -> Array:
     """Power (s,) of what is left beside a line's frequency while it rings, as its energy's square root's variance."""
-    other = ring[:, None] * np.exp(1j * np.outer(np.arange(len(ring)), _width(pole, len(ring)) * AROUND))
-    power = np.abs(left @ other.conj()) ** 2 / (np.abs(ring) ** 2).sum()
+    turn = np.exp(1j * _width(pole, len(ring)) * np.arange(len(ring)))
+    once = left * ring.conj()
+    powers = np.empty((AROUND - 1, len(ring)), complex)
+    powers[0] = turn * turn
+    for k in range(1, len(powers)):
+        np.multiply(powers[k - 1], turn, out=powers[k])
+    beside = np.concatenate([once @ powers.T, once @ powers.conj().T], axis=1)
+    power = np.abs(beside) ** 2 / (np.abs(ring) ** 2).sum()
     return np.asarray(np.median(power, axis=1) / np.log(2))  # of an exponential law
 
 
@@ -241,9 +260,8 @@ def _solved(y: Array, pole: Array) -> tuple[Array, Array, Array, Array, Array, f
     """Amplitudes (s, k), what is left (s, m), Gram matrix (k, k); of Gauss and Newton, the matrix (k, k), gradient (k,)
     and sum of squares.
     """
-    at = np.arange(y.shape[1])
-    ring = np.exp(np.outer(at, pole))
-    slope = at[:, None] * ring
+    ring = _rings(pole, y.shape[1])
+    slope = np.arange(y.shape[1])[:, None] * ring
     gram = ring.conj().T @ ring
     inverse = np.linalg.pinv(gram, hermitian=True)
     amplitude = y @ ring.conj() @ inverse.T

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.common.hum import ABOVE, MAINS
 from sonic_bullet.records import Array
+from sonic_bullet.records.units import MAINS_HZ
 
 LEAST_S = 0.1  # before the onset: five periods, so that Hann's main lobes lie apart
 GUARD_S = 0.005  # before the onset, whose first sample is not known that well
 MOST = 20  # multiples
+ABOVE = 30.0  # times the power between them
 REFINED = 3  # times that the tail's phases mend the frequency
 STAYS = 0.25  # of the comb's power in the tail, at most, once it is taken off
 
@@ -47,7 +48,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
         return np.zeros(len(signal)), 0.0
     power = np.abs(np.fft.rfft((quiet - quiet.mean()) * np.hanning(n), 4 * n)) ** 2
     step = sr / (4 * n)
-    multiple = np.arange(1, min(MOST, int(0.45 * sr / MAINS[-1])) + 1)
+    multiple = np.arange(1, min(MOST, int(0.45 * sr / MAINS_HZ[-1])) + 1)
 
     def stands(f: float) -> Array:
         """Which multiples of f stand above what lies between them."""
@@ -63,7 +64,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
         return float(((rest - rest.mean()) ** 2).sum())
 
     best, least = (0.0, np.zeros(0, int)), float(((quiet - quiet.mean()) ** 2).sum())
-    for mains in MAINS:
+    for mains in MAINS_HZ:
         found = stands(mains)
         if 1 not in found and len(found) < 2:  # half of a rectifier's hum is even multiples alone
             continue

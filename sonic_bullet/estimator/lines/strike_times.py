@@ -36,13 +36,12 @@ def find_strikes(signal: Array, sr: int) -> Array:
         Times in s from the first sample, in order; empty where nothing stands out of what could be predicted.
     """
     from scipy.ndimage import median_filter
-    from scipy.signal import lfilter
 
     block = max(1, round(BLOCK_S * sr))
     count = len(signal) // block
     if count < 20 or not np.any(signal):
         return np.zeros(0)
-    left = lfilter(prediction_error_filter(signal, ORDER), [1.0], signal)
+    left = np.convolve(signal, prediction_error_filter(signal, ORDER))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
     near = median_filter(power, min(round(2 * NEAR_S / BLOCK_S), count) | 1, mode="nearest")
     stands = power > np.maximum(near * 10 ** (ABOVE_DB / 10), power.max() * 10 ** (-BELOW_DB / 10))

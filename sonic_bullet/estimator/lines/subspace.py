@@ -24,6 +24,16 @@ COLUMNS_MOST = 1200
 EARLY = 1500  # samples
 
 
+def low_pass(passed: float, stopped: float, stop_db: float) -> Array:
+    """Taps (l,), l odd, of a linear-phase low-pass with gain 1 at 0 Hz.
+
+    passed, stopped: edges of what goes through and of what is ``stop_db`` (> 50) lower, over the rate.
+    """
+    half = int((stop_db - 7.95) / (2.285 * 2 * np.pi * (stopped - passed))) // 2
+    taps = np.sinc((passed + stopped) * np.arange(-half, half + 1)) * np.kaiser(2 * half + 1, 0.1102 * (stop_db - 8.7))
+    return np.asarray(taps / taps.sum())
+
+
 def poles(
     signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], width_hz: float, fastest_per_s: float
 ) -> Array:
@@ -34,16 +44,13 @@ def poles(
     linear convolution.
     """
     from scipy.fft import fft, ifft, next_fast_len
-    from scipy.signal import firwin, kaiser_beta
 
     found = []
     step = max(1, int(sr / (OVERSAMPLED * width_hz)))
     rate = sr / step
     taps = np.ones(1)
     if step > 1:
-        transition = 2 * np.pi * (rate - width_hz) / sr
-        length = int((STOP_DB - 8) / (2.285 * transition)) | 1  # [Kaiser 1974, eq. 20]
-        taps = firwin(length, rate / 2, window=("kaiser", kaiser_beta(STOP_DB)), fs=sr)
+        taps = low_pass(width_hz / 2 / sr, (rate - width_hz / 2) / sr, STOP_DB)
     points = next_fast_len(-(-(len(signal) + len(taps)) // step))
     size = points * step
     sound, offset = fft(signal, size), (np.arange(points) + points // 2) % points - points // 2

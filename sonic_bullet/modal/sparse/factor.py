@@ -87,7 +87,7 @@ def factorise(matrix: Any) -> Factor:
             made.append(Supernode(start, row, root, below))
     except (LinAlgError, MemoryError) as error:
         raise ModalError(
-            f"stiffness of {matrix.shape[0]} unknowns cannot be factorised ({error})", "give a simpler mesh"
+            f"stiffness of {lower.shape[0]} unknowns cannot be factorised ({error})", "give a simpler mesh"
         ) from error
     return Factor(made)
 
