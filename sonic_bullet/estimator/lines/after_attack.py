@@ -228,8 +228,8 @@ def _level_around(left: Array, ring: Array, pole: complex) -> Array:
     powers[0] = turn * turn
     for k in range(1, len(powers)):
         np.multiply(powers[k - 1], turn, out=powers[k])
-    beside = np.concatenate([once @ powers.T, once @ powers.conj().T], axis=1)
-    power = np.abs(beside) ** 2 / (np.abs(ring) ** 2).sum()
+    moment = np.concatenate([once @ powers.T, once @ powers.conj().T], axis=1)
+    power = np.abs(moment) ** 2 / (np.abs(ring) ** 2).sum()
     return np.asarray(np.median(power, axis=1) / np.log(2))  # of an exponential law
 
 
