@@ -35,6 +35,7 @@ from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, shown
@@ -224,7 +225,8 @@ def recorded_names() -> tuple[str, ...]:
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
     """The typed content of a preset file. Raises MaterialError naming file and field."""
-    with reading(path, "preset", MaterialError, "mend that field; docs/reference/preset.md describes the file"):
+    remedy = "mend that field; docs/reference/preset.md describes the file"
+    with reading(path, "preset", MaterialError, remedy):
         try:
             with open(path, "rb") as file:
                 content = file.read(BYTES_MAX + 1)
@@ -234,12 +236,7 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
             ) from error
         if len(content) > BYTES_MAX:
             raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
-        try:
-            preset = msgspec.json.decode(content, type=Preset)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise MaterialError(
-                f"preset {path}: {error}", "mend that field; docs/reference/preset.md describes the file"
-            ) from error
+        preset = decode_json(content, Preset, f"preset {path}", MaterialError, remedy)
         if preset.format != FORMAT:
             raise MaterialError(
                 f"preset {path} has format '{preset.format}', wanted '{FORMAT}'",

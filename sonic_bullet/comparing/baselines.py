@@ -33,6 +33,7 @@ from sonic_bullet.comparing.tolerance import (
 from sonic_bullet.files import replacing
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
@@ -137,13 +138,10 @@ def read_baseline(path: str | Path) -> SceneBaseline:
         data = Path(path).read_bytes()
     if len(data) > MOST_BYTES:
         raise FileError(f"{path} is no baseline: it is too large", remedy)
-    try:
-        version = msgspec.json.decode(data, type=dict[str, Any]).get("format")
-        if version != FORMAT:
-            raise CompareError(f"{path} is a baseline of another version ({str(version)[:40]})", remedy)
-        return msgspec.json.decode(data, type=SceneBaseline)
-    except msgspec.MsgspecError as error:
-        raise FileError(f"{path} is no baseline: {error}", remedy) from None
+    version = decode_json(data, dict[str, Any], f"{path} is no baseline", FileError, remedy).get("format")
+    if version != FORMAT:
+        raise CompareError(f"{path} is a baseline of another version ({str(version)[:40]})", remedy)
+    return decode_json(data, SceneBaseline, f"{path} is no baseline", FileError, remedy)
 
 
 def check_baseline(

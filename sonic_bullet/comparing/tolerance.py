@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, at_common_rate, band_levels, level_words, onsets_s
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.coerce import as_number, format_count
 from sonic_bullet.records.errors import CompareError
 
 if TYPE_CHECKING:
@@ -104,11 +104,7 @@ def compared_words(side: Side, same: bool, within: Closeness | None) -> str:
     x = side.sound.samples()
     names: Sequence[str] = [] if side.log is None else [one.name for one in side.log.bodies if one.material is not None]
     rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    who = f"{_count(len(names), 'body', 'bodies')} ({', '.join(names[:MOST_NAMES])}{rest}), " if names else ""
-    events = _count(len(onsets_s(x, side.sr)), "event", "events")
+    who = f"{format_count(len(names), 'body', 'bodies')} ({', '.join(names[:MOST_NAMES])}{rest}), " if names else ""
+    events = format_count(len(onsets_s(x, side.sr)), "event")
     how = "to the bit" if tolerance_db is None else f"tolerance {tolerance_db:g} dB"
     return f"{who}{events}, {x.shape[1] / side.sr:.4g} s, {how}"
-
-
-def _count(number: int, one: str, several: str) -> str:
-    return f"{number} {one if number == 1 else several}"

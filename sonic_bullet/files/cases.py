@@ -28,6 +28,7 @@ from sonic_bullet.files.case_fields import (
     Vector,
 )
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.files.unread import shown, unread_fields
 from sonic_bullet.records.errors import FileError, excerpt
 
@@ -50,6 +51,7 @@ __all__ = [
 ]
 
 FORMAT = "sonic-bullet-case/1"
+_REMEDY = "mend that field; docs/reference/case.md describes the file"
 BYTES_MAX = 1 << 24
 NAME_BYTES, PATH_BYTES = 255, 4095  # of POSIX file systems
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -132,7 +134,7 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
     Raises FileError naming the file and what is wrong with it; audio may be missing.
     """
     path = Path(folder)
-    with reading(path, "case", FileError, "mend that field; docs/reference/case.md describes the file"):
+    with reading(path, "case", FileError, _REMEDY):
         if path.is_dir():
             path = path / "case.json"
         try:
@@ -145,13 +147,8 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
             ) from error
         if len(content) > BYTES_MAX:
             raise FileError(f"case {path} is over 16 MiB", "give a case.json")
-        try:
-            raw = msgspec.json.decode(content, type=CaseFields)
-            unread = unread_fields(msgspec.json.decode(content), CaseFields, f"case {path}")
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise FileError(
-                f"case {path}: {error}", "mend that field; docs/reference/case.md describes the file"
-            ) from error
+        raw = decode_json(content, CaseFields, f"case {path}", FileError, _REMEDY)
+        unread = unread_fields(msgspec.json.decode(content), CaseFields, f"case {path}")
         if raw.format != FORMAT:
             raise FileError(
                 f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format"

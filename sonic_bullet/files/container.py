@@ -31,6 +31,7 @@ import numpy as np
 from sonic_bullet.files.atomic import replacing
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import read_at
+from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
@@ -160,14 +161,12 @@ def read_container(
         if HEADER not in arrays:
             raise LogError(f"{path} is no {what}: it has no header", REMEDY)
         text = arrays.pop(HEADER).tobytes()
-        try:
-            found = msgspec.json.decode(text, type=_Format).format
-            forms = (form,) if isinstance(form, str) else form
-            if found not in forms:
-                raise LogError(f"{path} has format '{found}', wanted '{forms[0]}'", f"give a {what} of this version")
-            return msgspec.json.decode(text, type=kind), arrays
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise LogError(f"{path} is no {what}: {error}", REMEDY) from error
+        where = f"{path} is no {what}"
+        found = decode_json(text, _Format, where, LogError, REMEDY).format
+        forms = (form,) if isinstance(form, str) else form
+        if found not in forms:
+            raise LogError(f"{path} has format '{found}', wanted '{forms[0]}'", f"give a {what} of this version")
+        return decode_json(text, kind, where, LogError, REMEDY), arrays
 
 
 def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:

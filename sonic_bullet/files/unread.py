@@ -38,7 +38,7 @@ def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]
                 if name in known:
                     yield from _unread(inner, known[name], f"{where}: {name}")
                 elif name not in FREE:
-                    yield f"{where}: field '{shown(name)}' is not known and not read{_nearest(name, tuple(known))}"
+                    yield f"{where}: field '{shown(name)}' is not known and not read{nearest_field(name, tuple(known))}"
         case msgspec.inspect.DictType(value_type=kind) if isinstance(value, dict):
             for name, inner in value.items():
                 yield from _unread(inner, kind, f"{where} '{shown(name)}'")
@@ -47,7 +47,7 @@ def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]
                 yield from _unread(inner, kind, f"{where} {i + 1}")
 
 
-def _nearest(name: str, known: tuple[str, ...]) -> str:
+def nearest_field(name: str, known: tuple[str, ...]) -> str:
     """The field that may have been meant, in words; all there are where none is like it."""
     near = difflib.get_close_matches(name[:QUOTED].lower(), known, n=1, cutoff=0.5)
     return f": did you mean '{near[0]}'?" if near else f" (known here: {', '.join(known)})"

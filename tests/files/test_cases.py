@@ -113,7 +113,7 @@ def test_paths_stay_inside(tmp_path: Path, name: str, field: str) -> None:
         ({"objects": {"bar": {"elastic_guess": {"density": -1}}}}, "density"),
         ({"objects": {"bar": {"elastic_guess": {"poisson_ratio": 0.7}}}}, "poisson"),
         ({"band_hz": [500, 20]}, "band_hz"),
-        ({"recordings": "none"}, "Expected"),
+        ({"recordings": "none"}, "recordings is .none., wanted a list"),
         ({"recordings": [{"file": "a.wav", "strike": {"impulse": 1e308}}]}, "impulse"),
         ({"recordings": [{"file": "a.wav", "strike": {"impulse": 1e-320}}]}, "impulse"),
         ({"recordings": [{"file": "a.wav", "strike": {"position": [0, 1e308, 0]}}]}, "position"),

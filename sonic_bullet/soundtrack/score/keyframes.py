@@ -17,6 +17,7 @@ import numpy as np
 
 from sonic_bullet.files.container import read_container
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
@@ -81,7 +82,7 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
             position, turn = (_numbers(arrays, name, many, n) for name, n in (("position", 3), ("quaternion_xyzw", 4)))
             poses = [(position[:, i], turn[:, i]) for i in range(many)]
         else:
-            made = msgspec.json.decode(place.read_bytes(), type=_File)
+            made = decode_json(place.read_bytes(), _File, f"animation {path}", AnimationError, _REMEDY)
             poses = [_poses(one) for one in made.bodies]
         frames = max((len(p) for p, _ in poses), default=0)
         unit, up = made.unit_m * scale, made.up
@@ -182,4 +183,5 @@ def read_rules(path: str | os.PathLike[str]) -> tuple[Rule, ...]:
     with reading(path, "table of materials", AnimationError, remedy):
         if Path(path).stat().st_size > 1 << 20:
             raise AnimationError(f"{path} is larger than a megabyte", remedy)
-        return tuple(one.rule() for one in msgspec.json.decode(Path(path).read_bytes(), type=list[_Said]))
+        found = decode_json(Path(path).read_bytes(), list[_Said], f"table of materials {path}", AnimationError, remedy)
+        return tuple(one.rule() for one in found)
