@@ -9,6 +9,7 @@ import click
 
 from sonic_bullet.cli.examples import CACHE_EPILOG
 from sonic_bullet.cli.parameters import json_option
+from sonic_bullet.records.counts import format_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -83,7 +84,7 @@ def _said(result: dict[str, Any], asked: bool) -> str:
     lines = [f"kept in {' and '.join(result['folders'])}" if result["folders"] else "nothing can be kept"]
     if asked:
         count = sum(kind["files"] for kind in result["removed"])
-        lines.append(f"removed: {count} files, {total_mb(result['removed']):.1f} MB")
+        lines.append(f"removed: {format_count(count, 'file')}, {total_mb(result['removed']):.1f} MB")
     rows = [
         (kind["kind"], str(kind["files"]), f"{kind['bytes'] / 1e6:.1f}", kind["oldest_use"][:16])
         for kind in result["kinds"]

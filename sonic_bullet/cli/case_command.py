@@ -25,6 +25,7 @@ from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 AUDIO = frozenset({".wav", ".flac", ".ogg", ".aif", ".aiff", ".caf", ".w64", ".rf64"})
@@ -87,7 +88,7 @@ def run_case_new(
             print(table(RESPONSE_COLUMNS, made.rows))
         elif not split:
             for sound in sounds:
-                warn(f"{sound}: {words}" for words in _doubts(sound))
+                warn(_doubts(sound))
         forces = [take.force for take in struck]
         name_of = _names(place, [*sounds, *forces, *([Path(mesh)] if mesh is not None else [])])
         if mesh is not None:
@@ -103,8 +104,14 @@ def run_case_new(
         for recording in case["recordings"][hold_out - 1 :: hold_out] if hold_out is not None else []:
             recording["split"] = "holdout"
         _written(place, name_of, case)
-    print(f"{place / 'case.json'}: {len(sounds)} recordings" + ("" if mesh is None else f" of {thing['mesh']}"))
+    of = "" if mesh is None else f" of {thing['mesh']}"
+    print(f"{place / 'case.json'}: {format_count(len(sounds), 'recording')}{of}")
     _say_missing(case, force_newton)
+    if mesh is None and made is None:
+        print(
+            "without a mesh 'fit' gives lines that a preset plays, but no E/ρ, no Poisson's ratio and no other shape: "
+            "name it with --mesh and --material"
+        )
 
 
 def _drawing(picture: str | None, split: bool) -> Path | None:
@@ -180,11 +187,13 @@ def _inside(place: Path) -> list[Path]:
 
 def _doubts(sound: Path) -> list[str]:
     """What is odd about a recording. Raises FileError, AudioError."""
-    from sonic_bullet.estimator.lines.onset import clipped_samples
+    from sonic_bullet.estimator.lines.onset import clipped_samples, span
 
-    signal, _, which = read_channel(sound)
-    clipped = clipped_samples(signal)
-    return [which] * bool(which) + [f"{clipped} samples are clipped: 'fit' refuses that"] * bool(clipped)
+    signal, sr, which = read_channel(sound)
+    clipped, hits = clipped_samples(signal), span(signal, sr).hits
+    many = format_count(clipped, "sample is", "samples are")
+    doubts = [f"{sound}: {which}"] * bool(which) + [f"{sound}: {many} clipped: 'fit' refuses that"] * bool(clipped)
+    return doubts + [f"{sound} holds {hits} hits: --split cuts it into takes"] * (hits > 1)
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
@@ -296,11 +305,12 @@ def run_case_check(folder: str) -> None:
         warn([f"{recording.file.name}: {which}"] if which else [])
     splits = [r.split for r in case.recordings]
     listed = ", ".join(f"{splits.count(name)} {name}" for name in dict.fromkeys(splits))
-    print(f"{case.name}: {len(case.recordings)} strikes ({listed}), recorded as {case.sensor}")
+    print(f"{case.name}: {format_count(len(case.recordings), 'strike')} ({listed}), recorded as {case.sensor}")
     if rows:
         print(table(("object", "mesh", "size in mm", "guess", "strikes placed"), rows))
     if missing:
-        print(f"{missing} recordings that are not fitted are not there: their sound can be predicted, not compared")
+        which = format_count(missing, "recording that is not fitted is", "recordings that are not fitted are")
+        print(f"{which} not there: the sound can be predicted, not compared")
 
 
 def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:

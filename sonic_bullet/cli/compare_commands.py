@@ -18,6 +18,7 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 
 COMPARE_EPILOG = """\b
@@ -244,6 +245,6 @@ def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int
             made = make_baseline(scene, reason, tell, runs)
         place.parent.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)
-        what = f"{len(made.features)} runs" if made.features else "no ensemble"
+        what = format_count(len(made.features), "run") if made.features else "no ensemble"
         commit = f"commit {made.commit[:12]}{'' if made.clean else ' with changes'}" if made.commit else "no commit"
         click.echo(f"{scene} -> {place}: {what}, {commit}")

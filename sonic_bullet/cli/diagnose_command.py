@@ -13,6 +13,7 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, warn, write_json
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 SIDES = ("before", "after")  # the folders of --predict
@@ -49,7 +50,7 @@ def run_diagnose(
             write_preset(output, preset_of(found))
         say(_summary(found))
         if predict is not None:
-            say(f"{written} strikes predicted in {predict}")
+            say(f"{format_count(written, 'strike')} predicted in {predict}")
     warn(found.warnings)
     write_json(json_to, described(found))
     if found.verdict == "worse-than-silence":

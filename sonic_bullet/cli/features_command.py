@@ -11,6 +11,7 @@ from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, w
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.files import read_channel
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
 NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
@@ -91,7 +92,8 @@ def _summary(recording: str, found: Features) -> str:
         )
         for k in order
     ]
-    head = f"{recording}: {len(rows)} features, onset at {found.onset_s:.4f} s, noise {found.noise_dbfs:.1f} dBFS"
+    head = f"{recording}: {format_count(len(rows), 'feature')}, onset at {found.onset_s:.4f} s, "
+    head += f"noise {found.noise_dbfs:.1f} dBFS"
     return "\n".join([head, table(("Hz", "±", "decay 1/s", "±", "T60 s", "loss factor", "Q", "dBFS"), rows)])
 
 

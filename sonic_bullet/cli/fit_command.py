@@ -18,6 +18,7 @@ from sonic_bullet.files.case_fields import LARGEST
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
 from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
@@ -252,7 +253,7 @@ def _summary(found: Any, preset: Any) -> str:
     text = [
         f"{found.case.name}: {fit.verdict}",
         table(("", "value", "spread"), rows),
-        f"{paired} modes paired with {lines} observed lines",
+        f"{format_count(paired, 'mode')} paired with {format_count(lines, 'observed line')}",
     ]
     if np.isfinite(sd[2]) and found.dimension_tolerance:
         own = lines_sd(fit.covariance, found.dimension_tolerance)

@@ -13,6 +13,7 @@ from sonic_bullet.cli.line_table import take_tables
 from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
 from sonic_bullet.files import read_channel
 from sonic_bullet.records import Residual
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
 UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
@@ -115,6 +116,7 @@ def _summary(source: str, residual: Residual) -> str:
     level = shown["residual_of_clip_db"]
     loud = "nothing" if level is None else f"{level:.1f} dB of the recordings' energy"
     return (
-        f"{source}: beside {shown['modes']} modes there is {loud}: {len(shown['lines'])} lines, and noise in "
+        f"{source}: beside {format_count(shown['modes'], 'mode')} there is {loud}: "
+        f"{format_count(len(shown['lines']), 'line')}, and noise in "
         f"{shown['noise_cells']} cells of band and time"
     )

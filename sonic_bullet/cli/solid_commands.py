@@ -13,6 +13,7 @@ from sonic_bullet.files import write_model
 from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
 from sonic_bullet.records import Material, ModalModel
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, MaterialError
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 
@@ -223,7 +224,7 @@ def _summary(mesh: str, material: Material, model: ModalModel) -> str:
         (str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}")
         for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)
     ]
-    dropped = f", {model.dropped} overdamped modes dropped" if model.dropped else ""
+    dropped = f", {format_count(model.dropped, 'overdamped mode')} dropped" if model.dropped else ""
     head = (
         f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} "
         f"modes{dropped}\n{model.note}"

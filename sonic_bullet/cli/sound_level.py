@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 
 if TYPE_CHECKING:
@@ -112,12 +113,12 @@ def level_warnings(report: AudioReport) -> tuple[str, ...]:
     """What a user should know of samples beyond full scale."""
     if report.clipped:
         return (
-            f"{report.clipped} samples were clipped at full scale (peak {report.peak_pa:.3g} Pa); "
-            "--peak-dbfs -1 avoids it, a float .wav needs no clipping",
+            f"{format_count(report.clipped, 'sample was', 'samples were')} clipped at full scale "
+            f"(peak {report.peak_pa:.3g} Pa); --peak-dbfs -1 avoids it, a float .wav needs no clipping",
         )
     if report.over:
         return (
-            f"{report.over} samples pass 1.0 (peak {report.peak_pa:.3g} Pa): the file is exact, but players "
-            "clip it; --peak-dbfs -1 scales it",
+            f"{format_count(report.over, 'sample passes', 'samples pass')} 1.0 (peak {report.peak_pa:.3g} Pa): "
+            "the file is exact, but players clip it; --peak-dbfs -1 scales it",
         )
     return ()

@@ -14,6 +14,8 @@ import numpy as np
 from sonic_bullet.files import live_channel, read_audio, write_audio
 from sonic_bullet.plots.takes_plot import DrawnRecording, write_takes_picture
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import AudioError
 
 LEAD_S = 0.05
 """Of what precedes a strike, which tells the noise; less where the strike before it is nearer."""
@@ -46,11 +48,13 @@ def cut_takes(
     Raises
     ------
     AudioError
-        A recording that is silent, too short or not finite.
+        A recording that is silent, too short, not finite, or without a hit.
     """
     made: list[Path] = []
     rows: list[tuple[str, ...]] = []
     drawn: list[DrawnRecording] = []
+    from sonic_bullet.estimator.lines.onset import is_struck
+
     for path in sounds:
         sound, sr = read_audio(path)
         if force_channel is not None:
@@ -58,6 +62,8 @@ def cut_takes(
         others = sound if force_channel is None or len(sound) == 1 else np.delete(sound, force_channel, axis=0)
         live_channel(others, None, path)
         loudest = others[int(np.argmax(np.ptp(others, axis=1)))]
+        if not is_struck(loudest, sr):
+            raise AudioError(f"no hit found in {path}", "name recordings of impacts, from before each to its decay")
         bounds = take_bounds(loudest, sr)
         drawn += [DrawnRecording(path.name, loudest, sr, bounds)] if picture is not None else []
         for k, (strike, start, stop) in enumerate(bounds, 1):
@@ -92,4 +98,4 @@ def _level(signal: Array) -> tuple[str, str]:
 
     clipped = clipped_samples(signal)
     peak = 20 * np.log10(max(float(np.abs(signal).max()), 1e-12))
-    return f"{peak:.1f} dBFS", f"{clipped} samples clipped" if clipped else ""
+    return f"{peak:.1f} dBFS", f"{format_count(clipped, 'sample')} clipped" if clipped else ""

@@ -35,6 +35,7 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
 
@@ -190,7 +191,7 @@ def _changes(baseline: SceneBaseline, side: Side) -> list[str]:
         found.append(f"it is {level_words(most)} than the baseline in the octave at {f:g} Hz, where they differ most")
     onsets, t60 = onsets_s(x, side.sr), t60_s(x, side.sr)
     if len(onsets) != len(baseline.onsets_s):
-        found.append(f"{len(baseline.onsets_s)} → {len(onsets)} onsets")
+        found.append(f"{len(baseline.onsets_s)} → {format_count(len(onsets), 'onset')}")
     if t60 is not None and baseline.t60_s is not None and abs(t60 / baseline.t60_s - 1) > 0.005:
         found.append(f"T60 {baseline.t60_s:.3g} → {t60:.3g} s")
     return found

@@ -14,7 +14,8 @@ import numpy as np
 
 from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, at_common_rate, band_levels, level_words, onsets_s
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number, format_count
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError
 
 if TYPE_CHECKING:

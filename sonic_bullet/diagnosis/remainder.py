@@ -75,7 +75,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
             else "; its share does not depend on the strike's strength"
         )
     if len(total) > 1:
-        words += "; it differs from place to place" if scatter > 0.5 else "; it is alike wherever the body is struck"
+        words += f"; {_places(takes, scatter)}"
     strange = of_no_body(takes, made)
     if strange > RULES.no_body_share:
         words += (
@@ -99,6 +99,16 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         "share_of_no_modes": strange,
         "lines_again_at_ratio": again,
     }
+
+
+def _places(takes: Sequence[Take], scatter: float) -> str:
+    """How it goes with the place of the strike, in words. scatter: standard deviation of its logarithm."""
+    at = {t.body.recordings[t.strike].position_m for t in takes} - {None}
+    if not at:
+        return "no strike has a place: whether it differs from place to place is not known"
+    if len(at) == 1:
+        return "all strikes are at one place: whether it differs elsewhere is not known"
+    return "it differs from place to place" if scatter > 0.5 else "it is alike wherever the body is struck"
 
 
 def listing(left_out: Sequence[LeftOut]) -> str:

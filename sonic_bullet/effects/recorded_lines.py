@@ -20,6 +20,7 @@ from sonic_bullet.effects.common.proofs import finite, same_length
 from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits
 from sonic_bullet.geometry import outward_normals
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import RecordError
 
 SOUND_SPEED_M_S = 343.0
@@ -79,7 +80,7 @@ class RecordedLines:
             decay_per_s=decay,
             shape=shape.astype(np.float32),
             includes_radiation=True,
-            note=f"{len(freq)} recorded lines at the level of this body's modes",
+            note=f"{format_count(len(freq), 'recorded line')} at the level of this body's modes",
         )
 
     def parameters(self) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from sonic_bullet.files.case_fields import (
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.files.unread import shown, unread_fields
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, excerpt
 
 __all__ = [
@@ -312,5 +313,5 @@ def _onset(value: Any) -> float | None:
 
 def _said(support: SupportFields | str | None) -> str:
     if isinstance(support, SupportFields):
-        return f"clamped at {len(support.fixed)} places" if support.fixed else "free"
+        return f"clamped at {format_count(len(support.fixed), 'place')}" if support.fixed else "free"
     return support or "not declared"

@@ -19,6 +19,7 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
@@ -158,7 +159,7 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
     """
     count, frames = samples.shape
     if channel is not None and not 0 <= channel < count:
-        known = "1 channel, 0" if count == 1 else f"{count} channels, 0 to {count - 1}"
+        known = f"{format_count(count, 'channel')}, 0" + f" to {count - 1}" * (count > 1)
         raise FileError(f"{name} has no channel {channel}", f"it has {known}")
     if frames < SHORTEST:
         raise AudioError(f"{name} holds {frames} samples", "give a recording of an impact, from before it to its decay")

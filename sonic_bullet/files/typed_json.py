@@ -16,7 +16,7 @@ import msgspec
 
 from sonic_bullet.files.unread import nearest_field, shown
 from sonic_bullet.machine.json_text import json_bytes
-from sonic_bullet.records.coerce import format_count
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SonicBulletError
 
 T = TypeVar("T")

@@ -12,6 +12,8 @@ from typing import Any
 
 import msgspec
 
+from sonic_bullet.records.counts import format_count
+
 FREE = frozenset({"note", "source", "licence", "license"})
 """Words for people, which may stand at any place of a file."""
 MOST = 20  # lines; more of them tell nothing new
@@ -24,7 +26,8 @@ def unread_fields(value: Any, form: type[msgspec.Struct], where: str) -> tuple[s
     """
     lines = list(_unread(value, msgspec.inspect.type_info(form), where))
     more = len(lines) - MOST
-    return tuple(lines[:MOST] + ([f"{where}: {more} more fields are not known"] if more > 0 else []))
+    many = format_count(more, "more field is", "more fields are")
+    return tuple(lines[:MOST] + ([f"{where}: {many} not known"] if more > 0 else []))
 
 
 def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]:

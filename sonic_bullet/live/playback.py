@@ -32,6 +32,7 @@ from sonic_bullet.live.latencies import Latencies
 from sonic_bullet.live.sample_queue import SampleQueue
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, PlaybackWarning
 
 FULL_SCALE_PA = 20.0
@@ -87,10 +88,10 @@ class PlaybackReport:
     clipped: int
 
     def __str__(self) -> str:
-        runs = "1 underrun" if self.underruns == 1 else f"{self.underruns} underruns"
+        runs = format_count(self.underruns, "underrun")
         silent = f" ({self.silent_s:.2f} s silent)" if self.underruns else ""
         late = f"latency {self.latency_median_s * 1e3:.1f} ms (worst {self.latency_worst_s * 1e3:.1f}), "
-        clipped = f", {self.clipped} samples clipped at full scale" if self.clipped else ""
+        clipped = f", {format_count(self.clipped, 'sample')} clipped at full scale" if self.clipped else ""
         return f"{self.seconds:.2f} s played on {self.card}, {late if self.seconds else ''}{runs}{silent}{clipped}"
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from sonic_bullet.modal.sparse.factor import factorise
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
 
 BLOCK = 8
@@ -96,7 +97,7 @@ def solve(
         value = shift + 1 / theta[:converged]
         elastic = value[rigid:]
         if say:
-            say(f"{max(0, len(elastic))} modes found")
+            say(f"{format_count(max(0, len(elastic)), 'mode')} found")
         if len(elastic) and (len(elastic) >= most or enough(elastic) or used >= size - width):
             return _checked(value[: rigid + most], basis[:, :used] @ ritz[:, : min(converged, rigid + most)], rigid)
     raise ModalError(f"only {max(0, converged - rigid)} of {most} modes converged", "give a smaller count or to_hz")

@@ -23,6 +23,7 @@ from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.sectors import MOST_MODES, Wanted
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Material, ModalModel, Shape
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
@@ -108,7 +109,7 @@ def analyse(
         note += f"; cut at {MOST_MODES} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
     dropped = len(lam) - len(alive)
     if dropped:
-        note += f"; {dropped} overdamped modes dropped"
+        note += f"; {format_count(dropped, 'overdamped mode')} dropped"
     volume = unit.volume * of.length_m**3
     mass = volume * material.density_kg_m3
     large = oversize(unit.vertex_m, mass)

@@ -176,11 +176,6 @@ def as_rows(
     return tuple(made)
 
 
-def format_count(number: int, one: str, several: str = "") -> str:
-    """How many there are of what: "1 strike", "2 strikes"; several: where a plural is not the singular with an s."""
-    return f"{number} {one if number == 1 else several or one + 's'}"
-
-
 def nearest(word: str, known: Collection[str], otherwise: str = "") -> str:
     """A remedy for a word that is none of ``known``: the nearest of them, or all where nothing is near, ``otherwise``
     behind them.

@@ -22,6 +22,7 @@ from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Microphone
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import LogError, SonicBulletError
 from sonic_bullet.render.ringing_on import TAIL_DB, as_tail_db
 from sonic_bullet.render.silence import body_notes, render_notes, silence_notes, why_silent
@@ -152,7 +153,7 @@ def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> 
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:
             if say is not None:
-                say(f"how {body.model.mode_count} modes of {body.name} radiate")
+                say(f"how {format_count(body.model.mode_count, 'mode')} of {body.name} radiate")
             radiation_of(body.model, log.air)
 
 

@@ -18,6 +18,7 @@ from sonic_bullet.radiation.compact import COMPACT
 from sonic_bullet.radiation.radiated import radiation_note
 from sonic_bullet.records import Array, Body, Microphone, Vibrometer
 from sonic_bullet.records.contacts import Contacts
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.render.resonator import Resonator, build_resonator
@@ -126,7 +127,7 @@ def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     if len(hand):
         return (
             f"{_names(log.bodies[i] for i in hand)} was moved by hand in {int(moved[hand].max())} of "
-            f"{len(log.steps)} steps, "
+            f"{format_count(len(log.steps), 'step')}, "
             "and what is set somewhere presses on nothing; move it by forces, velocities or constraints"
         )
     if len(rows):

@@ -29,6 +29,7 @@ from sonic_bullet.parallel import one_thread, parallel_map, said_here
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, shown
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeWarning, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
@@ -139,7 +140,7 @@ def solved_bodies(
             mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared, say)
             for (name, _), model in zip(one.parts, mine, strict=True):
                 if air is not None and model.mode_count:
-                    say(f"how {model.mode_count} modes of {name} radiate")
+                    say(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                     with _naming(name, len(one.parts)):
                         radiation_of(model, air)
             shared += mine

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
+from scipy.signal import lfilter
 
 from sonic_bullet.cli import main
 from sonic_bullet.files.case_schema import case_schema
@@ -276,6 +277,40 @@ def test_what_cannot_be_cut_is_named_and_leaves_nothing(place: Path, capfd: pyte
     assert not (place / "mine").exists()
     assert run("case", "new", "mine", "a.wav", "--split") == 0
     assert json.loads((place / "mine" / "case.json").read_text())["recordings"][0]["file"] == "a.wav"
+
+
+def test_new_says_what_a_case_without_a_mesh_cannot_do(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("case", "new", "mine", "a.wav") == 0
+    said = capfd.readouterr().out
+    assert "mine/case.json: 1 recording\n" in said
+    assert "no E/ρ" in said and "--mesh" in said
+    assert run("case", "new", "other", "a.wav", "--mesh", "bar.obj", "--material", "steel") == 0
+    assert "--mesh" not in capfd.readouterr().out
+    assert run("case", "check", "other") == 0
+    assert "other: 1 strike (1 fit)" in capfd.readouterr().out
+
+
+def test_new_says_that_a_recording_holds_several_hits(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    one, sr = soundfile.read("a.wav")
+    soundfile.write("long.wav", np.tile(np.append(np.zeros(4410), one), 3), sr, subtype="FLOAT")
+    assert run("case", "new", "mine", "long.wav", "a.wav") == 0
+    said = capfd.readouterr().err
+    assert "long.wav holds 3 hits: --split cuts it into takes" in said and "a.wav holds" not in said
+
+
+@pytest.mark.parametrize("kind", ["noise", "hum", "rumble"])
+def test_split_finds_no_hit_in_what_lasts(place: Path, capfd: pytest.CaptureFixture[str], kind: str) -> None:
+    t = np.arange(44_100) / 44_100
+    noise = np.random.default_rng(3).standard_normal(len(t))
+    sound = {
+        "noise": 0.1 * noise,
+        "hum": 0.3 * np.sin(2 * np.pi * 50 * t) + 1e-3 * noise,
+        "rumble": 0.01 * lfilter([1], [1, -0.98], noise),
+    }[kind]
+    soundfile.write("lasting.wav", sound, 44_100, subtype="FLOAT")
+    assert run("case", "new", "mine", "a.wav", "lasting.wav", "--split") == 2
+    assert "no hit found in lasting.wav" in capfd.readouterr().err
+    assert not (place / "mine").exists()
 
 
 def test_check_refuses_a_take_that_is_too_short(place: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -37,12 +37,23 @@ def spoiled() -> Struck:
     return replace(body, recorded=replace(body.recorded, signals=signals))
 
 
+def lossy_at(*place_m: tuple[float, float, float] | None) -> Struck:
+    """The same, of strikes whose places are said to be these, the last of them those that follow."""
+    body = lossy()
+    places = [place_m[min(i, len(place_m) - 1)] for i in range(len(body.recordings))]
+    moved = tuple(replace(r, position_m=at) for r, at in zip(body.recordings, places, strict=True))
+    assert body.recorded is not None
+    return replace(body, recordings=moved, recorded=replace(body.recorded, recordings=moved))
+
+
 CASES: list[tuple[Callable[[], Struck], tuple[Any, ...], str, str]] = [
     (recorded, (), "none", ""),
     (one_band_louder, (), "unexplained", "dB more than played between"),
     (one_mode_more, (), "unexplained", "dB more than played between"),
     (lossy, (DampingLaw,), "explained", ""),
     (lossy, (), "unexplained", "most of it in the"),
+    (lambda: lossy_at(None), (), "unexplained", "no strike has a place"),
+    (lambda: lossy_at(None, (0.0, 0.0, 0.1)), (), "unexplained", "all strikes are at one place"),
     (spoiled, (), "unexplained", "nothing could be compared"),
 ]
 
@@ -50,7 +61,10 @@ CASES: list[tuple[Callable[[], Struck], tuple[Any, ...], str, str]] = [
 @pytest.mark.parametrize(
     ("made", "effects", "verdict", "words"),
     CASES,
-    ids=["none", "band off", "band off by a mode more", "explained", "unexplained", "nothing compared"],
+    ids=[
+        *("none", "band off", "band off by a mode more", "explained", "unexplained"),
+        *("no places", "one place", "nothing compared"),
+    ],
 )
 def test_every_verdict_can_be_written(
     tmp_path: Path,

@@ -38,6 +38,7 @@ from sonic_bullet.files import (
     write_log,
 )
 from sonic_bullet.machine.worker import note_closing, stop_word
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, SceneError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -239,7 +240,7 @@ def summary(report: AudioReport, log: ContactLog) -> str:
     """What was written, in one line."""
     from sonic_bullet.plots.scene_plot import quantity
 
-    channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"
+    channels = format_count(report.channels, "channel")
     scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
     units = {quantity(sensor)[1] for sensor in log.sensors}
     unit = units.pop() if len(units) == 1 else "(mixed units)"

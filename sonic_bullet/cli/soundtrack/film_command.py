@@ -11,6 +11,7 @@ import click
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option, scene_options
 from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
 
 def _summary(output: str, report: FilmReport) -> str:
     width, height = report.size
-    channels = "1 channel" if report.channels == 1 else f"{report.channels} channels"
+    channels = format_count(report.channels, "channel")
     return (
         f"{output}: {float(report.pictures / report.fps):.3f} s, {report.pictures} pictures of {width}x{height} at "
         f"{report.fps} a second, {report.codec}, {channels}, {report.sr} Hz, scaled by {report.gain_per_pa:.4g}"
@@ -142,7 +143,8 @@ def _summary(output: str, report: FilmReport) -> str:
 
 
 def _clipped(report: FilmReport) -> tuple[str, ...]:
-    return (f"{report.clipped} samples were clipped at full scale; --peak-dbfs -1 avoids it",) * bool(report.clipped)
+    many = format_count(report.clipped, "sample was", "samples were")
+    return (f"{many} clipped at full scale; --peak-dbfs -1 avoids it",) * bool(report.clipped)
 
 
 def _described(output: str, report: FilmReport, notes: tuple[str, ...]) -> dict[str, Any]:

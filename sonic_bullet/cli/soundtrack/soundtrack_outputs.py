@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sonic_bullet.cli.output import folder_place
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ class Soundtrack:
                 time_reference=self.time_reference,
             )
         )
-        said = f"{self.wish.stems}{os.sep}: {len(reports)} stems"
+        said = f"{self.wish.stems}{os.sep}: {format_count(len(reports), 'stem')}"
         older = {one.name for one in Path(self.wish.stems).glob("[0-9][0-9]*-*.wav")} - {
             Path(report.path).name for report in reports
         }

@@ -11,6 +11,7 @@ from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.comparing.inputs.log_differences import same_model
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import ModalModel
+from sonic_bullet.records.counts import format_count
 
 ASSURED = 32
 """Modes whose shapes are compared."""
@@ -39,7 +40,7 @@ def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
         words.append(f"decays {_spread(decay, '%')}")
         values["decay_percent"] = round(float(np.median(decay)), 4)
     if a.mode_count != b.mode_count:
-        words.append(f"{a.mode_count} → {b.mode_count} modes")
+        words.append(f"{a.mode_count} → {format_count(b.mode_count, 'mode')}")
     if np.array_equal(a.vertex_m, b.vertex_m):
         k = min(n, ASSURED)
         x, y = (model.shape[:, :, :k].reshape(-1, k).astype(float) for model in (a, b))

@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.comparing.outcome.sound_effects import level_words
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 
 DELAY_MOST_S = 0.5
 GROUP_DELAY = 16
@@ -134,7 +135,7 @@ def _clipping(a: Array, b: Array) -> list[Consequence]:
     one, other = _flat_tops(a), _flat_tops(b)
     if other[0] <= one[0]:
         return []
-    words = f"clipped at ±{other[1]:.4g}: {other[0]} samples"
+    words = f"clipped at ±{other[1]:.4g}: {format_count(other[0], 'sample')}"
     return [Consequence("clipping", words, None, {"samples": other[0], "limit": other[1]})]
 
 

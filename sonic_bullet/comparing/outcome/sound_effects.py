@@ -13,6 +13,7 @@ import numpy as np
 
 from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 
 OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
 QUIET_DB = -80.0
@@ -43,7 +44,7 @@ def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     found: list[Consequence] = []
     n = min(a.shape[1], b.shape[1])
     if a.shape[0] != b.shape[0]:
-        return [Consequence("channels", f"A has {a.shape[0]} channels, B {b.shape[0]}", 0.0)]
+        return [Consequence("channels", f"A has {format_count(a.shape[0], 'channel')}, B {b.shape[0]}", 0.0)]
     where = np.flatnonzero((a[:, :n] != b[:, :n]).any(axis=0))
     if len(where):
         first = int(where[0])
@@ -116,7 +117,8 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
         at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > FRAME_S), None)
         longer = one if len(one) > len(other) else other
         at = longer[shared] if at is None else at
-        return Consequence("onset", f"{len(one)} onsets in A, {len(other)} in B", at, {"a_s": one, "b_s": other})
+        words = f"{format_count(len(one), 'onset')} in A, {len(other)} in B"
+        return Consequence("onset", words, at, {"a_s": one, "b_s": other})
     moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > FRAME_S / 2]
     if not moved:
         return None

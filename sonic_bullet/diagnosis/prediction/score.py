@@ -34,6 +34,7 @@ from sonic_bullet.estimator.lines.log_spectral import (
     with_noise,
 )
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 
 # rms of a noisy take of a cell with power over noise ABOVE
 EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * ABOVE))
@@ -166,7 +167,7 @@ class Take:
         if wrong := int((~np.isfinite(self.sample)).sum()):
             return f"holds {wrong} samples that are no numbers"
         if len(self.sample) < min(WINDOWS):
-            return f"holds {len(self.sample)} samples after the onset, and {min(WINDOWS)} are needed"
+            return f"holds {format_count(len(self.sample), 'sample')} after the onset, and {min(WINDOWS)} are needed"
         made = self._made(p)
         if not np.isfinite(made).all():
             return "is played by the model with samples that are no numbers"

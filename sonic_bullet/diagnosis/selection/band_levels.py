@@ -25,6 +25,7 @@ from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.estimator.lines.log_spectral import ABOVE, Floor
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 
 WINDOWS = (512, 1024, 2048, 4096, 8192)
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
@@ -54,7 +55,7 @@ class BandOff:
             else f"after the first {1000 * RULES.early_s:.0f} ms"
         )
         where = f"between {self.from_hz / 1000:.2g} and {self.to_hz / 1000:.2g} kHz"
-        strikes = "1 strike" if self.strikes == 1 else f"{self.strikes} strikes"
+        strikes = format_count(self.strikes, "strike")
         return f"recorded {abs(self.recorded_over_played_db):.1f} dB {less} than played {where} {when}, {strikes}"
 
 

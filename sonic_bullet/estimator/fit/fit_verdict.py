@@ -20,6 +20,7 @@ from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 
 DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their spreads
 AMPLITUDE_MISFIT = 0.25
@@ -44,7 +45,7 @@ def finished(
     covariance = np.full((5, 5), np.nan)
     unsaid: list[str] = []
     for name in damping.said:
-        unsaid.append(f"{name} (the decays of {_decays_seen(evidence)} lines do not tell it)")
+        unsaid.append(f"{name} (the decays of {format_count(_decays_seen(evidence), 'line')} do not tell it)")
     covariance[:2, :2] = damping.covariance
     _elastic(covariance, information, unsaid, bool(objects))
     tolerance = scale_tolerance(objects)

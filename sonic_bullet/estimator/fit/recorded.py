@@ -28,6 +28,7 @@ from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Material
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
 MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
@@ -130,13 +131,13 @@ def gather(
             raise FileError(f"cannot read {gone[0]}: no such file", "a fit needs the audio of its 'fit' strikes")
         sounds = None
         if played:  # before the modes, which take longer: a recording that will not do is reported at once
-            say(f"reading {len(played)} recordings of {name or 'the object'}")
+            say(f"reading {format_count(len(played), 'recording')} of {name or 'the object'}")
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
         if sounds is not None:
             signals, sr, remarks, before = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
-            say(f"listening to {len(played)} recordings of {name or 'the object'}")
+            say(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             still = without_hum(signals, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)

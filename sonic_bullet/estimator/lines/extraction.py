@@ -32,6 +32,7 @@ from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured,
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 
 FASTEST_PER_S = 3000.0
@@ -98,8 +99,7 @@ def extract(
     doubts, hopeless = onset.describe_doubts(x, sr)
     if hits := part.describe_hits(sr):
         hits += f": only what comes before the second, {len(x) / sr:.3g} s, is used"
-    cut = f"{clipped} samples are clipped: amplitudes and early decays are not to be trusted" if clipped else ""
-    notes = [*filter(None, [hits, cut, drift, describe_hum(hum_hz)]), *doubts]
+    notes = [*filter(None, [hits, onset.describe_clipping(clipped), drift, describe_hum(hum_hz)]), *doubts]
     found = (
         (Sinusoids(np.zeros(0, complex), np.zeros(0, complex)), white(_rms(x), sr))
         if hopeless
@@ -286,10 +286,10 @@ def _features(
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
     tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
-    for which, said in ((tone, "do not decay"), (vague & ~tone & whole, "have no decay that can be told")):
+    for which, said in ((tone, "without decay"), (vague & ~tone & whole, "without a decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])
-            notes.append(f"{int(which.sum())} lines {said} and are left out: {shown} Hz")
+            notes.append(f"{format_count(int(which.sum()), 'line')} {said} left out: {shown} Hz")
     modal = _modal(explained, banded, notes)
     amplitude, turn = np.abs(modes.amplitude), np.angle(modes.amplitude)
     pinned = (sd[1] > 0) & (np.abs(decay / FASTEST_PER_S - PINNED) < 1.001 * (1 - PINNED)) & (len(noise.density) > 2)

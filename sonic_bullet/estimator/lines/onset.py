@@ -16,11 +16,15 @@ import numpy as np
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.strike_times import GAP_S, find_strikes
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 
 BLOCK_S = 1e-3
 NEAR_DB = 20.0
 FALLS = 1.1  # the loudest block of a strike's first 50 ms over those after
 CLIPPED_RUN = 3
+FADES = (
+    2.0  # energy of a sound's first half over its second: noise of a quarter second comes to 1.1, takes to 3 and more
+)
 SHOWN = 6  # hits whose times are said
 REACH = 64  # samples that the first guess may be off
 SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
@@ -79,6 +83,17 @@ def span(signal: Array, sr: int) -> Span:
     return _until_next(strikes, sr, start, len(signal))
 
 
+def is_struck(signal: Array, sr: int) -> bool:
+    """Whether a recording (n,) that is not silent holds a hit: an onset stands out, or what follows the loudest rise
+    fades, as noise, hum and tones that last do not.
+    """
+    if len(find_strikes(signal, sr)):
+        return True
+    x = signal[span(signal, sr).start :]
+    half = len(x) // 2
+    return bool((x[:half] ** 2).sum() >= FADES * (x[half : 2 * half] ** 2).sum())
+
+
 def until_next_hit(signal: Array, sr: int, start: int) -> Span:
     """The impact of a recording (n,) that begins at sample ``start``."""
     return _until_next(find_strikes(signal, sr), sr, start, len(signal))
@@ -112,6 +127,12 @@ def clipped_samples(signal: Array) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], top, [False]]).astype(np.int8)))
     run = edges[1::2] - edges[::2]
     return int(run[run >= CLIPPED_RUN].sum())
+
+
+def describe_clipping(clipped: int) -> str:
+    """Say how many samples are clipped; nothing of none."""
+    many = format_count(clipped, "sample is", "samples are")
+    return f"{many} clipped: amplitudes and early decays are not to be trusted" if clipped else ""
 
 
 def describe_doubts(x: Array, sr: int) -> tuple[list[str], bool]:

@@ -19,6 +19,7 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing.stuffing import winding_number
 from sonic_bullet.records import Array
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 
 CAP_PART = 0.05
@@ -135,7 +136,7 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
         flip = _flips(face)
         if flip.any():
             face = np.where(flip[:, None], face[:, ::-1], face)
-            note = f"; {int(flip.sum())} faces turned to agree with their neighbours"
+            note = f"; {format_count(int(flip.sum()), 'face')} turned to agree with neighbours"
             label = pieces_of_faces(face)
             for piece in range(int(label.max()) + 1):
                 mine = label == piece
@@ -193,7 +194,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     area = geometry.face_areas_m2(vertex_m, face)
     solid = _solid_pieces(vertex_m, face)
     if 0.5 * area.sum() < area[solid].sum() < area.sum() and thickness_m is None:
-        note += f"; {len(np.unique(pieces_of_faces(face)[~solid]))} open pieces left out"
+        note += f"; {format_count(len(np.unique(pieces_of_faces(face)[~solid])), 'open piece')} left out"
         face, area = face[solid], area[solid]
     total = float(area.sum())
     volume = geometry.volume_m3(vertex_m, face)

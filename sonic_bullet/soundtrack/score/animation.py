@@ -14,6 +14,7 @@ from sonic_bullet.listener.frames import MOTION
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_kinds, as_number, shown
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AnimationError
 
 SLOWEST_FPS, FASTEST_FPS = 5.0, 10_000.0
@@ -70,7 +71,8 @@ class Animation:
         length = np.linalg.norm(turn, axis=2, keepdims=True)
         if not bodies or len(place) < 3:
             raise AnimationError(
-                f"{len(bodies)} bodies in {len(place)} frames", "an animation needs a body and three frames"
+                f"{format_count(len(bodies), 'body', 'bodies')} in {format_count(len(place), 'frame')}",
+                "an animation needs a body and three frames",
             )
         turn /= length
         names = [one.name for one in bodies]

@@ -21,6 +21,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.animated import AnimatedBody, matrices, rotation
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Contacts, Step
+from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
@@ -72,10 +73,11 @@ def move_notes(log: ContactLog, moves: Sequence[Moves]) -> tuple[str, ...]:
         name = log.bodies[one.index].name
         if one.drives:
             steps = sum(stop - first for first, stop in one.drives)
-            said.append(f"{name} is driven by hand in {steps} steps from {start_s[one.drives[0][0]]:.3f} s")
+            many = format_count(steps, "step")
+            said.append(f"{name} is driven by hand in {many} from {start_s[one.drives[0][0]]:.3f} s")
         if one.teleports:
             first = start_s[one.teleports[0]]
-            more = f" and {len(one.teleports) - 1} times more" if len(one.teleports) > 1 else ""
+            more = f" and {format_count(len(one.teleports) - 1, 'time')} more" if len(one.teleports) > 1 else ""
             said.append(f"{name} is set elsewhere at {first:.3f} s{more}: a teleport, which is silent")
     return tuple(said)
 
