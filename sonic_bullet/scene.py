@@ -121,8 +121,7 @@ def render_scene(
             with suppress(SonicBulletError):  # a script's own listener may keep nothing
                 error.partial = stage.result(()) if stage.listener is not None else None  # type: ignore[union-attr]
             raise
-        stage.check_names()
-        return stage.result(notes, tail_db)
+        return stage.result((*notes, *stage.check_names()), tail_db)
 
 
 def run_scene(
@@ -152,8 +151,7 @@ def run_scene(
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():
         notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"), progress, say)
-        stage.check_names()
-        return (*notes, *stage.need_listener().notes)
+        return (*notes, *stage.check_names(), *stage.need_listener().notes)
 
 
 def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
@@ -231,14 +229,15 @@ class _Stage:
             raise SceneError(f"scene '{self.path.name}' made no physics step", "call stepSimulation in it")
         return self.listener
 
-    def check_names(self) -> None:
-        """Raise SceneError where a name that was given a material, or silenced, is nobody's who is or was there."""
+    def check_names(self) -> tuple[str, ...]:
+        """Lines on who is silenced and silent anyway. Raises SceneError where a name of the choice is nobody's."""
+        world = self.need_listener().world
         if self.choice:
-            world = self.need_listener().world
             here = world.record_names([(*who, None) for who in world.all_links()])
             self.choice.check_names([*here, *(body.name for body in world.bodies)], f"scene '{self.path.name}'")
             if self.adds:
                 self.choice.check_added([body.name for body in world.bodies if body.material], self.path.name)
+        return self.choice.silent_notes(world.bodies)
 
     def result(self, notes: tuple[str, ...], tail_db: float | None = None) -> RenderResult:
         listener = self.need_listener()

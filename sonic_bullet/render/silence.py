@@ -70,7 +70,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     """
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
-    alone = [b for i in added if i not in touched and _can_sound(b := log.bodies[i])]
+    alone = [b for i in added if i not in touched and can_sound(b := log.bodies[i])]
     models = [(log.bodies[i], model) for i in added if (model := log.bodies[i].model) is not None and len(model.face)]
     dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
     notes = []
@@ -87,7 +87,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _can_sound(body: Body) -> bool:
+def can_sound(body: Body) -> bool:
     """Whether it may ring or click: ground, which has no modes and never moves, makes no sound in any case."""
     return body.model is not None or body.mass_kg > 0
 
@@ -106,7 +106,7 @@ def why_silent(log: ContactLog) -> str | None:
         return _untouched(log, rows, added)
     silenced = [body for body in log.bodies if body.silent]
     sounding = np.array(
-        [one and not body.silent and _can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
+        [one and not body.silent and can_sound(body) for one, body in zip(added, log.bodies, strict=True)]
     )
     if silenced and not sounding[np.concatenate([rows.a[mine], rows.b[mine]])].any():
         return f"every sounding body that was touched is silenced by --silent: {_names(silenced)}"

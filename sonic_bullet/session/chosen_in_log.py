@@ -42,8 +42,9 @@ def with_choice(
             bodies.append(replace(_made_of(body, material, where, solved, say), silent=silent))
         else:
             bodies.append(replace(body, silent=silent))
+    idle = choice.silent_notes(body for body in log.bodies if not body.silent)
     said = ", ".join(f"{name} is {of}" for name, of in changed.items())
-    return replace(log, bodies=tuple(bodies)), (f"{said}: {AS_RECORDED}",) if changed else ()
+    return replace(log, bodies=tuple(bodies)), (*((f"{said}: {AS_RECORDED}",) if changed else ()), *idle)
 
 
 def _made_of(

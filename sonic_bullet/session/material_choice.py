@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.listener.names import matched
-from sonic_bullet.records import Material
+from sonic_bullet.records import Body, Material
 from sonic_bullet.records.coerce import as_items, shown
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.render.silence import can_sound
 from sonic_bullet.session.arguments import as_material, as_name
 
 if TYPE_CHECKING:
@@ -72,6 +73,15 @@ class MaterialChoice:
             return ""
         rest = f"={self.named[one].name}" if one in self.named else ""
         return f'; quotes hold a name with a space together: "{spaced[-1]}{rest}"'
+
+    def silent_notes(self, bodies: Iterable[Body]) -> tuple[str, ...]:
+        """A line for each name that is silenced and of none of these bodies that sounds without it."""
+        sounding = [body.name for body in bodies if body.material is not None and can_sound(body)]
+        return tuple(
+            f"{shown(one)} is silent anyway: silencing it changes nothing"
+            for one in sorted(self.silent)
+            if not any(matched(name, (one,)) for name in sounding)
+        )
 
     def check_added(self, added: Collection[str], scene: str) -> None:
         """Raise SceneError where a name that was given a material is nobody's whom a scene's own listener added."""

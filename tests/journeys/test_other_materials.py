@@ -216,6 +216,23 @@ def test_a_silent_body_is_left_out_of_the_sound_alone(silent: str) -> None:
     np.testing.assert_array_equal(heard("new.npz"), heard("log.npz", "--silent", silent))  # the log keeps it
 
 
+def test_who_is_silent_anyway_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    """Of a board to which nobody gave a material, and of a bar that sounds without the option."""
+    heard("scene.py", "--silent", "body 0", "--silent", "bar")
+    said = capfd.readouterr().err
+    assert "'body 0' is silent anyway: silencing it changes nothing" in said and "'bar' is silent" not in said
+
+
+def test_ground_is_silent_anyway(capfd: pytest.CaptureFixture[str]) -> None:
+    Path("grounded.py").write_text(SCRIPT.replace("[0.1, 0.1, 0.02]", "[5, 5, 0.02]"))
+    heard("grounded.py")
+    assert "body 0 is ground" in (said := capfd.readouterr().err) and "anyway" not in said
+    shutil.move("new.npz", "grounded.npz")
+    for source in ("grounded.py", "grounded.npz"):
+        heard(source, "--silent", "body 0", "--silent", "bar")
+        assert "'body 0' is silent anyway" in (said := capfd.readouterr().err) and "'bar' is silent" not in said
+
+
 def test_all_silent_is_said(capfd: pytest.CaptureFixture[str]) -> None:
     assert not heard("log.npz", "--silent", "bar", "--silent", "ball").any()
     assert "every sounding body that was touched is silenced by --silent" in capfd.readouterr().err
