@@ -22,11 +22,10 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -155,16 +154,6 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     effects: tuple[dict[str, Any], ...] = ()
     residual: ResidualForm | None = None
     provenance: Provenance | None = None
-
-
-if not TYPE_CHECKING:  # or a type checker would take any name for one of this module
-
-    def __getattr__(name: str) -> type:
-        """`Restitution` by the name that it had in earlier versions, with a DeprecationWarning."""
-        if name != "Impact":
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        warnings.warn("sonic_bullet.presets.Impact is now Restitution", DeprecationWarning, stacklevel=2)
-        return Restitution
 
 
 def load_material(name: str | os.PathLike[str]) -> Material:

@@ -29,7 +29,7 @@ class ContactLog:
     is. untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
     events: what happened besides contacts, in its order. engine: the simulator's settings at the first step, under its
     own names; what is not among them is not known. versions: of sonic_bullet, the packages that its numbers hang on and
-    the simulator, by name; of older logs none. changes: what was set otherwise later, of engine and bodies, in order;
+    the simulator, by name. changes: what was set otherwise later, of engine and bodies, in order;
     `dynamics` and `settings` give what holds at a step. residual: whether it is rendered with what materials sound
     beside their modes; supports: whether with what bodies stand on.
     """

@@ -127,17 +127,16 @@ def _is_packed(name: str, packed: str | None) -> bool:
 def read_container(
     path: str | os.PathLike[str],
     kind: type[Header],
-    form: str | tuple[str, ...],
+    form: str,
     what: str,
     packed: str | None = None,
     lazy: Collection[str] = (),
 ) -> tuple[Header, dict[str, Array]]:
     """The header as ``kind`` and all arrays, by name, read-only.
 
-    form: the format id asked for, or several that will do, the newest first; what: the thing, in words, for messages
-    ("contact log"); packed: what the names of entries begin with that may be deflated; lazy: arrays that stay in the
-    file where they have over `LOADED_BYTES` (`RowsOfEntry`: checked like the others, by blocks, and then used like them
-    by [start:stop]).
+    form: the format id asked for; what: the thing, in words, for messages ("contact log"); packed: what the names of
+    entries begin with that may be deflated; lazy: arrays that stay in the file where they have over `LOADED_BYTES`
+    (`RowsOfEntry`: checked like the others, by blocks, and then used like them by [start:stop]).
 
     Raises FileError where there is no readable file, LogError where it is cut, foreign, pickled, holds another
     compressed entry, one twice or beside its directory, or lies about a size.
@@ -163,10 +162,17 @@ def read_container(
         text = arrays.pop(HEADER).tobytes()
         where = f"{path} is no {what}"
         found = decode_json(text, _Format, where, LogError, REMEDY).format
-        forms = (form,) if isinstance(form, str) else form
-        if found not in forms:
-            raise LogError(f"{path} has format '{found}', wanted '{forms[0]}'", f"give a {what} of this version")
+        if _is_older(found, form):
+            raise LogError(f"{path} is a {what} of format '{found}', which is no longer read", "make it anew")
+        if found != form:
+            raise LogError(f"{path} has format '{found}', wanted '{form}'", f"give a {what} of this version")
         return decode_json(text, kind, where, LogError, REMEDY), arrays
+
+
+def _is_older(found: str, form: str) -> bool:
+    """Whether a format is ``form`` with a lower number."""
+    (kind, _, number), (known, _, latest) = found.rpartition("/"), form.rpartition("/")
+    return kind == known and number.isdecimal() and int(number) < int(latest)
 
 
 def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:

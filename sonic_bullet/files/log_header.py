@@ -86,7 +86,7 @@ class _ModalSum(msgspec.Struct, tag="modal-sum"):
 
 
 class LogHeader(msgspec.Struct):
-    """The header. What older formats lack has its default: not known, or none of it."""
+    """The header. What a log may leave out has its default: not known, or none of it."""
 
     format: str
     sr: int

@@ -31,14 +31,11 @@ their own:
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting, silent; of all: engine, versions, residual, supports (see `Body`,
           `ContactLog`)
-    format "sonic-bullet-contacts/2"        the same without pose_body (a step's bodies are the first of the log),
-          changes and all that the lines above name; models' arrays are not deflated, and of their own types
-    format "sonic-bullet-contacts/1"        and without events
 
 Steps are written and read by blocks (`step_entries`): a log may be larger than the memory.
 
-A reader checks sizes before it allocates and records check their invariants, so a cut, foreign or forged file is one
-line of LogError.
+A reader checks sizes before it allocates and records check their invariants, so a cut or foreign file is one line of
+LogError.
 """
 
 from __future__ import annotations
@@ -74,8 +71,7 @@ from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import LogError
 
-LOG_FORMATS = ("sonic-bullet-contacts/3", "sonic-bullet-contacts/2", "sonic-bullet-contacts/1")
-"""What is read; the first is what is written."""
+LOG_FORMAT = "sonic-bullet-contacts/3"
 
 
 def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "included") -> None:
@@ -86,7 +82,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
     materials, material_of = distinct([body.material for body in log.bodies], material_key)
     entries, model_of, model_arrays = pack_models([body.model for body in log.bodies], models)
     header = LogHeader(
-        format=LOG_FORMATS[0],
+        format=LOG_FORMAT,
         sr=int(log.sr),
         seed=int(log.seed),
         air_density_kg_m3=float(log.air.density_kg_m3),
@@ -124,7 +120,7 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     not).
     """
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, LogHeader, LOG_FORMATS, "contact log", PACKED, LAZY)
+    header, arrays = read_container(path, LogHeader, LOG_FORMAT, "contact log", PACKED, LAZY)
     kept = recalled_models(header.models, [(body.model, body.name) for body in header.bodies], path)
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)
@@ -158,7 +154,7 @@ def _unpack_log(
     ]
     return ContactLog(
         bodies=tuple(bodies),
-        steps=read_steps(arrays, b, path, nobody_goes=header.format != LOG_FORMATS[0]),
+        steps=read_steps(arrays, b, path),
         sensors=tuple(unpack_sensor(sensor) for sensor in header.sensors),
         sr=header.sr,
         seed=header.seed,

@@ -1,7 +1,6 @@
 """Modal models on disk, alone, inside a contact log or in the cache beside it: every number bit for bit, no pickle.
 
 format "sonic-bullet-model/2"           one model: model0_<array> as `logs` describes them, in `container`'s npz
-format "sonic-bullet-model/1"           its arrays are not deflated, and of their own types
 
     array (…) of n bytes each -> planes (n, …) u1: all first bytes, all second ones … -> deflated
     shape (v, 3, m) f4 = q·2^e -> differences of q u2 in planes, e (m,) i2;   else, as it is, in planes
@@ -32,8 +31,7 @@ from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import FileError, LogError, excerpt
 from sonic_bullet.records.mode_shapes import differences, from_multiples, summed, whole_multiples
 
-MODEL_FORMATS = ("sonic-bullet-model/2", "sonic-bullet-model/1")
-"""What is read; the first is what is written."""
+MODEL_FORMAT = "sonic-bullet-model/2"
 MODELS = ("included", "reference")
 """Where a log's models are: in it, or in the cache."""
 PACKED = "model"
@@ -75,7 +73,7 @@ class _ModelHeader(msgspec.Struct):
 
 def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
     """Write one modal model, whole or not at all. Raises FileError."""
-    write_container(path, _ModelHeader(MODEL_FORMATS[0], _pack_model(model)), _packed_arrays(model, 0), PACKED)
+    write_container(path, _ModelHeader(MODEL_FORMAT, _pack_model(model)), _packed_arrays(model, 0), PACKED)
 
 
 def read_model(path: str | os.PathLike[str]) -> ModalModel:
@@ -83,7 +81,7 @@ def read_model(path: str | os.PathLike[str]) -> ModalModel:
 
     Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
     """
-    header, arrays = read_container(path, _ModelHeader, MODEL_FORMATS, "modal model", PACKED)
+    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model", PACKED)
     with reading(path, "modal model", LogError, REMEDY):
         return _unpack_model(header.model, arrays, 0, path)
 
@@ -224,10 +222,7 @@ def _planes(array: Array) -> Array:
 
 
 def _taken(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:
-    """The array ``name`` of planes, or as it is in files written before there were any. Raises LogError."""
-    found = arrays.get(name)
-    if found is None or found.dtype != np.uint8:
-        return take(arrays, name, dtype, shape, path)
+    """The array of the planes ``name``. Raises LogError."""
     planes = take(arrays, name, np.uint8, (np.dtype(dtype).itemsize, *shape), path)
     found = np.ascontiguousarray(np.moveaxis(planes, 0, -1)).view(dtype)
     return np.asarray(found.reshape(planes.shape[1:]))

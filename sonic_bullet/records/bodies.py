@@ -9,7 +9,6 @@ frame PyBullet calls inertial: origin at the centre of mass, axes as `getBasePos
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
@@ -296,9 +295,3 @@ class ModalModel:
     def omega0_squared_per_s2(self) -> Array:
         """Eigenvalues λ = ω² + d² (m,), of the undamped body [Ren et al. 2013, eq. 7]; NaN decays count as zero."""
         return np.asarray((2 * np.pi * self.freq_hz) ** 2 + np.nan_to_num(self.decay_per_s) ** 2)
-
-    @property
-    def choke_s_m(self) -> Array | None:
-        """Former name of `damping_growth_s_m`."""
-        warnings.warn("ModalModel.choke_s_m is now damping_growth_s_m", DeprecationWarning, stacklevel=2)
-        return self.damping_growth_s_m

@@ -66,7 +66,7 @@ class Body:
     partner. model None: nothing of it vibrates. since_step: the first step in which it exists for the sound;
     until_step: the first in which it does not any more, or -1. dynamics: friction, restitution, damping, mass, as the
     simulator has them when the record begins (see `Change`). options: what was asked of its modes; None where nothing
-    was, or the model was given, or an older log does not say. mounting: how it is held
+    was, or the model was given. mounting: how it is held
     (`records.mounting`). silent: no sensor hears it; it vibrates and touches as it does otherwise.
     """
 

@@ -6,15 +6,12 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from sonic_bullet import effects, presets
+from sonic_bullet import effects
 from sonic_bullet.effects.protocol import Evidence
-from tests.made.models import box_model
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "__pycache__" not in path.parts)
@@ -60,9 +57,6 @@ PRIVATE_WORDS = frozenset(
 Strings are no identifiers: effect ids, and the names in JSON, npz and command lines, stay what files and scripts know.
 """
 
-FORMER_NAMES = {"records/bodies.py": {"choke_s_m"}}
-"""Deprecated public aliases, by file."""
-
 MOST_FILES = 18
 """Python files that a folder holds at most."""
 
@@ -102,10 +96,7 @@ def identifiers(tree: ast.AST) -> Iterator[str]:
 
 def private_words(path: Path) -> set[str]:
     """The identifiers of a file that hold a private word, its own name among them."""
-    former = FORMER_NAMES.get(path.relative_to(PACKAGE).as_posix(), set())
-    return {
-        name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS
-    } - former
+    return {name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS}
 
 
 @pytest.mark.parametrize(
@@ -137,11 +128,6 @@ def test_identifiers_hold_no_private_word() -> None:
     assert found == {}
 
 
-def test_former_names_are_defined_where_they_are_listed() -> None:
-    for file, names in FORMER_NAMES.items():
-        assert names <= set(identifiers(ast.parse((PACKAGE / file).read_text())))
-
-
 def test_no_two_public_classes_have_one_name() -> None:
     places = defaultdict(list)
     for path in MODULES:
@@ -171,7 +157,7 @@ def test_a_folder_is_seen_at_a_glance() -> None:
 
 @pytest.mark.parametrize(
     ("module", "former", "name"),
-    [(effects, "Heard", "ObjectEvidence"), (effects, "Blow", "Impact"), (presets, "Impact", "Restitution")],
+    [(effects, "Heard", "ObjectEvidence"), (effects, "Blow", "Impact")],
 )
 def test_former_public_classes_are_still_found(module: object, former: str, name: str) -> None:
     with pytest.warns(DeprecationWarning, match=name):
@@ -185,9 +171,3 @@ def test_evidence_still_answers_to_its_former_field() -> None:
     evidence = Evidence((), 1.0, 1e-8, 1.0, (), (20.0, 2e4), held_out=True)
     with pytest.warns(DeprecationWarning, match="held_out"):
         assert evidence.on_trial
-
-
-def test_a_model_still_answers_to_its_former_field() -> None:
-    model = replace(box_model((0.1, 0.05, 0.01), (900.0, 2100.0)), damping_growth_s_m=np.array([0.5, 0.7]))
-    with pytest.warns(DeprecationWarning, match="damping_growth_s_m"):
-        assert model.choke_s_m is model.damping_growth_s_m

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import copy
-import io
 import os
-import zipfile
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -125,15 +124,6 @@ def test_degenerate_vertices_of_a_model_end_in_sound(
     assert np.isfinite(render_log(read)).all()
 
 
-def test_a_log_of_the_second_format_reads_as_one_that_does_not_know() -> None:
-    """tests/data/contacts-2.npz is what the last version that wrote format 2 made of the same log."""
-    read = files.read_log(DATA / "contacts-2.npz")
-    assert same(read, replace(log(facts=False), supports=False))  # as that version played it
-    assert not read.engine and not read.versions and not read.changes
-    assert [body.options for body in read.bodies] == [None] * 4
-    assert all("restitution" not in body.dynamics for body in read.bodies)
-
-
 def test_what_is_set_otherwise_holds_from_its_step_on() -> None:
     written = log()
     assert written.settings(0) == {"fixedTimeStep": 1 / 240, "erp": 0.2}
@@ -189,26 +179,19 @@ def test_whatever_is_known_comes_back(
     assert same(files.read_log(tmp_path / "b.npz"), read)
 
 
-@pytest.mark.parametrize("form", [1, 2])
-def test_older_formats_read_as_logs_in_which_nobody_goes(tmp_path: Path, form: int) -> None:
-    """Neither has an entry that says whose poses are whose; the first has no events."""
-    written = replace(log(), events=()) if form == 1 else log()
-    files.write_log(tmp_path / "new.npz", written)
-    with zipfile.ZipFile(tmp_path / "new.npz") as source, zipfile.ZipFile(tmp_path / "old.npz", "w") as target:
-        for name in source.namelist():
-            content = source.read(name)
-            if name == "header.npy":
-                with np.load(tmp_path / "new.npz") as entries:
-                    text = entries["header"].tobytes()
-                old = text.replace(b"sonic-bullet-contacts/3", b"sonic-bullet-contacts/%d" % form)
-                old = old.replace(b',"events":[]', b"") if form == 1 else old
-                assert old != text and (form == 2 or b"events" not in old)
-                stream = io.BytesIO()
-                np.save(stream, np.frombuffer(old, np.uint8))
-                content = stream.getvalue()
-            if name != "pose_body.npy":
-                target.writestr(name, content)
-    assert same(files.read_log(tmp_path / "old.npz"), written)
+@pytest.mark.parametrize(("number", "words"), [(b"2", "no longer read; make it anew"), (b"4", "wanted")])
+def test_logs_and_models_of_other_formats_are_one_line(tmp_path: Path, number: bytes, words: str) -> None:
+    files.write_log(tmp_path / "contacts.npz", log())
+    files.write_model(tmp_path / "model.npz", model())
+    for name, read in (("contacts", files.read_log), ("model", files.read_model)):
+        with np.load(tmp_path / f"{name}.npz") as plain:
+            entries = dict(plain.items())
+        form = re.compile(rb"(sonic-bullet-\w+)/[0-9]")
+        number = b"1" if (name, number) == ("model", b"2") else number
+        text = form.sub(rb"\1/" + number, entries["header"].tobytes())
+        np.savez(tmp_path / f"{name}.npz", **(entries | {"header": np.frombuffer(text, np.uint8)}))
+        with pytest.raises(LogError, match=words):
+            read(tmp_path / f"{name}.npz")
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x05\x06" + bytes(18), b"hello", bytes(1000)])
@@ -240,18 +223,6 @@ def test_shapes_that_were_rounded_are_whole_numbers_in_a_file_and_come_back_bit_
     files.write_model(tmp_path / "exact.npz", model())
     with np.load(tmp_path / "exact.npz") as plain:
         assert plain["model0_shape"].shape == (4, 4, 3, 3) and "model0_shape_exponent" not in plain.files
-
-
-def test_a_model_of_the_first_format_reads_the_same(tmp_path: Path) -> None:
-    """Plain arrays, none of them deflated."""
-    from sonic_bullet.files import models
-    from sonic_bullet.files.container import write_container
-
-    made = rounded_model()
-    plain = {f"model0_{name}": getattr(made, name) for name in models.MODEL_ARRAYS}
-    header = models._ModelHeader("sonic-bullet-model/1", models._pack_model(made))
-    write_container(tmp_path / "old.npz", header, plain)
-    assert same(made, files.read_model(tmp_path / "old.npz"))
 
 
 def test_a_model_of_nothing_but_zeros_is_written_so_that_it_is_read(tmp_path: Path) -> None:

@@ -84,10 +84,8 @@ def step_entries(steps: LogSteps) -> dict[str, Column]:
     }
 
 
-def read_steps(arrays: Mapping[str, Array], bodies: int, path: object, *, nobody_goes: bool) -> LogSteps:
+def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSteps:
     """The steps of a log of so many bodies, every number checked, by blocks.
-
-    nobody_goes: of an older format, in which the poses of a step are those of the first bodies.
 
     Raises LogError, or RecordError for numbers that are none.
     """
@@ -105,10 +103,6 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object, *, nobody
     for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
         as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
     step["dt_s"] = dt
-    take(arrays, "pose_teleported", bool, (p,), path)  # so that there are p of them
-    if nobody_goes:
-        count = np.diff(step["pose_end"], prepend=0)
-        arrays = {**arrays, "pose_body": (np.arange(p) - np.repeat(step["pose_end"] - count, count)).astype(np.int32)}
     poses, contacts = (
         {name: take(arrays, f"{kind}_{name}", dtype, (rows, *tail), path) for name, (dtype, tail) in fields.items()}
         for kind, rows, fields in (("pose", p, POSE_FIELDS), ("contact", k, ROW_FIELDS))
