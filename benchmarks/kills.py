@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 SR, FRAMES = 48_000, 96_000
-KINDS = (".wav", ".flac", ".ogg", ".aiff", ".caf", ".npz", "preset", ".png", "cache", "compiled")
+KINDS = (".wav", ".flac", ".ogg", ".aiff", ".caf", ".npz", "preset", ".png", "cache")
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,6 @@ def kinds() -> dict[str, Kind]:
     from sonic_bullet import presets
     from sonic_bullet.files import cache, read_audio, read_log, write_audio, write_log
     from sonic_bullet.files.contact_log import ContactLog
-    from sonic_bullet.machine import kept_code
     from sonic_bullet.plots.scene_plot import render_picture
     from sonic_bullet.records import Microphone
     from sonic_bullet.records.contacts import Contacts, Step
@@ -86,9 +85,6 @@ def kinds() -> dict[str, Kind]:
 
         return 0 if imread(folder / "a.png").size else None
 
-    def files(folder: Path) -> Any:
-        return kept_code.KeptFiles(str(folder), "kernel", "stamp")
-
     steel = presets.named_preset("steel")
     import msgspec
 
@@ -109,16 +105,7 @@ def kinds() -> dict[str, Kind]:
         lambda folder, v: cache.save(folder, "modes-0", {"shape": np.full((400, 300), float(v))}, ""),
         cache_version,
     )
-    made["compiled"] = Kind(
-        "kernel.1.nbc",
-        lambda folder, v: files(folder).save("key", np.full(100_000, v)),
-        lambda folder: _constant(files(folder).load("key")),
-    )
     return made
-
-
-def _constant(values: Any) -> int | None:
-    return None if values is None or (values != values[0]).any() else int(values[0])
 
 
 def killed(kind: Kind, folder: Path, after_s: float) -> None:

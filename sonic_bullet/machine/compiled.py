@@ -5,7 +5,7 @@
 
 numba's own cache=True keeps code beside the source or in a shared folder, believes what it reads there, and ends the
 import where neither can be written. Here it lies in a folder of mode 0700 that belongs to this user (NUMBA_CACHE_DIR,
-else the user's cache folder), and what is not as it was written is compiled anew (`sonic_bullet.machine.kept_code`).
+else the user's cache folder), and what cannot be read there is compiled anew (`sonic_bullet.machine.kept_code`).
 Where no such folder can be had kernels are compiled in every process.
 """
 

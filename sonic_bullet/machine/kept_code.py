@@ -1,22 +1,18 @@
 """A cache for one numba kernel in a folder of this user's own; it stands on inner parts of numba, and
 `sonic_bullet.machine.compiled` does without where they moved.
 
-    index (signature -> file) | machine code, each: numba's bytes + their sha256, written beside and replaced
+    index (signature -> file) | machine code, each: numba's bytes, written beside and replaced
 
-numba's own reader believes what it finds, and unpickles it. Here a file is opened only where it is a regular one of
-this user, and read only where the digest behind it is right; anything else is a miss, and so is any error while it is
-loaded or kept. Code is of the sources it was compiled from, and those are not one file: `source_stamp`.
+numba unpickles what it finds, so that the folder must be this user's alone (`sonic_bullet.machine.user_folder`). An
+error while code is loaded is a miss, one while it is kept costs the next run time. Code is of the sources it was
+compiled from, and those are not one file: `source_stamp`.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
-import os
 import re
-import stat
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,53 +20,18 @@ from typing import Any
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.runtime import rtsys
 
-from sonic_bullet.machine.partial_file import PartialFile
-
-DIGEST_BYTES = hashlib.sha256().digest_size
 IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)(?: +import +(\([^)]*\)|[^\n]*))?", re.MULTILINE)
 WORD = re.compile(rb"\w+")
-OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-
-
-def _as_written(path: str) -> bool:
-    """The file is a regular one, this user's, and whole. Raises OSError."""
-    fd = os.open(path, OPEN_FLAGS)
-    with os.fdopen(fd, "rb") as file:
-        found = os.fstat(fd)
-        if not stat.S_ISREG(found.st_mode) or (hasattr(os, "geteuid") and found.st_uid != os.geteuid()):
-            return False
-        content = file.read()
-    return hashlib.sha256(content[:-DIGEST_BYTES]).digest() == content[-DIGEST_BYTES:]
 
 
 class KeptFiles(IndexDataCacheFile):  # type: ignore[misc]
-    """numba's files, each with its digest behind it, where numba's reader, which stops at the end of its data, does not
-    look.
-    """
+    """numba's files; an index that cannot be read is an empty one."""
 
     def _load_index(self) -> Any:
         try:
-            return super()._load_index() if _as_written(self._index_path) else {}
+            return super()._load_index()
         except Exception:
             return {}
-
-    def _load_data(self, name: str) -> Any:
-        if not _as_written(self._data_path(name)):
-            raise OSError("not as it was written")  # which numba takes for a miss
-        return super()._load_data(name)
-
-    @contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[io.BytesIO]:
-        content = io.BytesIO()
-        yield content
-        whole = content.getvalue()
-        partial = PartialFile(Path(filepath).parent)
-        try:
-            with os.fdopen(partial.fd, "wb", closefd=False) as file:
-                file.write(whole + hashlib.sha256(whole).digest())
-            partial.replace(Path(filepath))
-        finally:
-            partial.close()
 
 
 @cache

@@ -21,7 +21,7 @@ from sonic_bullet.records.errors import FileError
 LIMIT = "SONIC_BULLET_CACHE_LIMIT"
 DEFAULT_LIMIT_BYTES = 2 * 10**9  # of modes: 5 to 10 MB for a body; hundreds of bodies
 NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
-CODE = re.compile(r".*\.nb[ic]")
+CODE = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
 SIZE = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
 OF_LOGS, CODE_KIND = "models of logs", "machine code"
 KINDS = {"radiation": "radiation", "model": OF_LOGS}

@@ -211,7 +211,7 @@ def test_writers_that_sweep_each_other_lose_nothing(tmp_path: Path) -> None:
 
 def test_kills_leave_the_old_file_or_the_new_and_the_next_run_leaves_nothing_else() -> None:
     """The benchmark has 300."""
-    found = benchmark("kills", "--kills", "12", "--kinds", ".flac,.ogg,cache,compiled")["all"]
+    found = benchmark("kills", "--kills", "12", "--kinds", ".flac,.ogg,cache")["all"]
     assert (found["kills"], found["whole"], found["litter"]) == (12, 12, 0)
     assert found["in a write"] >= 2  # they did hit
 
