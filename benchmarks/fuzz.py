@@ -8,7 +8,7 @@ and text.
     -> read, or refused by a SonicBulletError of at most 1 kB; anything else is a fault and its file is kept in DIR as
         FORMAT-NUMBER.SUFFIX
 A fault: another exception or a crash; more than 2 GB; more than 30 s of processor time, or two minutes of waiting; a
-text over 1 kB; a cache entry believed that is another.
+text over 1 kB.
 """
 
 from __future__ import annotations

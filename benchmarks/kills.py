@@ -73,7 +73,7 @@ def kinds() -> dict[str, Kind]:
         return values.pop() if len(values) == 1 else None
 
     def cache_version(folder: Path) -> int | None:
-        found = cache.load(folder, "modes-0", {"shape": cache.Kept("f8", (400, 300))})
+        found = cache.load(folder, "modes-0")
         return (
             None
             if found is None or (found[0]["shape"] != found[0]["shape"].flat[0]).any()

@@ -2,16 +2,14 @@
 that reader.
 
 log -> rendered for two steps     model -> struck once     preset -> material -> struck once     case -> loaded
-cache -> believed only where it is what was kept     audio -> features     mesh -> surface, volume, closed or not
+audio -> features     mesh -> surface, volume, closed or not
 """
 
 from __future__ import annotations
 
 import json
 import random
-import shutil
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -26,8 +24,7 @@ from sonic_bullet.effects.presets_of_effects import with_material, with_modes
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry import is_closed, volume_m3
-from sonic_bullet.radiation import radiated
-from sonic_bullet.records import Air, Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
+from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.render import render_log
@@ -232,40 +229,6 @@ def _enter_mesh(path: Path) -> None:
         is_closed(joined(read_surfaces(path))[1])
 
 
-class Untrue(Exception):
-    """A file was believed that is not what was kept."""
-
-
-@cache
-def _kept() -> tuple[ModalModel, tuple[Any, Any], str, bytes]:
-    """A model, how it radiates, and the name and bytes of the entry that keeps it."""
-    import tempfile
-
-    folder, model = Path(tempfile.mkdtemp()), box_model()
-    known = radiated.radiation_and_note.__wrapped__(model, Air(), folder)[:2]
-    entry = next(folder.iterdir())
-    content = entry.read_bytes()
-    shutil.rmtree(folder)
-    return model, known, entry.name, content
-
-
-def _enter_sealed_cache(path: Path) -> None:
-    """A forger's entry may be believed, but it must be read without harm and be of the right form."""
-    with suppress(Untrue):
-        _enter_cache(path)
-
-
-def _enter_cache(path: Path) -> None:
-    model, known, name, _ = _kept()
-    path.replace(path.with_name(name))
-    try:
-        found = radiated.radiation_and_note.__wrapped__(model, Air(), path.parent)[:2]
-    finally:
-        path.with_name(name).unlink(missing_ok=True)
-    if any(one.tobytes() != other.tobytes() for one, other in zip(found, known, strict=True)):
-        raise Untrue("a cache entry that was changed is believed")
-
-
 def _entries(write: Callable[[str], None]) -> containers.Entries:
     import tempfile
 
@@ -274,46 +237,22 @@ def _entries(write: Callable[[str], None]) -> containers.Entries:
         return containers.taken_apart(f"{folder}/a.npz")
 
 
-def _cache_entries() -> containers.Entries:
-    import io
-
-    return containers.taken_apart(io.BytesIO(_kept()[3]))
-
-
-def _sealed(entries: containers.Entries) -> containers.Entries:
-    """A cache entry whose digest is right again, so that what is behind it is reached."""
-    from sonic_bullet.files.cache import _digest
-
-    kept = dict(entries)
-    try:
-        header = json.loads(containers.array_of(kept["header.npy"]).tobytes())
-        arrays = {name[:-4]: containers.array_of(content) for name, content in entries if name != "header.npy"}
-        header["sha256"] = _digest(_kept()[2][: -len(".npz")], arrays, header["note"])
-    except Exception:  # the mutation left nothing to seal
-        return entries
-    sealed = containers.npy(np.frombuffer(json.dumps(header).encode(), np.uint8))
-    return [(name, sealed if name == "header.npy" else content) for name, content in entries]
-
-
 @cache
 def doors() -> tuple[Door, ...]:
     """All of them; shares add up to 1."""
-    log, model, kept = (
+    log, model = (
         _entries(lambda path: files.write_log(path, small_log(box_model(), replace(STEEL, residual=residual())))),
         _entries(lambda path: files.write_model(path, box_model())),
-        _cache_entries(),
     )
     preset, case = preset_seed(), case_seed()
 
-    def packed(
-        name: str, share: float, entries: containers.Entries, enter: Callable[[Path], object], seal: Any = None
-    ) -> Door:
+    def packed(name: str, share: float, entries: containers.Entries, enter: Callable[[Path], object]) -> Door:
         return Door(
             name,
             ".npz",
             share,
             lambda: containers.put_together(entries),
-            lambda draw: containers.container_changed(entries, draw, seal),
+            lambda draw: containers.container_changed(entries, draw),
             enter,
         )
 
@@ -339,10 +278,8 @@ def doors() -> tuple[Door, ...]:
         )
 
     return (
-        packed("log", 0.12, log, _enter_log),
+        packed("log", 0.20, log, _enter_log),
         packed("model", 0.08, model, _enter_model),
-        packed("cache", 0.05, kept, _enter_cache),
-        packed("cache forged", 0.03, kept, _enter_sealed_cache, _sealed),
         written("preset", 0.12, preset, _enter_preset),
         written("case", 0.16, case, _enter_case),
         *(sound(suffix, 0.03) for suffix in (".wav", ".rf64", ".w64", ".flac", ".ogg", ".aiff", ".caf")),

@@ -3,25 +3,20 @@
     KIND-sha256(numbers, options, source text that computes it) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache
         folder
 
-A file is written beside its name and moved there whole; a cut, foreign or unreadable file is a miss, and so is what is
-no file, one whose content is not what its SHA-256 says, or not what was asked for: names, dtypes, shapes, finite
-numbers, indices. A miss is computed anew and takes its place. Nothing is pickled. When a save passes the limit, what
-was unused for longest goes (`sonic_bullet.machine.kept_files`), and another process may take any entry away at any
-time. The user's cache folder is private (`sonic_bullet.machine.user_folder`); without a home nothing is kept. Against
-an owner of the folder who forges the digest too there is no defence, and none is meant.
+A file is written beside its name and moved there whole; a cut, foreign or damaged file is a miss, is computed anew and
+replaced. Nothing is pickled. When a save passes the limit, what was unused for longest goes
+(`sonic_bullet.machine.kept_files`), and another process may take any entry away at any time. The user's cache folder is
+private (`sonic_bullet.machine.user_folder`); without a home nothing is kept.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import msgspec
-import numpy as np
 
 from sonic_bullet.files.container import read_container, write_container
 from sonic_bullet.machine.kept_files import bounded, computed, limit_bytes, touch
@@ -30,28 +25,12 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 
 Place = Path | Literal["default"] | None
-FORMAT = "sonic-bullet-cache/2"  # 1 had no digest: a miss
+FORMAT = "sonic-bullet-cache/2"
 
 
 class _Header(msgspec.Struct):
     format: str
     note: str
-    sha256: str
-
-
-class Kept(NamedTuple):
-    """What an array of an entry must be. kind: "f8", "f4", "b1", or "i" for whole numbers; shape: lengths, a name for
-    one that arrays share, None for any.
-
-    below: the name of a length; the numbers are indices into it.
-    """
-
-    kind: str
-    shape: tuple[int | str | None, ...]
-    below: str = ""
-
-
-Layout = Mapping[str, Kept]
 
 
 def folder(place: Place) -> Path | None:
@@ -72,10 +51,8 @@ def holds(place: Place, name: str) -> bool:
     return at is not None and (at / f"{name}.npz").is_file()
 
 
-def load(place: Place, name: str, layout: Layout) -> tuple[dict[str, Array], str] | None:
-    """Arrays and note kept under ``name``, or None where there is no such entry, or not the one that was kept, or none
-    of that layout.
-    """
+def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
+    """Arrays and note kept under ``name``, or None where there is no such entry that can be read."""
     where = folder(place)
     if where is None:
         return None
@@ -84,38 +61,8 @@ def load(place: Place, name: str, layout: Layout) -> tuple[dict[str, Array], str
         header, arrays = read_container(path, _Header, FORMAT, "cached model")
     except (FileError, LogError):
         return None
-    if header.sha256 != _digest(name, arrays, header.note) or not _fits(arrays, layout):
-        return None
     touch(path)
     return arrays, header.note
-
-
-def _digest(name: str, arrays: Mapping[str, Array], note: str) -> str:
-    """SHA-256 of an entry's name and of all that it holds."""
-    digest = hashlib.sha256(repr((name, note)).encode("utf-8", "replace"))
-    for key in sorted(arrays):
-        array = np.ascontiguousarray(arrays[key])
-        digest.update(f"{key} {array.dtype.str} {arrays[key].shape}".encode("utf-8", "replace") + array.tobytes())
-    return digest.hexdigest()
-
-
-def _fits(arrays: Mapping[str, Array], layout: Layout) -> bool:
-    if set(arrays) != set(layout):
-        return False
-    length: dict[str, int] = {}
-    for name, kept in layout.items():
-        array = arrays[name]
-        if array.ndim != len(kept.shape) or (
-            array.dtype.kind != "i" if kept.kind == "i" else array.dtype != np.dtype(kept.kind)
-        ):
-            return False
-        for want, have in zip(kept.shape, array.shape, strict=True):
-            if (length.setdefault(want, have) if isinstance(want, str) else want) not in (have, None):
-                return False
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            return False
-    indices = [(arrays[name], length[kept.below]) for name, kept in layout.items() if kept.below]
-    return all(array.min(initial=0) >= 0 and array.max(initial=-1) < most for array, most in indices)
 
 
 def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
@@ -127,7 +74,7 @@ def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
         return
     with suppress(OSError, FileError):
         where.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_container(where / f"{name}.npz", _Header(FORMAT, note, _digest(name, arrays, note)), arrays)
+        write_container(where / f"{name}.npz", _Header(FORMAT, note), arrays)
     bound(where)
 
 

@@ -120,7 +120,7 @@ def read_log(path: str | os.PathLike[str]) -> ContactLog:
     not).
     """
     path = as_path(path, "path", "name a contact log (.npz)")
-    header, arrays = read_container(path, LogHeader, LOG_FORMAT, "contact log", PACKED, LAZY)
+    header, arrays = read_container(path, LogHeader, LOG_FORMAT, "contact log", LAZY)
     kept = recalled_models(header.models, [(body.model, body.name) for body in header.bodies], path)
     with reading(path, "contact log", LogError, REMEDY):
         check_sr(header.sr)

@@ -81,7 +81,7 @@ def read_model(path: str | os.PathLike[str]) -> ModalModel:
 
     Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
     """
-    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model", PACKED)
+    header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
     with reading(path, "modal model", LogError, REMEDY):
         return _unpack_model(header.model, arrays, 0, path)
 

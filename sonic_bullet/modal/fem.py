@@ -1,4 +1,4 @@
-"""Linear elasticity on tetrahedra: the one place that knows scikit-fem.
+"""Linear elasticity on tetrahedra: element matrices by scikit-fem.
 
     K_ij = ∫ Bᵢᵀ C Bⱼ dV,   M_ij = ∫ ρ Nᵢ Nⱼ dV · 1₃          [Hughes, The Finite Element Method (1987), ch. 3.10, 7.2]
 

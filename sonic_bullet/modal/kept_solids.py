@@ -15,15 +15,6 @@ if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.filling import Filler
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
-SOLID = {
-    "node": store.Kept("f8", ("n", 3)),
-    "tet": store.Kept("i", (None, None), "n"),
-    "affine": store.Kept("b1", (1,)),
-    "skin": store.Kept("i", ("v",), "n"),
-    "face": store.Kept("i", ("f", 3), "v"),
-    "curvature": store.Kept("f8", ("f",)),
-}
-
 
 def kept_or_filled(
     shapes: tuple[Shape, ...],
@@ -37,7 +28,7 @@ def kept_or_filled(
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
     from sonic_bullet.modal.meshing.solid import SolidSurface
 
-    found = store.load(*kept, SOLID)
+    found = store.load(*kept)
     if found is not None:
         a, note = found
         return Filled(

@@ -29,14 +29,6 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 
 LEAST_ERROR = 1e-4  # relative, of a frequency: what is under it is not told apart
-MODES = {
-    "value": store.Kept("f8", ("m",)),
-    "vector": store.Kept("f4", ("v", 3, "m")),
-    "volume": store.Kept("f8", (1,)),
-    "vertex": store.Kept("f8", ("v", 3)),
-    "face": store.Kept("i", ("f", 3), "v"),
-    "curvature": store.Kept("f8", ("f",)),
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +90,7 @@ def analyse(
             note="plane: unbounded, no modes",
         )
     of = _unit_of(shapes, material, asked, edge_m)
-    unit = _recall(store.load(cache, of.name, MODES))
+    unit = _recall(store.load(cache, of.name))
     if unit is None:
         unit = _solve(of, shapes, asked, edge_m, cache, say)
         store.save(cache, of.name, _arrays(unit), unit.note)

@@ -29,14 +29,6 @@ APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
 ACCURACY = 0.01  # of the highest mode's frequency: as `analyse` has it by default
 BEYOND = 1.1  # of the limit on λ: modes that are none at one ν may be some at the other
-KEPT = {
-    "lame": store.Kept("f8", ("b", "b")),
-    "shear": store.Kept("f8", ("b", "b")),
-    "skin": store.Kept("f4", ("v", 3, "b")),
-    "vertex": store.Kept("f8", ("v", 3)),
-    "face": store.Kept("i", (None, 3), "v"),
-    "numbers": store.Kept("f8", (4,)),
-}
 
 
 @one_thread()
@@ -61,7 +53,7 @@ def family(
     limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
     clamp = np.array(fixed, float).reshape(-1, 4)
     name = key("family", shape.vertex_m, shape.face, edge_m, clamp, poisson, limit)
-    found = store.load(cache, name, KEPT)
+    found = store.load(cache, name)
     if found is not None:
         a, note = found
         volume, count, meshed, error = a["numbers"]

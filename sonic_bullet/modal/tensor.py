@@ -49,14 +49,6 @@ FEWER = (0, 4, 5, 6, 11, 12, 13)  # of them where each costs a solution by eleme
 SPARE = 1.3  # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
 SPANNED = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
 SHORTER = 1.0  # waves than an isotropic body's of as many modes
-KEPT = {
-    "part": store.Kept("f8", (9, "b", "b")),
-    "ends": store.Kept("i", (None,)),
-    "skin": store.Kept("f4", ("v", 3, "b")),
-    "vertex": store.Kept("f8", ("v", 3)),
-    "face": store.Kept("i", (None, 3), "v"),
-    "numbers": store.Kept("f8", (2,)),
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +149,7 @@ def tensor_family(
         repr(ANCHORS),
         repr(FEWER),
     )
-    found = store.load(cache, name, KEPT)
+    found = store.load(cache, name)
     if found is not None:
         a, note = found
         volume, meshed = a["numbers"]

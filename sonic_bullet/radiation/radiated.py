@@ -21,7 +21,6 @@ from sonic_bullet.records import Air, Array, ModalModel
 
 SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass, compact))
 PACKAGES = ("numpy", "scipy", "numba")
-LAYOUT = {name: store.Kept("f8", ("m",)) for name in ("real", "imag", "damping")}
 
 
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
@@ -54,7 +53,7 @@ def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "defaul
         air.sound_speed_m_s,
         code=code,
     )
-    known = _recall(store.load(cache, name, LAYOUT), m)
+    known = _recall(store.load(cache, name), m)
     if known is None:
         known = radiation.radiation_and_note(model, air)
         store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, known[2])

@@ -17,8 +17,6 @@ from sonic_bullet.machine import user_folder
 
 REPO = Path(__file__).resolve().parents[2]
 
-LAYOUT = {"shape": cache.Kept("f8", (3,))}
-
 
 @pytest.mark.slow
 def test_commands_run_as_another_user_without_a_home_on_a_read_only_install() -> None:
@@ -42,7 +40,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_folder_of_models_is_private_and_made_so(home: Path) -> None:
     (home / "sonic_bullet").mkdir(mode=0o755)
     cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
-    assert cache.load("default", "modes-0", LAYOUT) is not None
+    assert cache.load("default", "modes-0") is not None
     assert [stat.S_IMODE(path.stat().st_mode) for path in (home / "sonic_bullet", home / "sonic_bullet" / "modal")] == [
         0o700
     ] * 2
@@ -54,7 +52,7 @@ def test_another_users_folder_is_not_believed(home: Path) -> None:
         pytest.skip("only root can give a folder away")
     cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
     os.chown(home / "sonic_bullet", 54321, 54321)
-    assert cache.load("default", "modes-0", LAYOUT) is None
+    assert cache.load("default", "modes-0") is None
     cache.save("default", "modes-1", {"shape": np.arange(3.0)}, "")
     assert not (home / "sonic_bullet" / "modal" / "modes-1.npz").exists()
     assert len(user_folder.NOTES) == 1  # said once
@@ -64,15 +62,15 @@ def test_another_users_folder_is_not_believed(home: Path) -> None:
 @pytest.mark.timeout(20)
 def test_what_is_no_file_in_the_cache_is_a_miss_and_does_not_hang(tmp_path: Path, what: object) -> None:
     what(tmp_path / "modes-0.npz")  # type: ignore[operator]
-    assert cache.load(tmp_path, "modes-0", LAYOUT) is None
+    assert cache.load(tmp_path, "modes-0") is None
     cache.save(tmp_path, "modes-0", {"shape": np.arange(3.0)}, "")
-    assert cache.load(tmp_path, "modes-0", LAYOUT) is None
+    assert cache.load(tmp_path, "modes-0") is None
 
 
 def test_a_home_that_is_missing_is_not_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "no" / "home"))
     cache.save("default", "modes-0", {"shape": np.arange(3.0)}, "")
-    assert cache.load("default", "modes-0", LAYOUT) is None
+    assert cache.load("default", "modes-0") is None
     assert list(tmp_path.iterdir()) == []
 
 

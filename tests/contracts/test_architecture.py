@@ -233,7 +233,7 @@ def test_no_unfinished_work_no_pickle_no_private_places() -> None:
         "/ro" + "ot/",
         "/ho" + "me/",
     ]
-    allowed = {"tests/files/test_forged_logs.py": {"allow_pickle=Tr" + "ue"}}  # forges one to see it refused
+    allowed = {"tests/files/test_damaged_logs.py": {"allow_pickle=Tr" + "ue"}}  # forges one to see it refused
     found = []
     for path in TEXTS:
         name, text = str(path.relative_to(REPO)), path.read_text(errors="replace")

@@ -14,8 +14,6 @@ from sonic_bullet.files import cache
 from sonic_bullet.machine import kept_files
 from sonic_bullet.records.errors import FileError
 
-LAYOUT = {"x": cache.Kept("f8", (1000,))}
-
 
 def name(i: int, kind: str = "modes") -> str:
     return f"{kind}-{i:064x}"
@@ -48,7 +46,7 @@ def test_a_save_past_the_limit_drops_what_was_unused_for_longest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     paths = [kept(tmp_path, i, age_s=1000 - 100 * i) for i in range(5)]
-    assert cache.load(tmp_path, name(0), LAYOUT) is not None  # used now, it is the oldest no more
+    assert cache.load(tmp_path, name(0)) is not None  # used now, it is the oldest no more
     monkeypatch.setenv(kept_files.LIMIT, str(4 * paths[0].stat().st_size))
     new = kept(tmp_path, 9, 0)
     assert [path.exists() for path in paths] == [True, False, False, True, True] and new.exists()
@@ -68,7 +66,7 @@ def test_a_limit_that_is_no_size_is_said_after_the_result_was_kept(
     monkeypatch.setenv(kept_files.LIMIT, "plenty")
     with pytest.raises(FileError, match=r"SONIC_BULLET_CACHE_LIMIT is 'plenty'.*2GB"):
         cache.save(tmp_path, name(0), {"x": np.zeros(1000)}, "")
-    assert cache.load(tmp_path, name(0), LAYOUT) is not None
+    assert cache.load(tmp_path, name(0)) is not None
 
 
 def test_only_what_was_kept_here_is_listed(tmp_path: Path) -> None:
@@ -110,7 +108,7 @@ def test_another_process_that_clears_costs_nobody_anything(tmp_path: Path) -> No
         found = missed = 0
         for i in range(400):
             cache.save(tmp_path, name(i % 7), {"x": np.full(1000, float(i))}, "")
-            entry = cache.load(tmp_path, name(i % 7), LAYOUT)
+            entry = cache.load(tmp_path, name(i % 7))
             missed += entry is None
             if entry is not None:
                 found += 1

@@ -153,7 +153,7 @@ def test_cache_gives_the_same_bits_and_survives_damage(
         for file in files:
             file.write_bytes(damage)
         assert quick(BAR, steel, cache=tmp_path).freq_hz.tobytes() == fresh.freq_hz.tobytes()
-    assert store.load(tmp_path, "no-such-name", {}) is None
+    assert store.load(tmp_path, "no-such-name") is None
     quick(BAR, steel, cache=Path("/proc/nowhere"))  # a cache that cannot be written costs nothing but time
 
 

@@ -77,7 +77,7 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
         if place.stat().st_size > BYTES_MAX:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         if place.suffix.lower() == ".npz":
-            made, arrays = read_container(place, _File, FORMAT, "animation", packed="")
+            made, arrays = read_container(place, _File, FORMAT, "animation")
             many = len(made.bodies)
             position, turn = (_numbers(arrays, name, many, n) for name, n in (("position", 3), ("quaternion_xyzw", 4)))
             poses = [(position[:, i], turn[:, i]) for i in range(many)]
