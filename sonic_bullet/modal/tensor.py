@@ -6,8 +6,7 @@ between.
         [Rayleigh-Ritz; Hellmann-Feynman]
 
 C_k/ρ in m²/s². A box whose sides lie along the axes takes polynomials (polynomials.py) and keeps its three mirrors:
-eight small problems. The reduced modes lie above the true ones, the most by less than 1e-3 in f for ratios of 3:1
-(tests/modal/test_tensor.py).
+eight small problems. The reduced modes lie above the true ones, the most by less than 1e-3 in f for ratios of 3:1.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Arrays in, arrays out, state explicit: loads become strikes and rubbing, forces become modal motion, motion becomes
 pressure.
 
-strikes, pulse: what an impact is | surface, profile: rolling and sliding | bank: the modes | radiation,
-path: to the microphone
+strikes, pulse: what an impact is | surface_kernel, profile: rolling and sliding | bank: the modes | path: to the
+microphone
 """
