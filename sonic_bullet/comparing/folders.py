@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sonic_bullet.files.audio import FORMATS
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.session.scene_file import defines_build
 
-SOUNDS = (".wav", ".flac", ".ogg", ".aiff", ".aif", ".caf", ".w64", ".rf64")
 AT_ONCE = 4
 """Pairs that two processes are given at a time; what is done is kept when it is stopped."""
 
@@ -49,7 +49,7 @@ def _taken(path: Path) -> bool:
             return defines_build(path) or "stepSimulation" in path.read_text(encoding="utf-8", errors="replace")
         except SonicBulletError:
             return True
-    return path.suffix.lower() in (".npz", *SOUNDS)
+    return path.suffix.lower() in (".npz", *FORMATS)
 
 
 def compare_folders(
