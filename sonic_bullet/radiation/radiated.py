@@ -61,8 +61,8 @@ def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "defaul
 
 
 def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array, str] | None:
-    """What was kept, where it is of as many modes."""
-    if found is None or len(found[0]["real"]) != m:
+    """What was kept, where it is of as many modes and all of it is a number."""
+    if found is None or len(found[0]["real"]) != m or not all(np.isfinite(value).all() for value in found[0].values()):
         return None
     a = found[0]
     weight = np.empty(m, complex)
