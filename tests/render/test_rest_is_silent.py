@@ -92,15 +92,19 @@ def test_a_body_at_rest_is_not_struck(shape: str, restitution: float, step_s: fl
 @parametrize_few(
     ("shape", "restitution", "step_hz"),
     [("bar", 0.7, 1000), ("box", 0.7, 1000), ("plate", 0.7, 1000), ("plate", 0.8, 1000), ("plate", 0.8, 500)],
-    (0, 2),
+    (0, 3),
 )
 def test_what_hardly_loses_speed_comes_to_silence_too(shape: str, restitution: float, step_hz: int) -> None:
-    """A plate of restitution 0.8 jitters at 70 mm/s, and was struck as long as a ball would have bounced on."""
-    _, events = dropped(shape, restitution, 1 / step_hz, seconds=3.3)
-    early = hits(events)
-    assert len(early) > 3
-    late = hits(events, 2.8)
-    assert not late or max(one.impulse_n_s for one in late) < 1e-3 * max(one.impulse_n_s for one in early)
+    """A plate of restitution 0.8 jitters at 70 mm/s, and was struck as long as a ball would have bounced on.
+
+    PyBullet's corners go on for ever at up to 7 g dt, and come as far as they go in one step: no energy is lost, and no
+    flight is that short.
+    """
+    log, events = dropped(shape, restitution, 1 / step_hz, seconds=3.3)
+    assert len(hits(events)) > 3
+    late = [step.contacts.row for step, start in zip(log.steps, log.start_s, strict=True) if start > 2.8]
+    assert max(row["impulse_n_s"].max(initial=0.0) for row in late) > 0, "it still is in contact, and is not struck"
+    assert hits(events, 2.8) == []
 
 
 def test_small_bounces_are_played_to_the_last() -> None:
