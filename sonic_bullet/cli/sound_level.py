@@ -91,9 +91,9 @@ class LevelWish:
             return asked
         return asked | {"peak_dbfs": DEFAULT_PEAK_DBFS}
 
-    def say(self, path: str, gain_per_pa: float, peak: float, log: ContactLog) -> dict[str, Any]:
+    def say(self, path: str, gain_per_pa: float, peak: float, log: ContactLog, clipped: int = 0) -> dict[str, Any]:
         """Say on stderr what full scale is and how loud the peak, and write it beside the file where that is asked for;
-        the same as JSON.
+        the same as JSON. clipped: samples that the file could not hold.
         """
         from sonic_bullet.cli.output import write_json
         from sonic_bullet.plots.scene_plot import quantity
@@ -103,7 +103,8 @@ class LevelWish:
         unit = units.pop() if len(units) == 1 else "(mixed units)"
         spl = 20 * math.log10(peak / REFERENCE_PRESSURE_PA) if unit == "Pa" and peak > 0 else None
         words = f"peak {spl:.0f} dB SPL" if spl is not None else f"peak {peak:.3g} {unit}"
-        print(f"sonic-bullet: 0 dBFS = {1 / gain_per_pa:.3g} {unit} ({words})", file=sys.stderr)
+        cut = ", which the file does not hold" if clipped else ""
+        print(f"sonic-bullet: 0 dBFS = {1 / gain_per_pa:.3g} {unit} ({words}{cut})", file=sys.stderr)
         scale = {"full_scale": 1 / gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
         write_json(self.json_path(path), scale)
         return scale
@@ -113,8 +114,9 @@ def level_warnings(report: AudioReport) -> tuple[str, ...]:
     """What a user should know of samples beyond full scale."""
     if report.clipped:
         return (
-            f"{format_count(report.clipped, 'sample was', 'samples were')} clipped at full scale "
-            f"(peak {report.peak_pa:.3g} Pa); --peak-dbfs -1 avoids it, a float .wav needs no clipping",
+            f"{format_count(report.clipped, 'sample was', 'samples were')} clipped at full scale: "
+            f"{report.format} {report.subtype} holds nothing above 1.0, and the peak is "
+            f"{report.peak_pa * report.gain_per_pa:.3g}; a .wav holds it as floats, --peak-dbfs -1 scales it",
         )
     if report.over:
         return (

@@ -265,10 +265,13 @@ def test_clipping_is_reported(scene: Path, monkeypatch: pytest.MonkeyPatch, capf
     assert run("render", "scene.py", "-o", "a.flac", "--pascals", "--json", "a.json") == 0
     clipped = json.loads(Path("a.json").read_text())["clipped"]
     assert clipped > 1000
-    assert f"{clipped} samples were clipped" in capfd.readouterr().err
+    out, err = capfd.readouterr()
+    assert ", clipped" in out and "which the file does not hold" in err
+    assert f"{clipped} samples were clipped" in err and "FLAC PCM_24 holds nothing above 1.0" in err and ".wav" in err
     assert run("render", "scene.py", "-o", "a.wav", "--pascals", "--json", "a.json") == 0
     assert json.loads(Path("a.json").read_text())["clipped"] == 0
-    assert "the file is exact" in capfd.readouterr().err
+    out, err = capfd.readouterr()
+    assert "the file is exact" in err and "clipped" not in out and "does not hold" not in err
 
 
 def test_a_log_renders_again_with_its_own_rate_and_seed(scene: Path, asked: dict[str, Any]) -> None:

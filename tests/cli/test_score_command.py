@@ -59,10 +59,14 @@ def test_a_glb_is_scored_and_its_log_is_one_as_any_other(place: Path, capfd: pyt
     assert run(*words, "-o", "a.wav", "--contacts", "a.npz", "--json", "said.json") == 0
     assert run(*words, "-o", "b.wav") == 0
     assert Path("a.wav").read_bytes() == Path("b.wav").read_bytes()
+    assert "clipped" not in "".join(capfd.readouterr())
+    assert run("score", "a.glb", "-o", "c.flac", "--sr", "16000", "--tail", "0", "--lufs", "0") == 0
+    out, err = capfd.readouterr()
+    assert ", clipped" in out and "FLAC PCM_24 holds nothing above 1.0" in err
     log, (sound, _) = read_log("a.npz"), read_audio("a.wav")
     assert np.abs(render_log(log) - sound).max() <= 2**-23 * np.abs(sound).max()
     assert {body.name for body in log.bodies} == {"floor", "box"}
-    assert "silent partners" in capfd.readouterr().err
+    assert "silent partners" in err
     # nothing sounds before the first touch and the sound's way from it, 0.1 m of fall and 1 m of air
     quiet = sound[0, : int(16000 * 0.1)]
     assert np.abs(quiet).max() < 1e-3 * np.abs(sound).max()

@@ -119,7 +119,9 @@ def run_render(
             render_picture(picture, result.sound, result.sr, result.log, Path(scene).name, seen)
         notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *level_warnings(report))
         say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
-        scale = level.say(to, report.gain_per_pa, report.peak_pa, result.log) if report.channels else {}
+        scale = {}
+        if report.channels:
+            scale = level.say(to, report.gain_per_pa, report.peak_pa, result.log, report.clipped)
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     lifted = None if isinstance(result, Replay) else result.lifted
@@ -242,6 +244,7 @@ def summary(report: AudioReport, log: ContactLog) -> str:
 
     channels = format_count(report.channels, "channel")
     scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
+    scale += ", clipped" if report.clipped else ""
     units = {quantity(sensor)[1] for sensor in log.sensors}
     unit = units.pop() if len(units) == 1 else "(mixed units)"
     return (

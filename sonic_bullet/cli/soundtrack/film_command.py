@@ -126,7 +126,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 progress=progress,
             )
         say(_summary(output, report))
-        scale = level.say(str(to), report.gain_per_pa, float(result.sound.peaks().max()), result.log)
+        scale = level.say(str(to), report.gain_per_pa, float(result.sound.peaks().max()), result.log, report.clipped)
         notes = (*result.notes, *report.notes, *_clipped(report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)

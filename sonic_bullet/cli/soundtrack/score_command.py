@@ -11,7 +11,7 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option
-from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options
+from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options, level_warnings
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
         scale = level.options(result.sound, result.log, str(to))
         report = replace(write_audio(str(to), result.sound, sr, **scale), path=output)
         say(summary(report, result.log))
-        scale = level.say(str(to), report.gain_per_pa, report.peak_pa, result.log)
-        for note in result.notes:
+        scale = level.say(str(to), report.gain_per_pa, report.peak_pa, result.log, report.clipped)
+        notes = (*result.notes, *level_warnings(report))
+        for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, described_render(result.log, report, result.notes) | {"scale": scale})
+    write_json(json_to, described_render(result.log, report, notes) | {"scale": scale})
