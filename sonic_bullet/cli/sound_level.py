@@ -1,7 +1,8 @@
 """How loud a file is to be, how far it rings on, and what is said of it: the options of `render`, `film` and `score`.
 
---peak-dbfs | --lufs | --pascals, else a peak of -1 dBFS -> one gain, of mix and stems -> the file, which says it
--> "0 dBFS = 63 Pa (peak 129 dB SPL)" on stderr -> with --scale-json a JSON beside the file
+--fade -> --peak-dbfs | --lufs | --pascals, else a peak of -1 dBFS -> one gain, of mix and stems; a limiter, too, where
+loudness and true peak conflict -> the file, which says its scale; with --scale-json a JSON beside it
+-> its loudness on stdout -> "0 dBFS = 63 Pa (peak 129 dB SPL)" and what a limiter takes off on stderr
 """
 
 from __future__ import annotations
@@ -19,12 +20,31 @@ from sonic_bullet.records.errors import AudioError
 
 if TYPE_CHECKING:
     from sonic_bullet.files import AudioReport, ContactLog
+    from sonic_bullet.files.levels import FileLevel
     from sonic_bullet.files.rows.spool import KeptSound
 
 DEFAULT_PEAK_DBFS = -1.0
 """Below full scale by what rebuilt waveforms of converters and lossy codecs overshoot [EBU R 128, sec. h]."""
 TAIL_DB = -60.0
-OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json")
+OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json", "fade_s")
+
+
+class Fade(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
+    """OUT or IN,OUT in seconds."""
+
+    name = "[IN,]OUT"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Both durations; click's usage error where they are none."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            *fade_in, fade_out = (float(part) for part in str(value).split(","))
+        except ValueError:
+            fade_in = [-1.0, -1.0]
+        if len(fade_in) > 1 or not all(0 <= x < 1e6 for x in (*fade_in, fade_out)):
+            self.fail(f"{str(value)[:40]!r} is no fade: seconds at the end, 0.5, or at both ends, 0.01,0.5", param, ctx)
+        return (fade_in[0] if fade_in else 0.0), fade_out
 
 
 def level_options(command: Any) -> Any:
@@ -35,9 +55,13 @@ def level_options(command: Any) -> Any:
                 "--peak-dbfs",
                 type=float,
                 metavar="DB",
-                help="Scale so that the peak is DB below full scale. [default: -1]",
+                help="Scale so that the peak is DB below full scale; with --lufs the true peak that a limiter keeps. "
+                "[default: -1]",
             ),
             click.option("--lufs", type=float, metavar="L", help="Scale to this programme loudness (say -23)."),
+            click.option(
+                "--fade", "fade_s", type=Fade(), help="Fade out over the last seconds, or in and out: 0.01,0.5."
+            ),
             click.option("--pascals", is_flag=True, help="Do not scale: 1.0 in the file is 1 Pa."),
             click.option(
                 "--tail",
@@ -64,6 +88,7 @@ class LevelWish:
     pascals: bool = False
     tail_db: float = TAIL_DB
     scale_json: bool = False
+    fade_s: tuple[float, float] | None = None
 
     def check(self) -> None:
         """Raise AudioError where it cannot be: before anything is rendered."""
@@ -79,21 +104,34 @@ class LevelWish:
         """Where the JSON goes, if it is asked for."""
         return f"{output}.json" if self.scale_json else None
 
-    def options(self, sound: KeptSound, log: ContactLog, path: str) -> dict[str, Any]:
-        """Keywords of `write_audio` and `make_film`. What is silent is not scaled unless it is asked for, nor what goes
-        into a file that cannot say its scale (W64).
+    def faded(self, sound: KeptSound, sr: int) -> KeptSound:
+        """The sound with its fades. Raises AudioError where it is shorter than they are."""
+        from sonic_bullet.files.loudness.gain_curve import GainCurve
+
+        if self.fade_s is None:
+            return sound
+        fade_in, fade_out = (round(seconds * sr) for seconds in self.fade_s)
+        if fade_in + fade_out > sound.shape[1]:
+            lasts = f"{sound.shape[1] / sr:.3f} s"
+            raise AudioError(f"--fade takes longer than the sound, {lasts}", "give shorter fades, or render longer")
+        return sound.shaped(GainCurve(sound.shape[1], fade_in, fade_out))
+
+    def found(self, sound: KeptSound, sr: int, log: ContactLog, path: str) -> FileLevel:
+        """The level that `write_audio` and `make_film` take. What is silent is not scaled unless it is asked for, nor
+        what goes into a file that cannot say its scale (W64). Raises AudioError.
         """
+        from sonic_bullet.files.levels import find_level
         from sonic_bullet.render.silence import is_silent
 
-        asked: dict[str, Any] = {"peak_dbfs": self.peak_dbfs, "lufs": self.lufs}
+        peak_dbfs = self.peak_dbfs
         as_it_is = self.pascals or self.lufs is not None or self.peak_dbfs is not None
-        if as_it_is or Path(path).suffix.lower() == ".w64" or is_silent(sound, log):
-            return asked
-        return asked | {"peak_dbfs": DEFAULT_PEAK_DBFS}
+        if not as_it_is and Path(path).suffix.lower() != ".w64" and not is_silent(sound, log):
+            peak_dbfs = DEFAULT_PEAK_DBFS
+        return find_level(self.faded(sound, sr), sr, peak_dbfs, self.lufs, 1.0)
 
-    def say(self, path: str, gain_per_pa: float, peak: float, log: ContactLog, clipped: int = 0) -> dict[str, Any]:
-        """Say on stderr what full scale is and how loud the peak, and write it beside the file where that is asked for;
-        the same as JSON. clipped: samples that the file could not hold.
+    def say(self, path: str, level: FileLevel, peak: float, log: ContactLog, clipped: int = 0) -> dict[str, Any]:
+        """Say on stderr what full scale is, how loud the peak, and what a limiter takes off; write it beside the file
+        where that is asked for; the same as JSON. clipped: samples that the file could not hold.
         """
         from sonic_bullet.cli.output import write_json
         from sonic_bullet.plots.scene_plot import quantity
@@ -104,10 +142,21 @@ class LevelWish:
         spl = 20 * math.log10(peak / REFERENCE_PRESSURE_PA) if unit == "Pa" and peak > 0 else None
         words = f"peak {spl:.0f} dB SPL" if spl is not None else f"peak {peak:.3g} {unit}"
         cut = ", which the file does not hold" if clipped else ""
-        print(f"sonic-bullet: 0 dBFS = {1 / gain_per_pa:.3g} {unit} ({words}{cut})", file=sys.stderr)
-        scale = {"full_scale": 1 / gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
+        print(f"sonic-bullet: 0 dBFS = {1 / level.gain_per_pa:.3g} {unit} ({words}{cut})", file=sys.stderr)
+        if level.limited_db:
+            print(f"sonic-bullet: note: {limited(level)}", file=sys.stderr)
+        scale = {"full_scale": 1 / level.gain_per_pa, "unit": unit, "peak": peak, "peak_db_spl": spl}
+        scale |= {"limited_db": level.limited_db, "limited_s": level.limited_s}
         write_json(self.json_path(path), scale)
         return scale
+
+
+def limited(level: FileLevel | AudioReport) -> str:
+    """What a limiter does to a sound."""
+    return (
+        f"loudness and true peak conflict: a limiter takes off up to {level.limited_db:.1f} dB, in all for "
+        f"{level.limited_s:.3f} s; a lower --lufs needs less"
+    )
 
 
 def level_warnings(report: AudioReport) -> tuple[str, ...]:

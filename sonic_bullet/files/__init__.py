@@ -9,10 +9,11 @@ after, `reading` is the boundary of all readers, `atomic` the replacing.
 """
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
-from sonic_bullet.files.audio import AudioReport, AudioWriter, check_audio_output, write_audio
+from sonic_bullet.files.audio import AudioWriter, check_audio_output, write_at_level, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import check_levels, check_sr
 from sonic_bullet.files.logs import read_log, write_log
+from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.models import read_model, write_model
 from sonic_bullet.files.recordings import live_channel, read_audio, read_audio_scale, read_channel
 
@@ -33,6 +34,7 @@ __all__ = [
     "read_log",
     "read_model",
     "replacing",
+    "write_at_level",
     "write_audio",
     "write_log",
     "write_model",

@@ -19,7 +19,7 @@ import math
 import os
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -27,7 +27,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name
-from sonic_bullet.files.levels import as_sound, check_levels, check_sr, gain_per_pa
+from sonic_bullet.files.levels import FileLevel, as_sound, check_levels, check_sr, find_level
+from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
 from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
 from sonic_bullet.files.rows.spool import KeptSound
@@ -53,32 +54,6 @@ SAMPLE_BYTES = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, 
 CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
 BLOCK_FRAMES = 1 << 18
 SMALLEST_NORMAL = 2.0**-126  # of float32
-
-
-@dataclass(frozen=True, slots=True)
-class AudioReport:
-    """What was written: where, how much, how loud.
-
-    gain_per_pa: file units for one pascal. peak_pa, rms_pa: before the gain, over all channels. clipped: samples that
-    were cut at full scale. over: samples beyond full scale in all (equal to clipped except in float files, where it is
-    the player that clips).
-    """
-
-    path: str
-    format: str
-    subtype: str
-    sr: int
-    channels: int
-    frames: int
-    gain_per_pa: float
-    peak_pa: float
-    rms_pa: float
-    clipped: int
-    over: int
-
-    @property
-    def seconds(self) -> float:
-        return self.frames / self.sr
 
 
 def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
@@ -314,12 +289,13 @@ def write_audio(
 ) -> AudioReport:
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
-    The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. At most one of
-    ``peak_dbfs`` (dB re full scale) and ``lufs`` scales; else full_scale_pa is 1.0 in the file. The file says what its
-    full scale is, and `read_audio` undoes it; full_scale_pa None: samples are in no known unit, and it
-    says none. Over 4 GiB a .wav is written as RF64. cues: places named in a .wav (none of them: [] still says where the
-    file begins), time_reference: its first sample on the timeline it is for (files.riff). Raises AudioError (rate, NaN,
-    silence or under 0.4 s where loudness is asked, both levels given) and FileError (place, format).
+    The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. ``peak_dbfs``
+    (dB re full scale) or ``lufs`` scales; both: a loudness whose true peak a limiter keeps below peak_dbfs (of lufs
+    alone below -1 dBTP); neither: full_scale_pa is 1.0 in the file. The file says what its full scale is, and
+    `read_audio` undoes it; full_scale_pa None: samples are in no known unit, and it says none. Over 4 GiB a .wav is
+    written as RF64. cues: places named in a .wav (none of them: [] still says where the file begins), time_reference:
+    its first sample on the timeline it is for (files.riff). Raises AudioError (rate, NaN, silence or under 0.4 s where
+    loudness is asked, a loudness beyond reach) and FileError (place, format).
     """
     rate = check_sr(sr)
     _, container, _ = check_audio_output(path, subtype)
@@ -333,15 +309,29 @@ def write_audio(
         "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError,
     )  # fmt: skip
     sound = as_sound(samples)
-    channels, frames = sound.shape
-    if channels == 0:
+    if sound.shape[0] == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
-    gain = gain_per_pa(sound, rate, peak_dbfs, lufs, full_scale_pa)
+    level = find_level(sound, rate, peak_dbfs, lufs, full_scale_pa)
+    return write_at_level(path, sound, rate, level, subtype, cues, begins, scale=scale)
+
+
+def write_at_level(
+    path: str | os.PathLike[str],
+    sound: KeptSound,
+    sr: int,
+    level: FileLevel,
+    subtype: str | None = None,
+    cues: Sequence[Cue] | None = None,
+    time_reference: int = 0,
+    *,
+    scale: bool = True,
+) -> AudioReport:
+    """What `write_audio` writes once the level is found. Raises AudioError, FileError."""
+    gain, (channels, frames) = level.gain_per_pa, sound.shape
     words = f"{Path(path).stem[:80]}; {scale_text(1 / gain)}" if scale else Path(path).stem
-    chunks = b"" if cues is None else wave_chunks(cues, description=words, time_reference=begins)
+    chunks = b"" if cues is None else wave_chunks(cues, description=words, time_reference=time_reference)
     options: dict[str, Any] = {"gain_per_pa": gain, "subtype": subtype, "expected_frames": frames, "chunks": chunks}
-    options["scale"] = scale
-    with AudioWriter(path, rate, channels, **options) as writer:
-        for block in sound.blocks(BLOCK_FRAMES):
+    with AudioWriter(path, sr, channels, scale=scale, **options) as writer:
+        for block in sound.shaped(level.curve).blocks(BLOCK_FRAMES):
             writer.write(block)
-    return writer.report()
+    return replace(writer.report(), limited_db=level.limited_db, limited_s=level.limited_s)

@@ -62,6 +62,7 @@ class _Body(msgspec.Struct):
     options: ModalOptions | None = None
     mounting: str | float = "free"
     silent: bool = False
+    gain_db: float = 0.0
 
 
 class _Change(msgspec.Struct):
@@ -149,6 +150,7 @@ def pack_body(x: Body, material: int | None, model: int | None) -> _Body:
         x.options,
         x.mounting,
         bool(x.silent),
+        float(x.gain_db),
     )
 
 

@@ -66,8 +66,8 @@ class Body:
     partner. model None: nothing of it vibrates. since_step: the first step in which it exists for the sound;
     until_step: the first in which it does not any more, or -1. dynamics: friction, restitution, damping, mass, as the
     simulator has them when the record begins (see `Change`). options: what was asked of its modes; None where nothing
-    was, or the model was given. mounting: how it is held
-    (`records.mounting`). silent: no sensor hears it; it vibrates and touches as it does otherwise.
+    was, or the model was given. mounting: how it is held (`records.mounting`). silent: no sensor hears it; it vibrates
+    and touches as it does otherwise. gain_db: how much louder sensors hear it than it is.
     """
 
     body_id: int
@@ -86,6 +86,7 @@ class Body:
     options: ModalOptions | None = None
     mounting: Mounting = "free"
     silent: bool = False
+    gain_db: float = 0.0
 
     def __post_init__(self) -> None:
         where = f"body {shown(self.body_id)} link {shown(self.link)}"
@@ -102,6 +103,12 @@ class Body:
             as_kind(self.options, ModalOptions, f"{where}: options", "give ModalOptions, or none")
         store(self, mounting=as_mounting(self.mounting, f"{where}: mounting"))
         as_flag(self.silent, f"{where}: silent")
+        store(self, gain_db=as_number(self.gain_db, f"{where}: gain_db", "give a level in dB", least=-200, most=200))
+
+    @property
+    def gain(self) -> float:
+        """The factor that gain_db is."""
+        return float(10 ** (self.gain_db / 20))
 
 
 @dataclass(frozen=True, slots=True)

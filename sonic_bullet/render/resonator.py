@@ -109,9 +109,10 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             weight[row] = np.einsum("c,cxm,x->m", barycentric[0], corners, sensor.direction)
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
-    if body.silent:  # no sensor hears it; what it takes of its partners, and gives them, stays
-        weight[:] = 0.0
-        translation = None if translation is None else replace(translation, weight=0.0)
+    if body.silent or body.gain_db:  # of what sensors hear; what it takes of its partners, and gives them, stays
+        gain = 0.0 if body.silent else body.gain
+        weight *= gain
+        translation = None if translation is None else replace(translation, weight=translation.weight * gain)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
     damping_growth = None if model.damping_growth_s_m is None else model.damping_growth_s_m[keep] * most
     return Resonator(

@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.levels import check_levels, gain_per_pa
+from sonic_bullet.files.levels import FileLevel, check_levels, find_level
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.pictures import Camera, Standing, open_pictures
 from sonic_bullet.machine.progress import says_so
@@ -90,14 +90,16 @@ def make_film(
     codec: str | None = None,
     peak_dbfs: float | None = None,
     lufs: float | None = None,
+    level: FileLevel | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmReport:
     """A film of a log with its sound (channels, n) in pascals, whole or not at all; two processes draw.
 
     Where the sound goes on after the log's last step, the last picture does.
     standing: shapes of the scene's world, where it is there; events: drawn in, where they are given. codec: of the
-    sound, None: the container's usual one. progress: given the share done. Raises FileError, AudioError, SceneError;
-    stopped or failed under way, the error names the film that is finished so far.
+    sound, None: the container's usual one. level: found before, in place of peak_dbfs and lufs. progress: given the
+    share done. Raises FileError, AudioError, SceneError; stopped or failed under way, the error names the film that is
+    finished so far.
     """
     look = FilmLook() if look is None else look
     check_film_output(path, sr, sound.shape[0], codec)
@@ -106,7 +108,8 @@ def make_film(
     count = pictures_in(log, look.fps, seconds)
     if sound.shape[1] > math.floor(duration_of(log) * sr):  # it rings on: the last picture stays
         count = max(count, pictures_of(sound.shape[1], look.fps, sr))
-    gain = gain_per_pa(sound, sr, peak_dbfs, lufs, 1.0)
+    level = level or find_level(sound, sr, peak_dbfs, lufs, 1.0)
+    gain, sound = level.gain_per_pa, sound.shaped(level.curve)
     staging = staged(log, look.fps, count, standing)
     cameras = _cameras(log, staging, look)
     touching = None if events is None else _touching(log, staging)

@@ -11,13 +11,15 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.files import AudioReport, cannot, write_audio
+from sonic_bullet.files import AudioReport, cannot, write_at_level
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.files.levels import FileLevel, find_level
+from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records.errors import AudioError
@@ -78,13 +80,15 @@ def write_stems(
     *,
     gain_per_pa: float = 1.0,
     peak_dbfs: float | None = None,
+    lufs: float | None = None,
     cues: Callable[[int], Sequence[Cue]] | None = None,
     time_reference: int = 0,
 ) -> Iterator[AudioReport]:
     """Write a float32 WAV a stem into a folder, made where it is missing, one after another; each is whole or not
     there.
 
-    gain_per_pa: of all, so that they add up; peak_dbfs: each to a peak of its own instead, silent ones as they are.
+    gain_per_pa: of all, so that they add up; peak_dbfs, lufs: each to a level of its own instead, those as they are
+    that are silent, or too short or faint to have a loudness.
     cues: a stem's own, by its body's index. Raises FileError, AudioError.
     """
     place = Path(folder)
@@ -93,13 +97,17 @@ def write_stems(
     except OSError as error:
         raise cannot("make the folder", folder, error) from error
     for stem in stems:
-        own = peak_dbfs if peak_dbfs is not None and stem.sound.peaks().any() else None
-        yield write_audio(
-            place / f"{stem.name}.wav",
-            stem.sound,
-            sr,
-            peak_dbfs=own,
-            full_scale_pa=1 / gain_per_pa,
-            cues=None if cues is None else cues(stem.index),
-            time_reference=time_reference,
-        )
+        level = _own_level(stem.sound, sr, peak_dbfs, lufs) or FileLevel(gain_per_pa, stem.sound.curve)
+        place_to, own_cues = place / f"{stem.name}.wav", None if cues is None else cues(stem.index)
+        report = write_at_level(place_to, stem.sound, sr, level, cues=own_cues, time_reference=time_reference)
+        yield replace(report, loudness=measure_loudness(stem.sound.shaped(level.curve), sr, level.gain_per_pa))
+
+
+def _own_level(sound: KeptSound, sr: int, peak_dbfs: float | None, lufs: float | None) -> FileLevel | None:
+    """The level asked for, None where it cannot be given or none is."""
+    if peak_dbfs is None and lufs is None:
+        return None
+    try:
+        return find_level(sound, sr, peak_dbfs, lufs, 1.0)
+    except AudioError:
+        return None

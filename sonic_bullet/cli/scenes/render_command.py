@@ -8,7 +8,9 @@ import click
 
 from sonic_bullet.cli.examples import RENDER_EPILOG
 from sonic_bullet.cli.parameters import json_option, scene_options
+from sonic_bullet.cli.scenes.take_options import take_options
 from sonic_bullet.cli.sound_level import level_options
+from sonic_bullet.cli.soundtrack.session_output import session_options
 from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 
 
@@ -17,9 +19,9 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 @click.option(
     "-o",
     "--output",
-    required=True,
     metavar="NAME.wav",
-    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; it says what its full scale is in Pa.",
+    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; it says what its full scale is in Pa. Not needed with "
+    "--session.",
 )
 @click.option(
     "--seconds",
@@ -49,6 +51,8 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
     "--supports/--no-supports", default=None, help="Bodies that stand on others ring less. [default: as above]"
 )
 @soundtrack_options
+@session_options
+@take_options
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scenes.scene_commands import run_render

@@ -1,55 +1,45 @@
-"""`render` and `doctor`: check every output's place first, run, then write log, sound, picture and JSON, each whole or
-not at all.
-"""
+"""`render` and `doctor`: check every output's place first, run, then write (render_outputs.py)."""
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import (
-    clean_stdout,
-    described_render,
-    places,
-    progress_bar,
-    quiet_stderr,
-    status,
-    write_json,
-)
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
+from sonic_bullet.cli.scenes.render_outputs import RenderOutputs, with_partial
 from sonic_bullet.cli.scenes.scene_runs import (
     Replay,
     WantedMaterials,
     Wish,
     check_scene_file,
     is_log,
+    prepared,
+    rendered,
     replayed,
     simulated,
+    standing_collector,
 )
-from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_warnings
-from sonic_bullet.cli.soundtrack.soundtrack_outputs import Soundtrack, SoundtrackWish
-from sonic_bullet.files import (
-    AudioReport,
-    check_audio_output,
-    check_sr,
-    kept_name,
-    write_audio,
-    write_log,
-)
-from sonic_bullet.machine.worker import note_closing, stop_word
-from sonic_bullet.records.counts import format_count
+from sonic_bullet.cli.scenes.take_options import OPTIONS as TAKE_OPTIONS
+from sonic_bullet.cli.scenes.take_options import TakesWish
+from sonic_bullet.cli.scenes.take_outputs import write_takes
+from sonic_bullet.cli.sound_level import OPTIONS, LevelWish
+from sonic_bullet.cli.soundtrack.session_output import OPTIONS as SESSION_OPTIONS
+from sonic_bullet.cli.soundtrack.session_output import SessionWish
+from sonic_bullet.cli.soundtrack.soundtrack_outputs import SoundtrackWish
+from sonic_bullet.files import check_audio_output, check_sr
 from sonic_bullet.records.errors import AudioError, FileError, SceneError, SonicBulletError
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.listener.pictures import Standing
     from sonic_bullet.scene import RenderResult
 
 
 def run_render(
     scene: str,
     *,
-    output: str,
+    output: str | None,
     seconds: float | None,
     sr: float | None,
     contacts: str | None,
@@ -64,7 +54,7 @@ def run_render(
     supports: bool | None,
     **others: Any,
 ) -> None:
-    """The `render` command. others: options of `LevelWish` and `SoundtrackWish`.
+    """The `render` command. others: options of `LevelWish`, `SoundtrackWish` and `SessionWish`.
 
     Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far.
     """
@@ -74,61 +64,64 @@ def run_render(
     materials = WantedMaterials.read(material, silent)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
-    extras = SoundtrackWish(**others).checked(output)
+    takes = TakesWish.read(**{name: others.pop(name) for name in TAKE_OPTIONS})
+    session = SessionWish(**{name: others.pop(name) for name in SESSION_OPTIONS}).checked(others["stems"])
+    if output is None and session.folder is None:
+        raise FileError("there is no --output", "give -o NAME.wav, or --session DIR")
+    if takes.takes is not None:
+        others_given = {"--contacts": contacts, "--picture": picture, "--scale-json": level.scale_json or None}
+        _check_takes_alone(others_given | {f"--{name}": others[name] for name in ("stems", "events")}, others, session)
+    output = output or session.mix
+    extras = SoundtrackWish(**others | {"stems": session.folder or others["stems"]}).checked(output)
     to, contacts, picture, json_to, events_to = _check_places(
         output, contacts, picture, json_to, extras.events, level.json_path(output)
     )
-    made: Soundtrack | None = None
+    names = takes.outputs(output) if takes.takes is not None else []
+    *take_places, page, _ = places(*names, takes.page, json_to)
+    outputs = RenderOutputs(scene, output, to, contacts, models, picture, events_to, level, extras, session)
+    standing: list[Standing] = []
     with clean_stdout(json_to) as say:
         try:
             with progress_bar(Path(scene).name) as (progress, tell):
                 wish = Wish(
-                    seconds,
-                    rate,
-                    microphones,
-                    seed,
-                    materials,
-                    residual,
-                    supports,
-                    progress,
-                    tell,
+                    seconds, rate, microphones, seed, materials, residual, supports, progress, tell,
+                    at_end=standing_collector(standing) if session.film_fps is not None else None,
                     tail_db=level.tail_db,
-                )
-                result: RenderResult | Replay = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
+                )  # fmt: skip
+                result: RenderResult | Replay
+                if not takes:
+                    result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
+                else:
+                    log, said = _log_of(scene, wish)
+                    if takes.takes is None:
+                        log, more = takes.changed(log, scene)
+                        result = rendered(log, wish, (*said, *more))
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, to, output, level) from error
-        if contacts is not None:
-            try:
-                write_log(contacts, result.log, models or "included")
-            except SonicBulletError as error:
-                error.partial = result  # type: ignore[attr-defined]
-                raise with_partial(error, to, output, level) from error
-        try:
-            with progress_bar("stems and events") as (progress, tell):
-                made = extras.made(result, events_to, progress, tell, drawn=picture is not None)
-        except (SonicBulletError, KeyboardInterrupt) as error:
-            error.partial = result  # type: ignore[union-attr]
-            raise with_partial(error, to, output, level) from error
-        report = replace(_written(to, result, level, made), path=output)
-        if made is not None:
-            made.write(report)
-        if picture is not None:
-            from sonic_bullet.plots.scene_plot import render_picture
+        if takes.takes is not None:
+            to_each = [(name, str(place)) for name, place in zip(names, take_places, strict=True)]
+            log = takes.applied(log, scene)
+            described = write_takes(log, said, takes, level, to_each, page, wish, say)
+        else:
+            described = outputs.write(result, standing, say)
+    write_json(json_to, described)
 
-            seen = made.events if made is not None else ()
-            render_picture(picture, result.sound, result.sr, result.log, Path(scene).name, seen)
-        notes = (*result.notes, *_by_hand(scene, result.log), *_oversized(result.log), *level_warnings(report))
-        say("\n".join([summary(report, result.log), *(made.words if made is not None else ())]))
-        scale = {}
-        if report.channels:
-            scale = level.say(to, report.gain_per_pa, report.peak_pa, result.log, report.clipped)
-        for note in notes:
-            print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    lifted = None if isinstance(result, Replay) else result.lifted
-    write_json(
-        json_to,
-        described_render(result.log, report, notes, lifted) | {"scale": scale} | (made.described if made else {}),
-    )
+
+def _log_of(scene: str, wish: Wish) -> tuple[ContactLog, tuple[str, ...]]:
+    """The log of a scene that is run, or one that is there, as it is to be rendered; what a user should read of it."""
+    if is_log(scene):
+        log, _, said = prepared(scene, wish)
+        return log, said
+    result = simulated(scene, replace(wish, tail_db=0.0))
+    return result.log, result.notes
+
+
+def _check_takes_alone(outputs_given: dict[str, Any], others: dict[str, Any], session: SessionWish) -> None:
+    """Raise FileError where an output of one sound is asked for of several takes."""
+    given = outputs_given | {"--session": session.folder, "--cues": others["cues"] or None}
+    for option, value in given.items():
+        if value is not None:
+            raise FileError(f"{option} is of one sound, and --takes writes several", "give --take K in its place")
 
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
@@ -179,75 +172,3 @@ def _check_places(output: str, *others: str | None) -> tuple[str, str | None, st
         check_picture_output(picture)
     to, *found = places(output, *others)
     return str(to), found[0], found[1], found[2], found[3]
-
-
-def _written(output: str, result: RenderResult | Replay, level: LevelWish, made: Soundtrack | None) -> AudioReport:
-    """The sound as a file. Where silence keeps it from being one, the error says why it is silent."""
-    from sonic_bullet.render import why_silent
-
-    try:
-        cues: dict[str, Any] = {} if made is None else made.cues_for(result.sound.shape[1])
-        how = level.options(result.sound, result.log, output)
-        return write_audio(output, result.sound, result.sr, **how, **cues)
-    except AudioError as error:
-        reason = None if result.sound.peaks().any() else why_silent(result.log)
-        raise AudioError(error.what, reason) if reason else error from error
-
-
-def with_partial(
-    error: SonicBulletError | KeyboardInterrupt, to: str, output: str, level: LevelWish
-) -> SonicBulletError | KeyboardInterrupt:
-    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a
-    valid file beside ``to``.
-    """
-    result: RenderResult | Replay | None = getattr(error, "partial", None)
-    note_closing()
-    said = ""
-    if result is not None and all(result.sound.shape):
-        partial = kept_name(Path(to))
-        said = f"the first {result.sound.shape[1] / result.sr:.3f} s are in {kept_name(Path(output))}"
-        try:
-            try:
-                write_audio(partial, result.sound, result.sr, **level.options(result.sound, result.log, output))
-            except AudioError:
-                # silent or too short for the level asked for: kept as it is
-                write_audio(partial, result.sound, result.sr)
-        except FileError as failure:  # the error itself is what the user must read first
-            said = failure.what
-    if isinstance(error, SonicBulletError) and not stop_word():
-        return type(error)(error.what, "; ".join(part for part in (error.remedy, said) if part))
-    stopped = stop_word() if isinstance(error, SonicBulletError) else str(error) or "stopped"
-    return KeyboardInterrupt("; ".join(part for part in (stopped, said) if part))
-
-
-def _by_hand(scene: str, log: ContactLog) -> tuple[str, ...]:
-    from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of
-
-    moves = () if is_log(scene) else moves_of(log)
-    driven = any(one.drives for one in moves)
-    remedy = (f"contacts of what is driven are not simulated: sonic-bullet score {scene} lets it sound",)
-    return (*move_notes(log, moves), *(remedy if driven else ()))
-
-
-def _oversized(log: ContactLog) -> tuple[str, ...]:
-    from sonic_bullet.geometry import oversize
-    from sonic_bullet.records.simulated import with_body_id
-
-    large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
-    remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
-    return tuple(f"{with_body_id(body.name, body.body_id)} {words}; {remedy}" for body, words in large if words)
-
-
-def summary(report: AudioReport, log: ContactLog) -> str:
-    """What was written, in one line."""
-    from sonic_bullet.plots.scene_plot import quantity
-
-    channels = format_count(report.channels, "channel")
-    scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
-    scale += ", clipped" if report.clipped else ""
-    units = {quantity(sensor)[1] for sensor in log.sensors}
-    unit = units.pop() if len(units) == 1 else "(mixed units)"
-    return (
-        f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, "
-        f"rms {report.rms_pa:.4g} {unit}{scale}"
-    )

@@ -13,6 +13,7 @@ from sonic_bullet.records.errors import AudioError, FileError, MaterialError, So
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.files.rows.spool import KeptSound
+    from sonic_bullet.listener.pictures import Standing
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
     from sonic_bullet.session.material_choice import MaterialChoice
@@ -94,6 +95,19 @@ def check_scene_file(scene: str, verb: str) -> None:
         )
 
 
+def standing_collector(standing: list[Standing]) -> Callable[[Listener], None]:
+    """A function that, at a scene's end, puts the shapes of its silent partners into a list, for a film."""
+
+    def at_end(listener: Listener) -> None:
+        from sonic_bullet.listener import PyBulletWorld
+        from sonic_bullet.listener.pictures import standing_in
+
+        if isinstance(listener.world, PyBulletWorld):
+            standing.extend(standing_in(listener.world.client_id))
+
+    return at_end
+
+
 def simulated(scene: str, wish: Wish) -> RenderResult:
     """A scene, run."""
     with quiet_stderr():
@@ -125,11 +139,16 @@ class Replay:
 
 def replayed(path: str, wish: Wish) -> Replay:
     """A log's sound: bit for bit the render it came from, where no option changes it."""
+    log, _, said = prepared(path, wish)
+    return rendered(log, wish, said)
+
+
+def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
+    """A log as it is to be rendered, the wish, and what a user should read of it."""
     import numpy as np
 
     from sonic_bullet.files import read_log
     from sonic_bullet.records import Microphone
-    from sonic_bullet.render import render_kept, render_notes
     from sonic_bullet.session.chosen_in_log import with_choice
 
     log, said = with_choice(read_log(path), wish.materials.choice(), path, wish.say)
@@ -148,6 +167,13 @@ def replayed(path: str, wish: Wish) -> Replay:
                 "give fewer seconds, or simulate the scene for longer",
             )
         log = log.first(int((log.start_s < seconds - 1e-9).sum()))
+    return log, wish, said
+
+
+def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
+    """The sound of a log as it is."""
+    from sonic_bullet.render import render_kept, render_notes
+
     rate = wish.rate or log.sr
     try:
         sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, progress=wish.progress, say=wish.say)

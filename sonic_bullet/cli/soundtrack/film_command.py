@@ -16,7 +16,6 @@ from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
     from sonic_bullet.listener.pictures import Standing
-    from sonic_bullet.session import Listener
     from sonic_bullet.soundtrack.film import FilmReport
 
 EPILOG = """\b
@@ -61,8 +60,17 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @json_option
 def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
-    from sonic_bullet.cli.scenes.scene_commands import check_request, with_partial
-    from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, Wish, is_log, replayed, simulated
+    from sonic_bullet.cli.scenes.render_outputs import with_partial
+    from sonic_bullet.cli.scenes.scene_commands import check_request
+    from sonic_bullet.cli.scenes.scene_runs import (
+        DEFAULT_SR,
+        WantedMaterials,
+        Wish,
+        is_log,
+        replayed,
+        simulated,
+        standing_collector,
+    )
     from sonic_bullet.files import check_sr
     from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
     from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size
@@ -83,19 +91,12 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     to, json_to, _ = places(output, json_to, level.json_path(output))
     standing: list[Standing] = []
 
-    def at_end(listener: Listener) -> None:
-        from sonic_bullet.listener import PyBulletWorld
-        from sonic_bullet.listener.pictures import standing_in
-
-        if isinstance(listener.world, PyBulletWorld):
-            standing.extend(standing_in(listener.world.client_id))
-
     sound_to = str(Path(str(to)).with_suffix(".wav"))
     with clean_stdout(json_to) as say:
         with progress_bar(Path(scene).name) as (progress, tell):
             wish = Wish(
                 options["seconds"], rate, options["microphones"], options["seed"], materials, None, None,
-                progress, tell, at_end, level.tail_db,
+                progress, tell, standing_collector(standing), level.tail_db,
             )  # fmt: skip
             try:
                 result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
@@ -104,6 +105,7 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         if not result.log.sensors:
             raise FileError("there is no microphone, so the film has no sound", "give one, --microphone 0,-1,0.5")
         pictures_in(result.log, look.fps, options["seconds"])
+        found = level.found(result.sound, result.sr, result.log, str(to))
         events = None
         with quiet_stderr():
             import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
@@ -122,11 +124,12 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 standing=standing,
                 events=events,
                 codec=options["codec"],
-                **level.options(result.sound, result.log, str(to)),
+                level=found,
                 progress=progress,
             )
         say(_summary(output, report))
-        scale = level.say(str(to), report.gain_per_pa, float(result.sound.peaks().max()), result.log, report.clipped)
+        peak = float(result.sound.shaped(found.curve).peaks().max())
+        scale = level.say(str(to), found, peak, result.log, report.clipped)
         notes = (*result.notes, *report.notes, *_clipped(report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)

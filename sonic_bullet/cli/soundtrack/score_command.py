@@ -49,8 +49,8 @@ materials and an export script for Blender."""
 def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
     """Give a baked animation (.glb .gltf .json .npz) its sound, or a scene that of bodies that it moves by hand."""
     from sonic_bullet.cli.output import described_render
-    from sonic_bullet.cli.scenes.scene_commands import summary, with_partial
-    from sonic_bullet.files import check_audio_output, check_sr, write_audio, write_log
+    from sonic_bullet.cli.scenes.render_outputs import summary, with_partial
+    from sonic_bullet.files import check_audio_output, check_sr, write_at_level, write_log
 
     sr, level = check_sr(options["sr"]), LevelWish(**{name: options[name] for name in OPTIONS})
     level.check()
@@ -86,10 +86,10 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
             if result is not None:
                 error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, str(to), output, level) from error
-        scale = level.options(result.sound, result.log, str(to))
-        report = replace(write_audio(str(to), result.sound, sr, **scale), path=output)
+        found = level.found(result.sound, sr, result.log, str(to))
+        report = replace(write_at_level(str(to), result.sound, sr, found), path=output)
         say(summary(report, result.log))
-        scale = level.say(str(to), report.gain_per_pa, report.peak_pa, result.log, report.clipped)
+        scale = level.say(str(to), found, report.peak_pa, result.log, report.clipped)
         notes = (*result.notes, *level_warnings(report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)

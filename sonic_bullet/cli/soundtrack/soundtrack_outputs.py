@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,8 @@ from sonic_bullet.records.errors import FileError
 if TYPE_CHECKING:
     from sonic_bullet.cli.scenes.scene_runs import Replay
     from sonic_bullet.files import AudioReport, ContactLog
+    from sonic_bullet.files.levels import FileLevel
+    from sonic_bullet.files.loudness.gain_curve import GainCurve
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.soundtrack.sound_events import SoundEvent
     from sonic_bullet.soundtrack.stems import Stem
@@ -40,6 +42,7 @@ def soundtrack_options(command: Any) -> Any:
                 metavar="DB",
                 help="Scale each stem to a peak of its own. [default: all as the mix is]",
             ),
+            click.option("--stem-lufs", type=float, metavar="L", help="Scale each stem to a loudness of its own."),
             click.option(
                 "--events",
                 metavar="NAME.json|csv",
@@ -65,6 +68,7 @@ class SoundtrackWish:
 
     stems: str | None = None
     stem_peak_dbfs: float | None = None
+    stem_lufs: float | None = None
     events: str | None = None
     cues: bool = False
     time_reference_s: float | None = None
@@ -75,12 +79,17 @@ class SoundtrackWish:
             raise FileError(f"cannot write {self.events}: events are JSON or CSV", "end the name with .json or .csv")
         if self.cues and Path(output).suffix.lower() not in WITH_CUES:
             raise FileError(f"cannot write cue points to {output}", "end its name with .wav")
+        from sonic_bullet.files import check_levels
+
         if self.time_reference_s is not None and not self.cues:
             raise FileError("--time-reference is told beside cue points", "give --cues too")
         if self.time_reference_s is not None and not self.time_reference_s <= LATEST_S:
             raise FileError(f"--time-reference is {self.time_reference_s:g} s", f"give 0 to {LATEST_S:g}, 30 years")
-        if self.stem_peak_dbfs is not None and self.stems is None:
-            raise FileError("--stem-peak-dbfs is of stems", "give --stems DIR too")
+        own = {"--stem-peak-dbfs": self.stem_peak_dbfs, "--stem-lufs": self.stem_lufs}
+        for option, asked in own.items():
+            if asked is not None and self.stems is None:
+                raise FileError(f"{option} is of stems", "give --stems DIR too")
+        check_levels(self.stem_peak_dbfs, self.stem_lufs)
         if self.stems is None:
             return self
         folder = folder_place(self.stems, "")
@@ -146,8 +155,10 @@ class Soundtrack:
             "time_reference": self.time_reference,
         }
 
-    def write(self, mix: AudioReport) -> None:
-        """Events and stems. Raises FileError, AudioError."""
+    def write(self, mix: AudioReport, fades: GainCurve | None, level: FileLevel) -> None:
+        """Events and stems, faded as the mix; limited as it, too, but for those of a level of their own. Raises
+        FileError, AudioError.
+        """
         from sonic_bullet.soundtrack.event_tables import write_events
         from sonic_bullet.soundtrack.stems import write_stems
 
@@ -157,13 +168,17 @@ class Soundtrack:
             self.described["sounding"] = counts
         if self.wish.stems is None:
             return
+        own = self.wish.stem_peak_dbfs is not None or self.wish.stem_lufs is not None
+        curve = fades if own else level.curve
+        stems = [replace(stem, sound=stem.sound.shaped(curve)) for stem in self.stems]
         reports = list(
             write_stems(
                 self.wish.stems,
-                self.stems,
+                stems,
                 self.sr,
                 gain_per_pa=mix.gain_per_pa,
                 peak_dbfs=self.wish.stem_peak_dbfs,
+                lufs=self.wish.stem_lufs,
                 cues=(lambda body: self.cues_for(mix.frames, body)["cues"]) if self.wish.cues else None,
                 time_reference=self.time_reference,
             )
@@ -183,6 +198,8 @@ class Soundtrack:
                 "name": self.log.bodies[stem.index].name.encode("utf-8", "replace").decode(),
                 "peak_pa": report.peak_pa,
                 "gain_per_pa": report.gain_per_pa,
+                "limited_db": report.limited_db,
+                "loudness": None if report.loudness is None else asdict(report.loudness),
             }
-            for stem, report in zip(self.stems, reports, strict=True)
+            for stem, report in zip(stems, reports, strict=True)
         ]

@@ -13,12 +13,13 @@ import os
 import tempfile
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO, Any
 
 import numpy as np
 
 from sonic_bullet.files.atomic import cannot
+from sonic_bullet.files.loudness.gain_curve import GainCurve
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
@@ -174,12 +175,14 @@ class SoundSpool(Spool):
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptSound:
     """Sound as long as it likes: (channels, n) float64, the first ``count`` frames in a spool of rows (channels,), the
-    ``rest`` (channels, ·) in memory. What is appended to the spool later is not of it.
+    ``rest`` (channels, ·) in memory. What is appended to the spool later is not of it. curve: a factor a frame, which
+    `read` applies; None: ones.
     """
 
     spool: SoundSpool
     count: int
     rest: Array
+    curve: GainCurve | None = None
 
     @classmethod
     def of(cls, samples: Array) -> KeptSound:
@@ -191,8 +194,24 @@ class KeptSound:
         """Channels and frames."""
         return len(self.rest), self.count + self.rest.shape[1]
 
+    def shaped(self, curve: GainCurve | None) -> KeptSound:
+        """The same sound with another curve."""
+        return replace(self, curve=curve)
+
+    def limited(self, factor: Array) -> KeptSound:
+        """The same sound with factors (frames,) besides its fades."""
+        return self.shaped(replace(self.curve or GainCurve(self.shape[1]), limiter=factor))
+
+    def scaled(self, gain: float) -> KeptSound:
+        """The same sound, times a gain."""
+        return self.shaped(replace(self.curve or GainCurve(self.shape[1]), gain=gain))
+
     def read(self, start: int, stop: int) -> Array:
         """(channels, stop - start) of the frames start … stop-1, fewer at the end. Raises FileError."""
+        block = self._read(start, stop)
+        return block if self.curve is None else block * self.curve.read(start, stop)
+
+    def _read(self, start: int, stop: int) -> Array:
         first = self.spool[start : min(stop, self.count)].T
         if stop <= self.count:
             return first

@@ -108,14 +108,15 @@ def _audible(new: Array, free: Array) -> Array:
 
 def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
     """Weights (W, columns) of what passes to each partner that is heard: more than LEAST_PASSED of what the body itself
-    sounds in some mode, of those within FAINTEST of its loudest.
+    sounds in some mode, of those within FAINTEST of its loudest, both without gains.
     """
-    own = np.abs(state.resonators[b].weight[0])
+    own = np.abs(state.resonators[b].weight[0]) / state.resonators[b].body.gain
     least = np.maximum(LEAST_PASSED * own, FAINTEST * own.max(initial=0.0))
     for p, rate in zip(partners, placed.passes, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
         weight[:, : rate.shape[1]] = passed_weight(state.resonators[p], rate, placed.omega_rad_s)
-        if (np.abs(weight[0, : len(own)]) > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
+        passed = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
+        if (passed > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
 
 

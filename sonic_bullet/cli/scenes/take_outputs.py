@@ -1,0 +1,83 @@
+"""`render --takes N`: each take rendered, brought to its level and written, one after another; then the page.
+
+Each is whole or not there: what ends the run leaves those before it.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.cli.output import described_render, progress_bar
+from sonic_bullet.cli.scenes.render_outputs import find_level_of, summary, with_partial
+from sonic_bullet.cli.scenes.scene_runs import Wish, rendered
+from sonic_bullet.cli.scenes.take_options import TakesWish, describe_draws
+from sonic_bullet.cli.sound_level import LevelWish, level_warnings
+from sonic_bullet.files import write_at_level
+from sonic_bullet.files.loudness.meter import measure_loudness
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.session.variation import AS_SIMULATED, make_take
+
+if TYPE_CHECKING:
+    from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.files.levels import FileLevel
+
+
+def write_takes(
+    log: ContactLog,
+    notes: tuple[str, ...],
+    takes: TakesWish,
+    level: LevelWish,
+    places: list[tuple[str, str]],
+    page: str | None,
+    wish: Wish,
+    say: Callable[[str], None],
+) -> dict[str, Any]:
+    """All takes of a log; the same as JSON. places: of each the name as the user gave it and the absolute path; page:
+    absolute. Raises SonicBulletError, KeyboardInterrupt.
+    """
+    from sonic_bullet.report.takes_page import take_entry, write_page
+
+    described: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
+    scales: list[tuple[str, FileLevel, float, ContactLog, int]] = []
+    said, lines = [*notes, AS_SIMULATED], []
+    for number, (output, to) in enumerate(places, start=1):
+        take = make_take(log, number, takes.variation)
+        try:
+            with progress_bar(f"take {number} of {len(places)}") as (progress, tell):
+                result = rendered(take.log, replace(wish, progress=progress, say=tell), ())
+        except (SonicBulletError, KeyboardInterrupt) as error:
+            raise with_partial(error, to, output, level) from error
+        found = find_level_of(result, level, to)
+        try:
+            report = replace(write_at_level(to, result.sound, result.sr, found), path=output)
+        except SonicBulletError as error:
+            finished = "; ".join([error.remedy, *[f"{name} is finished" for name, _ in places[: number - 1]][-1:]])
+            raise type(error)(error.what, finished) from error
+        sound = result.sound.shaped(found.curve)
+        loudness = measure_loudness(sound, result.sr, found.gain_per_pa)
+        draws = describe_draws(take)
+        lines += [summary(report, take.log), f"{output}: {loudness}", *[f"{output}: {draws}"] * bool(draws)]
+        scales.append((to, found, report.peak_pa, take.log, report.clipped))
+        said += [one for one in (*result.notes, *level_warnings(report)) if one not in said]
+        described.append(
+            described_render(take.log, report, result.notes)
+            | {"take": number, "seed": take.log.seed, "drawn": {name: dict(of) for name, of in take.drawn.items()}}
+            | {"loudness": asdict(loudness)}
+        )
+        if page is not None:
+            entries.append(take_entry(output, sound, result.sr, found.gain_per_pa, str(loudness), take.drawn))
+    if page is not None:
+        write_page(page, entries, f"Takes of {Path(places[0][0]).name}, seed {log.seed}", AS_SIMULATED)
+        lines.append(f"{takes.page}: {format_count(len(entries), 'take')}")
+    say("\n".join(lines))
+    for one, scale in zip(described, scales, strict=True):
+        one["scale"] = level.say(*scale) if one["channels"] else {}
+    for note in said:
+        print(f"sonic-bullet: note: {note}", file=sys.stderr)
+    return {"takes": described, "notes": said, "varied": sorted(takes.varied)}

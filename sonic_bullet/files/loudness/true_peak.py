@@ -1,0 +1,59 @@
+"""The largest magnitude of the waveform between samples, which a converter or a lossy codec rebuilds.
+
+    x -> 16 times the rate, by a Kaiser-windowed sinc of 40 samples -> largest magnitude    [ITU-R BS.1770-5, annex 2]
+
+The standard asks for 4 times at least, which may read 0.7 dB low; 16 times reads at most 0.04 dB low: 20·log10 cos(π
+f/n) of a tone at the share f = 1/2 of the rate, n times of it [annex 2, att. 1].
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.records import Array
+
+OVERSAMPLING = 16
+REACH, KAISER_BETA = 20, 7.0
+"""Samples on either side of which one between is made, and their window: even to 0.45 of the rate."""
+BOUND = 3.5
+"""No sample between is larger than that many times the largest around: the sum of the sinc's magnitudes."""
+BLOCK_FRAMES = 1 << 14
+
+
+def find_true_peak(sound: KeptSound) -> float:
+    """The true peak of all channels. Blocks in which none larger than those before can be are passed over."""
+    found = 0.0
+    for start in range(0, sound.shape[1], BLOCK_FRAMES):
+        block = sound.read(max(start - 2 * REACH, 0), start + BLOCK_FRAMES + 2 * REACH)
+        if BOUND * np.abs(block).max(initial=0.0) > found:
+            found = max(found, float(np.abs(_between(block)).max()))
+    return found
+
+
+def sample_true_peaks(samples: Array) -> Array:
+    """(n,) the true peak within half a sample of each, over channels (c, n)."""
+    frames = samples.shape[1]
+    made = np.empty(frames)
+    for start in range(0, frames, BLOCK_FRAMES):
+        first, stop = max(start - 2 * REACH, 0), min(start + BLOCK_FRAMES, frames)
+        fine = np.abs(_between(samples[:, first : stop + 2 * REACH])).max(axis=0)
+        fine = np.concatenate([np.zeros(OVERSAMPLING // 2), fine, np.zeros(OVERSAMPLING // 2)])
+        after = OVERSAMPLING * (np.arange(start, stop) - first)  # half a sample before each, then as much behind
+        made[start:stop] = np.maximum.reduce([fine[after + k] for k in range(OVERSAMPLING + 1)])
+    return made
+
+
+def _between(samples: Array) -> Array:
+    from scipy.signal import resample_poly
+
+    return np.asarray(resample_poly(samples, OVERSAMPLING, 1, axis=1, window=_window()))
+
+
+@cache
+def _window() -> Array:
+    from scipy.signal import firwin
+
+    return np.asarray(firwin(2 * REACH * OVERSAMPLING + 1, 1 / OVERSAMPLING, window=("kaiser", KAISER_BETA)))
