@@ -1,8 +1,8 @@
 """The pages of docs/reference that are made of the code: what a docstring, a command's help or a class says is said
 once.
 
-python docs/make_reference.py            writes api.md, commands.md, case.schema.json, and the marked parts
-                                             of case.md, contact-log.md and how-a-diagnosis-judges.md
+python docs/make_reference.py            writes api.md, commands.md, case.schema.json, baked.schema.json, and the marked
+                                             parts of case.md, baked.md, contact-log.md, how-a-diagnosis-judges.md
 python docs/make_reference.py --check    writes nothing; names what is out of date, and exits with 1 where something is
 """
 
@@ -41,6 +41,7 @@ API = (
         ("Comparison", "Difference", "Consequence"),
     ),
     ("sonic_bullet.comparing.sides", "A scene to be compared.", ("SceneSide",)),
+    ("sonic_bullet.bake", "Bake models for other engines, read and play them.", None),
     ("sonic_bullet.environments", "Sound as an observation. It needs the extra `environments`.", None),
     ("sonic_bullet.estimator.fit.material_fit", "Fit a material to a case.", ("fit_case",)),
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
@@ -216,19 +217,30 @@ def walked(path: str, command: click.Command) -> Iterator[tuple[str, click.Comma
             yield from walked(f"{path} {name}", command.commands[name])
 
 
-def schema_text() -> str:
-    """JSON Schema of case.json."""
-    from sonic_bullet.files.case_schema import case_schema
-
-    return json.dumps(case_schema(), indent=2, ensure_ascii=False) + "\n"
+def schema_text(schema: dict[str, Any]) -> str:
+    """A JSON Schema as its file has it."""
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def case_fields() -> str:
-    """A table a part of case.json: field, type, default, meaning."""
+    """A table a part of case.json."""
     from sonic_bullet.files.case_schema import case_schema
 
+    return field_tables(case_schema()["$defs"])
+
+
+def baked_fields() -> str:
+    """A table a part of a baked model's JSON; its residual is a preset's."""
+    from sonic_bullet.bake.baked_form import ABOUT, baked_schema
+
+    tables = field_tables({name: part for name, part in baked_schema()["$defs"].items() if name in ABOUT})
+    return tables.replace("[ResidualForm](#residualform)", "[residual](preset.md)")
+
+
+def field_tables(defs: dict[str, Any]) -> str:
+    """A table a part of a JSON file: field, type, default, meaning."""
     parts = []
-    for name, part in case_schema()["$defs"].items():
+    for name, part in defs.items():
         parts += [
             f"### {name}",
             "",
@@ -294,13 +306,18 @@ def thresholds() -> str:
 
 def pages() -> dict[Path, str]:
     """Every made file, and what it should hold."""
-    case, log = PLACE / "case.md", PLACE / "contact-log.md"
+    from sonic_bullet.bake.baked_form import baked_schema
+    from sonic_bullet.files.case_schema import case_schema
+
+    case, log, baked = PLACE / "case.md", PLACE / "contact-log.md", PLACE / "baked.md"
     judges = PLACE.parent / "explanation" / "how-a-diagnosis-judges.md"
     return {
         PLACE / "api.md": api_page(),
         PLACE / "commands.md": commands_page(),
-        PLACE / "case.schema.json": schema_text(),
+        PLACE / "case.schema.json": schema_text(case_schema()),
+        PLACE / "baked.schema.json": schema_text(baked_schema()),
         case: between(case.read_text(encoding="utf-8"), "fields", case_fields()),
+        baked: between(baked.read_text(encoding="utf-8"), "fields", baked_fields()),
         log: between(log.read_text(encoding="utf-8"), "arrays", log_arrays()),
         judges: between(judges.read_text(encoding="utf-8"), "thresholds", thresholds()),
     }

@@ -13,6 +13,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sonic_bullet.bake import read_baked
     from sonic_bullet.comparing.compared_sides import compare
     from sonic_bullet.files import read_audio, read_log, write_audio
     from sonic_bullet.files.contact_log import ContactLog
@@ -45,6 +46,7 @@ _HOME = {
     "list_materials": "presets",
     "load_material": "presets",
     "read_audio": "files",
+    "read_baked": "bake",
     "read_log": "files",
     "render_log": "render",
     "write_audio": "files",
@@ -69,6 +71,7 @@ __all__ = [
     "list_materials",
     "load_material",
     "read_audio",
+    "read_baked",
     "read_log",
     "render_log",
     "write_audio",

@@ -5,6 +5,7 @@
     film SCENE.py | LOG.npz   -> the same, with pictures: .mp4 .mov .mkv
     score ANIMATION           -> a baked animation's sound and contact log
     modes MESH                -> ModalModel   -> table, JSON, npz
+    bake MESH | SCENE | LOG   -> BakedModel   -> .glb .gltf .json .dsp .h .wav
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
     compare A B               -> Comparison   -> words, JSON, page
@@ -38,6 +39,7 @@ from sonic_bullet.cli.examples import (
 from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options, uff_option
 from sonic_bullet.cli.scenes.play_command import play
 from sonic_bullet.cli.scenes.render_command import render
+from sonic_bullet.cli.solids.bake_command import bake
 from sonic_bullet.cli.soundtrack.film_command import film
 from sonic_bullet.cli.soundtrack.score_command import score
 
@@ -57,6 +59,7 @@ cli.add_command(render)
 cli.add_command(play)
 cli.add_command(film)
 cli.add_command(score)
+cli.add_command(bake)
 
 
 @cli.command(epilog=MODES_EPILOG)

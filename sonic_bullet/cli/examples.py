@@ -18,6 +18,16 @@ Examples:
   sonic-bullet modes fork.obj --material steel --fix 0,0,-0.1,0.01
   sonic-bullet modes plate.obj --material glass --uff plate.uff"""
 
+BAKE_EPILOG = """\b
+Examples:
+  sonic-bullet bake bowl.obj --material steel -o bowl.glb       (glTF with KHR_audio_rigid_bodies)
+  sonic-bullet bake bowl.obj --material bowl.json --modes 30 --below 60 --points 100 -o bowl.json
+  sonic-bullet bake mug.obj --material ceramic-mug -o mug.dsp   (faust2jack mug.dsp)
+  sonic-bullet bake mug.obj --material porcelain -o mug.h
+  sonic-bullet bake bar.obj --material brass --strike 0.1,0,0.005 --impulse 0.02 -o tap.wav
+  sonic-bullet bake scenes/tabletop.py -o bodies.glb            (all its bodies)
+  sonic-bullet bake table.npz --body mug -o mug.h"""
+
 FIT_EPILOG = """\b
 Examples:
   sonic-bullet fit tap.wav --mesh bar.obj --strike 0.05,0,0.003 --material steel -o bar.json --picture bar.png

@@ -42,6 +42,23 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
         return surfaces
 
 
+def read_own_vertices(path: Path) -> MeshSurface:
+    """All vertices (v, 3) of a mesh file in the file's own order, those that no face names too, and its faces (f, 3).
+
+    Raises FileError and MeshError as `read_surfaces` does.
+    """
+    if path.suffix.lower() != ".obj":
+        parts = read_surfaces(path)
+        offsets = np.cumsum([0] + [len(vertex) for vertex, _ in parts[:-1]])
+        faces = [face + offset for (_, face), offset in zip(parts, offsets, strict=True)]
+        return np.concatenate([vertex for vertex, _ in parts]), np.concatenate(faces)
+    with reading(path, "mesh", MeshError, REMEDY):
+        if not path.is_file():
+            raise FileError(f"mesh file '{path}' does not exist", "check the path")
+        points, objects = _parsed_obj(path)
+        return points, np.concatenate([np.array(faces).reshape(-1, 3) for faces in objects]) - 1
+
+
 def _check(path: Path, vertex: Array, face: Array) -> None:
     wrong = np.argwhere((face < 0) | (face >= len(vertex)))
     if len(wrong):
@@ -54,7 +71,18 @@ def _check(path: Path, vertex: Array, face: Array) -> None:
 
 
 def _obj(path: Path) -> Iterator[MeshSurface]:
-    """Wavefront OBJ: v, f, and o or g as the start of an object; texture and normals are skipped."""
+    """Each object of a Wavefront OBJ with the vertices that it uses."""
+    points, objects = _parsed_obj(path)
+    for faces in objects:
+        if faces:
+            used, index = np.unique(faces, return_inverse=True)
+            yield points[used - 1], index.reshape(-1, 3)
+
+
+def _parsed_obj(path: Path) -> tuple[Array, list[list[tuple[int, int, int]]]]:
+    """Vertices (v, 3) of a Wavefront OBJ, and of each object its triangles by vertices counted from 1: v, f, and o or g
+    as the start of an object; texture and normals are skipped.
+    """
     vertex: list[tuple[float, float, float]] = []
     objects: list[list[tuple[int, int, int]]] = [[]]  # of vertices as they are counted, from 1
     largest, largest_line, before = 0, 0, ""
@@ -83,11 +111,7 @@ def _obj(path: Path) -> Iterator[MeshSurface]:
         raise MeshError(
             f"mesh file {path}, line {largest_line}: a face names vertex {largest} of {len(vertex)}", REMEDY
         )
-    points = np.array(vertex, float).reshape(-1, 3)
-    for faces in objects:
-        if faces:
-            used, index = np.unique(faces, return_inverse=True)
-            yield points[used - 1], index.reshape(-1, 3)
+    return np.array(vertex, float).reshape(-1, 3), objects
 
 
 def _vertex(words: list[str]) -> tuple[float, float, float]:

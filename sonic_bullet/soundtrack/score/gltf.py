@@ -11,19 +11,16 @@ do mass and isKinematic of KHR_physics_rigid_bodies.
 
 from __future__ import annotations
 
-import base64
-import json
 import os
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
-from sonic_bullet.files.reading import reading, refuse_lfs_pointer
+from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
+from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
@@ -36,8 +33,6 @@ POSES_MAX = 2_000_000
 """Of all nodes: half a gigabyte while they are read."""
 LATE_S = 1e-3
 _REMEDY = "export it again as glTF 2.0 (.glb)"
-COMPONENT = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 STRETCH = 1e-3
 """Share by which a scale may change, or the axes of a transform be oblique, and still be rounding."""
@@ -51,7 +46,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
     with reading(path, "glTF file", AnimationError, _REMEDY):
         if place.stat().st_size > BYTES_MAX:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
-        file = _File.of(place)
+        file = read_tree(place, AnimationError, _REMEDY)
         channels = _channels(file)
         if not channels:
             raise AnimationError(
@@ -71,73 +66,6 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
         notes = [f"the first key is at {first:.3f} s: the sound begins there"] * bool(first > LATE_S)
         objects = tuple(_objects(file, channels, at_s, scale, notes))
         return Export(rate, objects, np.array([0.0, 0.0, -9.81]), tuple(notes))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _File:
-    """The JSON tree, and the bytes of each buffer."""
-
-    tree: dict[str, Any]
-    buffer: tuple[bytes, ...]
-
-    @classmethod
-    def of(cls, path: Path) -> _File:
-        raw, chunk = path.read_bytes(), b""
-        if raw[:4] == b"glTF":  # [4.4]
-            version, length = struct.unpack_from("<II", raw, 4)
-            size, kind = struct.unpack_from("<I4s", raw, 12)
-            if version != 2 or kind != b"JSON" or length > len(raw):
-                raise AnimationError(f"{path} is no whole GLB of version 2", _REMEDY)
-            text, rest = raw[20 : 20 + size], 20 + size
-            if rest + 8 <= len(raw):
-                more, kind = struct.unpack_from("<I4s", raw, rest)
-                chunk = raw[rest + 8 : rest + 8 + more] if kind == b"BIN\0" else b""
-        else:
-            text = raw
-        tree = json.loads(text)
-        if not isinstance(tree, dict) or str(tree.get("asset", {}).get("version", ""))[:2] != "2.":
-            raise AnimationError(f"{path} is no glTF of version 2", _REMEDY)
-        needed = set(tree.get("extensionsRequired", ())) - {"KHR_mesh_quantization", "KHR_texture_transform"}
-        packed = sorted(x for x in needed if "draco" in x.lower() or "meshopt" in x.lower())
-        if packed:
-            raise AnimationError(f"{path} is compressed with {packed[0]}", "export it without compression")
-        return cls(tree, tuple(_buffer(one, chunk, path) for one in tree.get("buffers", ())))
-
-    def accessor(self, index: int) -> Array:
-        """(n, width) float, or integer where it is no normalised one."""
-        it = self.tree["accessors"][index]
-        kind, width, count = np.dtype(COMPONENT[it["componentType"]]), WIDTH[it["type"]], int(it["count"])
-        if "sparse" in it or "bufferView" not in it:
-            raise AnimationError("an accessor is sparse or empty", "export with full accessors")
-        view = self.tree["bufferViews"][it["bufferView"]]
-        data = self.buffer[view["buffer"]]
-        start = int(view.get("byteOffset", 0)) + int(it.get("byteOffset", 0))
-        row = kind.itemsize * width
-        stride = int(view.get("byteStride", row))
-        if start < 0 or stride < row or count < 1 or start + (count - 1) * stride + row > len(data):
-            raise AnimationError("an accessor claims more bytes than its buffer has", _REMEDY)
-        found = np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
-        if kind.kind == "f" or not it.get("normalized"):
-            return np.array(found, float if kind.kind == "f" else np.int64)
-        most = float(np.iinfo(kind).max)
-        return np.maximum(found.astype(float) / most, -1.0)  # [3.11]
-
-
-def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path) -> bytes:
-    uri = one.get("uri")
-    if uri is None:
-        data = chunk
-    elif uri.startswith("data:"):
-        data = base64.b64decode(uri.split(",", 1)[1])
-    else:
-        name = Path(unquote(uri))
-        if name.is_absolute() or ".." in name.parts:
-            raise AnimationError(f"buffer {shown(uri)} lies outside its folder", "keep it beside the .gltf")
-        refuse_lfs_pointer(path.parent / name, AnimationError)
-        data = (path.parent / name).read_bytes()
-    if len(data) < int(one.get("byteLength", 0)):
-        raise AnimationError("a buffer is shorter than it claims", _REMEDY)
-    return data
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,7 +110,7 @@ def _slerp(a: Array, b: Array, s: Array) -> Array:
     return np.asarray(np.where(small, a + s * (b - a), (np.sin((1 - s) * angle) * a + np.sin(s * angle) * b) / sine))
 
 
-def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
+def _channels(file: GltfTree) -> dict[int, dict[str, _Sampler]]:
     """Samplers of each animated node, of all animations: what two of them say of one path, the first says."""
     found: dict[int, dict[str, _Sampler]] = {}
     for animation in file.tree.get("animations", ()):
@@ -202,11 +130,11 @@ def _channels(file: _File) -> dict[int, dict[str, _Sampler]]:
     return found
 
 
-def _parents(file: _File) -> dict[int, int]:
+def _parents(file: GltfTree) -> dict[int, int]:
     return {child: i for i, node in enumerate(file.tree.get("nodes", ())) for child in node.get("children", ())}
 
 
-def _needed(file: _File) -> set[int]:
+def _needed(file: GltfTree) -> set[int]:
     """Nodes that have a mesh, and those that they hang on."""
     parent, found = _parents(file), set[int]()
     for one, node in enumerate(file.tree.get("nodes", ())):
@@ -218,7 +146,7 @@ def _needed(file: _File) -> set[int]:
 
 
 def _objects(
-    file: _File, channels: Mapping[int, Mapping[str, _Sampler]], at_s: Array, scale: float, notes: list[str]
+    file: GltfTree, channels: Mapping[int, Mapping[str, _Sampler]], at_s: Array, scale: float, notes: list[str]
 ) -> Iterator[ExportedObject]:
     nodes, parent = file.tree.get("nodes", []), _parents(file)
     known: dict[int, Array] = {}
@@ -299,7 +227,7 @@ def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
     return stretch, matrix[:, :3, 3].copy(), Rotation.from_matrix(frame).as_quat()
 
 
-def _mesh(file: _File, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
+def _mesh(file: GltfTree, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
     """Vertices (v, 3) and triangles (f, 3) of all primitives of a mesh that are triangles [3.7.2]."""
     vertices, faces, at = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
     for part in mesh.get("primitives", ()):

@@ -1,0 +1,1 @@
+"""Commands on solids that are no scenes."""

@@ -1,0 +1,214 @@
+"""What `bake` does: places first, then modes, then the file, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, warn, write_json
+from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.records import Body
+from sonic_bullet.records.coerce import LISTED, nearest
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import FileError, MaterialError
+from sonic_bullet.records.units import HEARING_LIMIT_HZ
+
+if TYPE_CHECKING:
+    from sonic_bullet.bake import BakedModel, PruningOptions
+    from sonic_bullet.files import ContactLog
+
+MESH_MATERIAL = "steel"
+PROGRAMS, FEW_POINTS = (".dsp", ".h"), 64
+"""Points of programs, whose tables a compiler reads, unless others are asked for."""
+SCENE_S = 0.1
+"""How long a scene runs until its bodies are known."""
+STRIKE_RATE_HZ, LONGEST_STRIKE_S, STRIKE_FALL = 48_000, 10.0, 6.9
+"""Of a .wav: e^-6.9 is -60 dB."""
+
+
+@dataclass(frozen=True, slots=True)
+class _StrikeWish:
+    """What was asked of a strike; None: by default."""
+
+    strike: tuple[float, ...] | None
+    direction: tuple[float, ...] | None
+    impulse: float | None
+    contact_ms: float | None
+
+    def check(self, end: str) -> None:
+        asked = [name for name in ("strike", "direction", "impulse", "contact_ms") if getattr(self, name) is not None]
+        if asked and end != ".wav":
+            option = asked[0].replace("contact_ms", "contact")
+            raise FileError(f"--{option} is of a strike, and {end} holds none", "end the name with .wav")
+
+    def write(self, path: str, model: BakedModel) -> str:
+        """Write the strike; what to say of it."""
+        import numpy as np
+
+        from sonic_bullet.bake import choose_strike, render_strike
+        from sonic_bullet.bake.strike_playback import CONTACT_S, IMPULSE_N_S
+        from sonic_bullet.files import write_audio
+
+        strike = choose_strike(
+            model,
+            point_m=None if self.strike is None else np.array(self.strike),
+            direction=None if self.direction is None else np.array(self.direction),
+            impulse_n_s=self.impulse or IMPULSE_N_S,
+            contact_s=CONTACT_S if self.contact_ms is None else self.contact_ms / 1000,
+        )
+        slowest = float(model.decay_per_s[model.freq_hz < STRIKE_RATE_HZ / 2].min(initial=np.inf))
+        seconds = min(LONGEST_STRIKE_S, strike.contact_s + STRIKE_FALL / max(slowest, 1e-3)) or LONGEST_STRIKE_S
+        sound = render_strike(model, strike, STRIKE_RATE_HZ, seconds)
+        report = write_audio(path, sound[None], STRIKE_RATE_HZ, peak_dbfs=-1)
+        at = ", ".join(f"{1e3 * x:.4g}" for x in strike.point_m)
+        size = float(np.linalg.norm(strike.impulse_n_s))
+        return f"a strike of {size:.3g} N·s at ({at}) mm: peak {report.peak_pa:.3g} Pa at 1 m, its modes alone"
+
+
+def run_bake(
+    source: str,
+    *,
+    output: str,
+    material: tuple[str, ...],
+    modes: int | None,
+    below_db: float | None,
+    points: int | None,
+    body: str | None,
+    scale: float,
+    thickness_m: float | None,
+    to_hz: float | None,
+    json_to: str | None,
+    **strike: Any,
+) -> None:
+    """The `bake` command. Raises SonicBulletError."""
+    from sonic_bullet.bake.formats import ONE, check_baked_name
+
+    end = check_baked_name(output)
+    wish = _StrikeWish(**strike)
+    wish.check(end)
+    to, json_to = places(output, json_to)
+    assert to is not None
+    scene = is_log(source) or Path(source).suffix.lower() == ".py"
+    if scene and (thickness_m is not None or to_hz is not None or scale != 1.0):
+        raise FileError(
+            "--scale, --thickness and --to-hz are of a mesh", f"leave them out: {source} says what its bodies are"
+        )
+    if not scene and body is not None:
+        raise FileError("--body is of a scene or a contact log", "leave it out: a mesh is one body")
+    with clean_stdout(json_to) as say:
+        from sonic_bullet.bake import PruningOptions, write_baked
+
+        pruning = PruningOptions(modes, below_db, points or (FEW_POINTS if end in PROGRAMS else None))
+        if scene:
+            models = _scene_models(source, material, body, pruning, one=end in ONE)
+        else:
+            models = [_mesh_model(source, material, scale, thickness_m, to_hz, pruning)]
+        if end == ".wav":
+            say(_line(models[0]) + "\n" + wish.write(to, models[0]))
+        else:
+            write_baked(to, models)
+            say("\n".join(map(_line, models)))
+        warn(f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note)
+    write_json(json_to, {"output": output, "bodies": [_described(model) for model in models]})
+
+
+def _mesh_model(
+    mesh: str,
+    material: tuple[str, ...],
+    scale: float,
+    thickness_m: float | None,
+    to_hz: float | None,
+    pruning: PruningOptions,
+) -> BakedModel:
+    from sonic_bullet.bake import bake_mesh
+    from sonic_bullet.presets import load_material
+
+    if len(material) > 1 or (material and "=" in material[0] and not Path(material[0]).is_file()):
+        raise MaterialError("a mesh is of one material", "give --material M once")
+    made = load_material(material[0] if material else MESH_MATERIAL)
+    with status(mesh) as progress:
+        return bake_mesh(
+            mesh,
+            made,
+            scale=scale,
+            pruning=pruning,
+            to_hz=to_hz or HEARING_LIMIT_HZ,
+            thickness_m=thickness_m,
+            progress=progress,
+        )
+
+
+def _scene_models(
+    source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool
+) -> list[BakedModel]:
+    """The bodies of a scene or log that ring, each once. one: whether the format holds no more."""
+    from sonic_bullet.bake import bake_body
+
+    materials = WantedMaterials.read(material, ())
+    if is_log(source):
+        from sonic_bullet.files import read_log
+        from sonic_bullet.session.chosen_in_log import with_choice
+
+        with status(source) as say:
+            log, _ = with_choice(read_log(source), materials.choice(), source, say)
+    else:
+        with progress_bar(Path(source).name) as (progress, tell):
+            log = _log_of_scene(source, materials, progress, tell)
+    bodies: dict[str, Body] = {}
+    for body in log.bodies:
+        if body.model is not None and body.model.mode_count and body.material is not None:
+            bodies.setdefault(body.name, body)
+    if not bodies:
+        raise FileError(f"no body of {source} has modes", "give one a material that rings")
+    if name is not None:
+        if name not in bodies:
+            raise FileError(f"{source} has no body '{name}' with modes", nearest(name, list(bodies)))
+        bodies = {name: bodies[name]}
+    if one and len(bodies) > 1:
+        raise FileError(
+            f"{source} has {len(bodies)} bodies with modes, and that format holds one",
+            f"give --body with one of {', '.join(list(bodies)[:LISTED])}",
+        )
+    with status(source) as say:
+        made = []
+        for body in bodies.values():
+            say(body.name)
+            made.append(bake_body(body, pruning))
+    return made
+
+
+def _log_of_scene(
+    source: str, materials: WantedMaterials, progress: Callable[[float], None], say: Callable[[str], None]
+) -> ContactLog:
+    """The first moments of a scene, which makes no sound."""
+    with quiet_stderr():
+        from sonic_bullet.scene import render_scene
+
+    asked: dict[str, Any] = {"seconds": SCENE_S, "microphones": (), **materials.options}
+    return render_scene(source, **asked, progress=progress, say=say).log
+
+
+def _line(model: BakedModel) -> str:
+    """What a user is to know of a model, in a line."""
+    low, high = model.freq_hz.min(), model.freq_hz.max()
+    weight = "" if model.mass is None else f", {model.mass.mass_kg:.4g} kg"
+    return (
+        f"{model.name}: {model.material.name}{weight}, {format_count(model.mode_count, 'mode')} from {low:.0f} to "
+        f"{high:.0f} Hz at {len(model.point_m)} points"
+    )
+
+
+def _described(model: BakedModel) -> dict[str, Any]:
+    return {
+        "name": model.name,
+        "material": model.material.name,
+        "mass_kg": None if model.mass is None else model.mass.mass_kg,
+        "points": len(model.point_m),
+        "modes": [
+            {"freq_hz": float(f), "decay_per_s": float(d)}
+            for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
+        ],
+        "notes": list(model.notes),
+    }

@@ -1,0 +1,1 @@
+"""Baked models: records, pruning, points, and files that are wrong."""
