@@ -60,7 +60,10 @@ def test_a_glb_is_scored_and_its_log_is_one_as_any_other(place: Path, capfd: pyt
     assert run(*words, "-o", "b.wav") == 0
     assert Path("a.wav").read_bytes() == Path("b.wav").read_bytes()
     assert "clipped" not in "".join(capfd.readouterr())
-    assert run("score", "a.glb", "-o", "c.flac", "--sr", "16000", "--tail", "0", "--pascals", "--microphone", "0,-0.2,0.1") == 0
+    assert (
+        run("score", "a.glb", "-o", "c.flac", "--sr", "16000", "--tail", "0", "--pascals", "--microphone", "0,-0.2,0.1")
+        == 0
+    )
     out, err = capfd.readouterr()
     assert ", clipped" in out and "FLAC PCM_24 holds nothing above 1.0" in err
     log, (sound, _) = read_log("a.npz"), read_audio("a.wav")
