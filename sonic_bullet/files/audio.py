@@ -309,8 +309,6 @@ def write_audio(
         "full_scale_pa", "give a full scale in Pa, above zero", above=0, error=AudioError,
     )  # fmt: skip
     sound = as_sound(samples)
-    if sound.shape[0] == 0:
-        raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     level = find_level(sound, rate, peak_dbfs, lufs, full_scale_pa)
     return write_at_level(path, sound, rate, level, subtype, cues, begins, scale=scale)
 

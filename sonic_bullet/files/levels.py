@@ -50,6 +50,8 @@ def find_level(
     """The level of the module's head; peak and loudness are of the whole sound, its fades included: a peak takes a
     pass over it, a loudness all of it in memory. Raises AudioError where the level cannot be reached.
     """
+    if sound.shape[0] == 0:
+        raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     if peak_dbfs is None and lufs is None:
         return FileLevel(1 / full_scale_pa, sound.curve)
     peak = float(sound.peaks().max(initial=0.0))

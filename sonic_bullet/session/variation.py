@@ -218,7 +218,7 @@ def _vary_model(model: ModalModel, old: Material, new: Material, ratio: float, d
     eigenvalue = model.omega0_squared_per_s2
     decay = model.decay_per_s
     if new.alpha_per_s is not None and new.beta_s is not None and old.alpha_per_s is not None:
-        law = 0.5 * (old.alpha_per_s + (old.beta_s or 0.0) * eigenvalue)
+        law = 0.5 * (old.alpha_per_s + (0.0 if old.beta_s is None else old.beta_s) * eigenvalue)
         wanted = 0.5 * (new.alpha_per_s + new.beta_s * eigenvalue * ratio)
         decay = np.where(law > 0, decay * wanted / np.where(law > 0, law, 1.0), decay)
     omega_squared = eigenvalue * ratio - np.nan_to_num(decay) ** 2

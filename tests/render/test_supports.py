@@ -164,8 +164,9 @@ def test_a_partner_is_heard_for_one_mode_alone() -> None:
     """A fork: its low mode hardly sounds and the board's share of it is large, its highest is 75 dB louder. And what a
     partner's mode sounds goes with the frequency at which it is moved.
     """
-    fork = SimpleNamespace(weight=np.array([[0.0043, 25.4]], complex), omega_rad_s=np.array([2.7e3, 8.6e4]))
-    on = SimpleNamespace(weight=np.array([[1.0j]]), omega_rad_s=np.array([1.35e3]))
+    plain = SimpleNamespace(gain=1.0)
+    fork = SimpleNamespace(body=plain, weight=np.array([[0.0043, 25.4]], complex), omega_rad_s=np.array([2.7e3, 8.6e4]))
+    on = SimpleNamespace(body=plain, weight=np.array([[1.0j]]), omega_rad_s=np.array([1.35e3]))
     state: Any = SimpleNamespace(resonators=[fork, on], bank=SimpleNamespace(observed=np.ones((1, 2))))
 
     def heard(share: float) -> list[tuple[int, Array]]:

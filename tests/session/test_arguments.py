@@ -14,6 +14,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet import scene
+from sonic_bullet.bake.json_models import write_json_models
 from sonic_bullet.records.errors import (
     AudioError,
     MaterialError,
@@ -189,6 +190,11 @@ def reading_log(_: Any, folder: Path) -> Made:
     return sb.read_log, {"path": folder / "a.npz"}
 
 
+def reading_baked(_: Any, folder: Path) -> Made:
+    write_json_models(folder / "a.json", ())
+    return sb.read_baked, {"path": folder / "a.json"}
+
+
 def of_log(name: str) -> Callable[[Any, Path], Made]:
     def make(client: Any, _: Path) -> Made:
         listener, body = listener_of(client)
@@ -236,6 +242,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "keep_restitution": lambda client, _: (sb.keep_restitution, {"client": client}),
     "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
     "read_audio": reading_audio,
+    "read_baked": reading_baked,
     "read_log": reading_log,
     "render_log": lambda *_: (
         sb.render_log,
@@ -416,6 +423,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "keep_restitution": {"client": CLIENT},
     "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
     "read_audio": {"path": PATH},
+    "read_baked": {"path": PATH},
     "read_log": {"path": PATH},
     "render_log": {
         "log": [*RECORD, None],
