@@ -1,12 +1,12 @@
-"""listener: what a simulator tells, as values.
+"""Read bodies, poses, contacts and step lengths of a simulator as values.
 
-`world` says what that is; PyBullet, in a folder of its own, is the one there is.
+`world` defines what a simulator has to provide; the package `pybullet` implements it.
 
-Everything is imported when first used.
+Every name is imported when first used.
 
-world = open_world(client)          BulletClient, the pybullet module, or a client id
-world.hook(before, after)           or, with the raw module, world.after_step() after each stepSimulation
-step = world.after_step()           -> contacts.Step
+    world = open_world(client)          BulletClient, the pybullet module, or a client id
+    world.hook(before, after)           or, with the raw module, world.after_step() after each stepSimulation
+    step = world.after_step()           -> contacts.Step
 """
 
 from __future__ import annotations

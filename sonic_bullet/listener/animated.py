@@ -1,4 +1,4 @@
-"""What the score of an animation asks of a simulator: how near bodies are in a pose, and what follows from a start.
+"""Interface of the simulator that scores an animation: distances in a pose, and the motion that follows from a start.
 
     AnimatedBody ... -> PoseStage: MOTION (b,) -> closest: RAW (k,), no force        -> a fit of impulses
                                MOTION (b,) -> shoot: MOTION (n + 1, b), RAW each -> a search for the start
@@ -27,9 +27,18 @@ HEAVIEST_KG = 1e6
 class AnimatedBody:
     """A body that an animation moves.
 
-    shapes: in the body frame, origin at the centre of mass, axes along the principal inertia. mass_kg: 0 where nothing
-    moves it but the animation. inertia_kg_m2 (3,): principal moments. restitution, friction: the pair's are products of
-    both bodies'. driven: something besides gravity and contacts moves it, a hand or a motor.
+    Parameters
+    ----------
+    shapes
+        In the body frame: origin at the centre of mass, axes along the principal inertia.
+    mass_kg
+        0 where only the animation moves it.
+    inertia_kg_m2 : Array, shape (3,)
+        Principal moments.
+    restitution, friction
+        A pair's value is the product of both bodies' values.
+    driven
+        Something besides gravity and contacts moves it, a hand or a motor.
     """
 
     name: str
@@ -41,6 +50,7 @@ class AnimatedBody:
     driven: bool = False
 
     def __post_init__(self) -> None:
+        """Check and normalise the fields."""
         who = f"body {shown(self.name)}"
         as_text(self.name, "the name of a body", "give a text")
         store(
@@ -60,8 +70,16 @@ class AnimatedBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shot:
-    """What a simulator makes of a start. motion (n + 1, b) of MOTION: at the starts of n steps, and after the last;
-    raw: RAW rows of each step, none where nobody asked. touching (b, b): who exchanged a force.
+    """Motion that follows from a start (a single shooting).
+
+    Parameters
+    ----------
+    motion : Array of MOTION, shape (n + 1, b)
+        At the start of each of n steps, and after the last.
+    raw
+        RAW rows of each step, empty where they were not polled.
+    touching : Array of bool, shape (b, b)
+        Pairs that exchanged a force.
     """
 
     motion: Array
@@ -70,44 +88,66 @@ class Shot:
 
 
 class PoseStage(Protocol):
-    """A simulated world that is set, asked and shot, never left to itself. Bodies are counted as they were given.
+    """A simulated world whose poses are set, queried and simulated from, in the order of the bodies it was given.
 
-    reach_m (b,): how far a body's points are from its centre of mass at most.
+    reach_m (b,): largest distance of a body's points from its centre of mass.
     """
 
     reach_m: Array
 
     def boxes(self, motion: Array) -> tuple[Array, Array]:
-        """Corners (b, 3), lowest and highest, of boxes along the world's axes round the bodies in that pose."""
+        """Return the lowest and highest corners (b, 3) of the bodies' axis-aligned boxes, world frame, in that pose."""
         ...
 
     def rows(self, body_id: Array) -> Array:
-        """Which bodies, as they were given, RAW rows mean by these ids (k,)."""
+        """Map body ids (k,) of RAW rows to indices of the bodies as they were given."""
         ...
 
     def closest(self, motion: Array, pairs: Sequence[tuple[int, int]], reach_m: float) -> Array:
-        """RAW (k,) without force of the places where these pairs are nearer than reach_m in that pose (b,) of MOTION:
-        of faces and edges that lie on each other their corners.
+        """Find where pairs are nearer than reach_m in a pose.
+
+        Parameters
+        ----------
+        motion : Array of MOTION, shape (b,)
+        pairs
+            Indices of the bodies.
+        reach_m
+            Largest distance.
+
+        Returns
+        -------
+        Array of RAW, shape (k,)
+            Rows without force; of faces and edges that lie on each other, their corners.
         """
         ...
 
     def shoot(
         self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
     ) -> Shot:
-        """What follows in so many steps from a start (b,) of MOTION, with that restitution (b,); who is driven or has
-        mass 0 goes straight to `end` (b,).
+        """Simulate so many steps from a start.
+
+        Parameters
+        ----------
+        start, end : Array of MOTION, shape (b,)
+            Bodies that are driven or have mass 0 move straight to `end`.
+        restitution : Array, shape (b,)
+        polled
+            Whether to return the RAW rows of each step.
         """
         ...
 
 
 def free(bodies: Sequence[AnimatedBody]) -> Array:
-    """(b,) who is moved by gravity and contacts alone."""
+    """Select the bodies (b,) that only gravity and contacts move."""
     return np.array([body.mass_kg > 0 and not body.driven for body in bodies], bool)
 
 
 def rotation(first: Array, second: Array) -> Array:
-    """Rotation vectors (…, 3) in rad, world frame, from the first orientations (…, 4) to the second: the logarithm of
-    q₂ q₁* [Sola 2017, Quaternion kinematics, eq. 105].
+    """Compute rotation vectors (…, 3) in rad, world frame, between orientations (…, 4): the logarithm of q₂ q₁*.
+
+    References
+    ----------
+    Sola 2017, Quaternion kinematics, eq. 105.
     """
     v, w, x, y = first[..., :3], first[..., 3:], second[..., :3], second[..., 3:]
     axis, real = w * x - y * v - np.cross(x, v), w * y + (v * x).sum(axis=-1, keepdims=True)
@@ -117,7 +157,12 @@ def rotation(first: Array, second: Array) -> Array:
 
 
 def matrices(quaternion: Array) -> Array:
-    """Rotation matrices (…, 3, 3) of unit quaternions (…, 4), x y z w [Kuipers 1999, sec. 5.15]."""
+    """Convert unit quaternions (…, 4), x y z w, to rotation matrices (…, 3, 3).
+
+    References
+    ----------
+    Kuipers 1999, sec. 5.15.
+    """
     x, y, z, w = np.moveaxis(quaternion, -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

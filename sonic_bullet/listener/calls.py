@@ -1,9 +1,10 @@
-"""What a scene asks of its simulator, call by call and by value: where two scenes differ, and what to ask instead.
+"""Calls of a scene into its simulator by name and by value, to compare two scenes and to substitute arguments.
 
     createMultiBody(0.004, shape) -> Call("createMultiBody", {"baseMass": 0.004, "shape": {"radius": 0.005, …}}, who)
     Call -> leaves {("shape", "radius"): 0.005, …} -> with_leaves(…) -> Call
 
-Handles are none: a body is the n-th that its run made (`Who`), a shape is what it was made of, a file is its content.
+Values hold no handles: a body is the n-th that its run made (`Who`), a shape is the arguments that made it, a file is
+its content.
 """
 
 from __future__ import annotations
@@ -16,23 +17,24 @@ from typing import Any, Protocol
 import numpy as np
 
 Path = tuple[str, ...]
-"""Where a leaf is: names of arguments, of fields of records, of keys."""
+"""Path of a leaf: names of arguments, of fields of records, of keys."""
 
 
 class _Absent:
     def __repr__(self) -> str:
+        """Return the word that reports print."""
         return "nothing"
 
 
 FIRST_ABSENT = 1_000_000
-"""From here on, ids of bodies that a scene asked for and a plan did not have made."""
+"""First id of the bodies that a scene asked for and a plan left out."""
 ABSENT = _Absent()
 """Stands for a leaf that is not there."""
 
 
 @dataclass(frozen=True, slots=True)
 class Who:
-    """The body, or constraint, that a run made as its ``serial``-th; side: of which run."""
+    """The body, or constraint, that a run made as its ``serial``-th; side: which run."""
 
     side: str
     serial: int
@@ -41,22 +43,36 @@ class Who:
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """A file that a scene names: two of the same content are the same, wherever they lie."""
+    """A file that a scene names. Two files of the same content are equal, whatever their paths."""
 
     path: str
     digest: str
 
     def __eq__(self, other: object) -> bool:
+        """Compare the contents."""
         return isinstance(other, InputFile) and self.digest == other.digest
 
     def __hash__(self) -> int:
+        """Hash the content."""
         return hash(self.digest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Call:
-    """One call. step: physics steps made before it; arguments: by name and by value; who: the body it is about, None:
-    the engine; made: the bodies it made; own: what it was of, where arguments do not say all (a `WantedBody`).
+    """One call into the simulator.
+
+    Parameters
+    ----------
+    step
+        Physics steps made before it.
+    arguments
+        By name and by value.
+    who
+        The body it is about; None: the engine.
+    made
+        The bodies it made.
+    own
+        Its origin, where the arguments do not say all (a `WantedBody`).
     """
 
     name: str
@@ -69,25 +85,25 @@ class Call:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inserted:
-    """A call of the other scene that is to be made before the scene's own."""
+    """A call of the other scene, to be made before the scene's own."""
 
     call: Call
 
 
 class Plan(Protocol):
-    """What is to be asked instead of what a scene asks."""
+    """Calls that substitute those of a scene."""
 
     def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
-        """Calls of the other scene to be made first, and arguments to make this one with; None: not at all."""
+        """Return the other scene's calls to be made first, and arguments for this one; None: do not make it."""
         ...
 
     def behind(self, step: int, name: str | None = None) -> list[Call]:
-        """Calls of the other scene that are left of a step, of that name those that come next."""
+        """Return the other scene's calls that remain of a step; with a name, those of that name that come next."""
         ...
 
 
 def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """(where, value) of all that is no mapping and no record; nested names one behind the other."""
+    """Yield (path, value) of all that is neither a mapping nor a record; nested names follow each other in the path."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             yield from leaves(inner, (*path, str(name)))
@@ -99,7 +115,10 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def with_leaves(value: Any, given: Mapping[Path, Any]) -> Any:
-    """The value with those leaves; ABSENT takes a key out. Raises what a record raises that will not have it."""
+    """Return the value with those leaves replaced; ABSENT removes a key.
+
+    Raises what a record raises that rejects the value.
+    """
     if () in given:
         return given[()]
     heads: dict[str, dict[Path, Any]] = {}
@@ -118,7 +137,7 @@ def with_leaves(value: Any, given: Mapping[Path, Any]) -> Any:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two values are, to the bit, whatever they are made of."""
+    """Compare two values of any kind, to the bit."""
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         a, b = np.asarray(one), np.asarray(other)
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
@@ -134,7 +153,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """The value with every leaf changed, mappings and sequences looked into."""
+    """Return the value with every leaf changed, in mappings and sequences too."""
     if isinstance(value, Mapping):
         return {name: mapped(inner, change) for name, inner in value.items()}
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Where every link of every body is, and how fast: centre-of-mass frames as arrays, whatever simulator they come from.
+"""Poses and twists of every link as arrays, in centre-of-mass frames, whatever simulator they come from.
 
 Origin at the centre of mass, axes along the principal inertia: the frame of `Body`.
 n rows: one for each link of each body, ordered by (body id, link).
@@ -32,10 +32,20 @@ NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roster:
-    """Who is in the world. code (n,) = body · LINK_SPAN + link + 1, ascending; static (n,): mass 0.
+    """The links in the world.
 
-    count: of all bodies there when it was made, also those that it leaves out. soft: ids of soft bodies, which it
-    leaves out.
+    Parameters
+    ----------
+    bodies
+        (body id, number of joints, static) of each body.
+    code : Array, shape (n,)
+        body · LINK_SPAN + link + 1, ascending.
+    static : Array of bool, shape (n,)
+        Mass 0.
+    count
+        Number of all bodies when it was made, also of those it leaves out.
+    soft
+        Ids of soft bodies, which it leaves out.
     """
 
     bodies: tuple[tuple[int, int, bool], ...]
@@ -47,10 +57,15 @@ class Roster:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Poses and twists of a roster at one instant: row (n,) of MOTION.
+    """Poses and twists of a roster at one instant, world frame.
 
-    position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3): world
-    frame. broken: ids of the bodies of which a number is NaN or `BEYOND`, as read.
+    Parameters
+    ----------
+    roster
+    row : Array of MOTION, shape (n,)
+        position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3).
+    broken
+        Ids of the bodies of which a number, as read, is NaN or `BEYOND`.
     """
 
     roster: Roster
@@ -61,7 +76,7 @@ class Motion:
     def of(
         cls, roster: Roster, position_m: Array, quaternion_xyzw: Array, velocity_m_s: Array, spin_rad_s: Array
     ) -> Motion:
-        """The motion of these columns."""
+        """Build a motion from its columns."""
         row = np.empty(len(position_m), MOTION)
         for name, column in zip(
             MOTION.names or (), (position_m, quaternion_xyzw, velocity_m_s, spin_rad_s), strict=True
@@ -71,40 +86,45 @@ class Motion:
 
     @property
     def position_m(self) -> Array:
+        """Position of the centre of mass (n, 3)."""
         return self.row["position_m"]
 
     @property
     def quaternion_xyzw(self) -> Array:
+        """Orientation (n, 4)."""
         return self.row["quaternion_xyzw"]
 
     @property
     def velocity_m_s(self) -> Array:
+        """Velocity of the centre of mass (n, 3)."""
         return self.row["velocity_m_s"]
 
     @property
     def spin_rad_s(self) -> Array:
+        """Angular velocity (n, 3)."""
         return self.row["spin_rad_s"]
 
     @property
     def number(self) -> Array:
-        """(n, 13) all of them."""
+        """All numbers (n, 13)."""
         return self.row.view(np.float64).reshape(len(self.row), MOTION_NUMBERS)
 
     def would_move(self, dt_s: float) -> bool:
-        """Whether a step must change some number: a body may rest on a fixed point of Bullet's arithmetic and keep
-        every bit.
+        """Tell whether a step must change some number.
+
+        A body may rest on a fixed point of Bullet's arithmetic and keep every bit.
         """
         steps = self.position_m + dt_s * self.velocity_m_s != self.position_m
         return bool(steps.any() or (np.abs(self.spin_rad_s) * dt_s > 1e-12).any())
 
 
 def taken(motion: Motion, roster: Roster, rows: Array) -> Motion:
-    """The rows (n,) of a motion as a motion of that roster."""
+    """Select rows (n,) of a motion as a motion of that roster."""
     return Motion(roster, motion.row[rows])
 
 
 def without(motion: Motion, body: int | None) -> Motion:
-    """The motion of all others than a body (None: of nobody)."""
+    """Return the motion of all bodies but one; None: of no body."""
     roster = motion.roster
     keep = np.flatnonzero(roster.code // LINK_SPAN != body) if body is not None else np.zeros(0, int)
     bodies = tuple(entry for entry in roster.bodies if entry[0] != body and body is not None)
@@ -112,27 +132,27 @@ def without(motion: Motion, body: int | None) -> Motion:
 
 
 def same_motion(first: Motion, second: Motion) -> bool:
-    """Whether every number is the same, bit for bit."""
+    """Compare two motions, bit for bit."""
     return first.roster.bodies == second.roster.bodies and np.array_equal(first.number, second.number)
 
 
 def encode(body: Array | int, link: Array | int) -> Array:
-    """Row codes of (body, link) pairs."""
+    """Return the row codes of (body, link) pairs."""
     return np.asarray(body, np.int64) * LINK_SPAN + np.asarray(link, np.int64) + 1
 
 
 def decode(code: int) -> tuple[int, int]:
-    """(body, link) of a row code."""
+    """Return (body, link) of a row code."""
     return int(code) // LINK_SPAN, int(code) % LINK_SPAN - 1
 
 
 def link_words(link: int) -> str:
-    """How a link is called in a message; nothing for the base."""
+    """Name a link in a message; an empty text for the base."""
     return "" if link < 0 else f" link {link}"
 
 
 def rows_of(roster: Roster, code: Array) -> Array:
-    """Row numbers of codes (k,); -1 where the roster does not hold them."""
+    """Find the row numbers of codes (k,); -1 where the roster does not hold them."""
     if not len(roster.code):
         return np.full(len(code), -1)
     row = np.minimum(np.searchsorted(roster.code, code), len(roster.code) - 1)
@@ -140,7 +160,7 @@ def rows_of(roster: Roster, code: Array) -> Array:
 
 
 def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
-    """Orientations (k, 4) turned by world-frame rotation vectors (k, 3)."""
+    """Rotate orientations (k, 4) by world-frame rotation vectors (k, 3)."""
     angle = np.linalg.norm(rotation_rad, axis=1, keepdims=True)
     y, v = rotation_rad * np.sinc(angle / (2 * np.pi)) / 2, np.cos(angle / 2)
     x, w = quaternion_xyzw[:, :3], quaternion_xyzw[:, 3:]
@@ -149,7 +169,7 @@ def turned(quaternion_xyzw: Array, rotation_rad: Array) -> Array:
 
 
 def advanced(motion: Motion, duration_s: float) -> Motion:
-    """The motion carried on by its own twists; a negative duration undoes Bullet's last semi-implicit step."""
+    """Integrate a motion by its own twists; a negative duration undoes Bullet's last semi-implicit step."""
     return Motion.of(
         motion.roster,
         motion.position_m + duration_s * motion.velocity_m_s,

@@ -1,11 +1,11 @@
-"""What two bodies do to each other at a contact, from their poses and twists before the step.
+"""Relative motion of two bodies at a contact, from their poses and twists before the step.
 
     p' = Rᵀ(p - x)                               the point in a body's frame
     v = V + ω × (p - x)                          velocity of the material there
     approach = -(v_a - v_b)·n                    closing speed, n from b to a
     slip = (v_a - v_b) - ((v_a - v_b)·n) n       tangential velocity of a's material relative to b's
 
-Compiled, on rows of `frames.MOTION` or of whatever begins with its fields.
+Compiled, on rows of `frames.MOTION` or of a dtype that begins with its fields.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -25,9 +25,7 @@ def turn(qx, qy, qz, qw, x, y, z):
 
 @njit(nogil=True, error_model="numpy")
 def pose_after(body, elapsed, position, quaternion):
-    """Position (3,) and orientation (4,) of a body `elapsed` seconds into the step, by its twist before it, written in
-    place.
-    """
+    """Write a body's pose `elapsed` seconds into the step, by its twist before it: position (3,), quaternion (4,)."""
     q, w = body.quaternion_xyzw, body.spin_rad_s
     for x in range(3):
         position[x] = body.position_m[x] + elapsed * body.velocity_m_s[x]
@@ -46,7 +44,7 @@ def pose_after(body, elapsed, position, quaternion):
 
 @njit(nogil=True, error_model="numpy")
 def relative_motion(touch, a, b, slip):
-    """Approach in m/s of the bodies a, b at a touch; their slip in m/s goes to slip (3,)."""
+    """Return the approach in m/s of bodies a, b at a contact and write their slip in m/s to slip (3,)."""
     p, q, n = touch.point_a_m, touch.point_b_m, touch.normal
     va, vb, wa, wb = a.velocity_m_s, b.velocity_m_s, a.spin_rad_s, b.spin_rad_s
     rx, ry, rz = p[0] - a.position_m[0], p[1] - a.position_m[1], p[2] - a.position_m[2]
@@ -61,7 +59,7 @@ def relative_motion(touch, a, b, slip):
 
 @njit(nogil=True, error_model="numpy")
 def rotation_between(first, second, vector):
-    """The rotation vector (3,) in rad, world frame, that turns the first orientation xyzw (4,) into the second."""
+    """Write the rotation vector (3,) in rad, world frame, between two orientations xyzw (4,)."""
     w, v = first[3], second[3]
     scalar = w * v + (first[0] * second[0] + first[1] * second[1] + first[2] * second[2])
     vector[0] = w * second[0] - v * first[0] - (second[1] * first[2] - second[2] * first[1])

@@ -1,6 +1,6 @@
-"""The bodies that a log of a world names: who lives under which code, since when and until when.
+"""The bodies that a log of a world names: the link of each code, since when and until when.
 
-code of a link -> index into the bodies, counted on for ever; a code may be given anew, an index is not
+code of a link -> index into the bodies, ascending and never reused; a code may be reused
 roster -> START.index, START.pose, and the indices (b,) of those whose poses a step holds
 """
 
@@ -18,9 +18,16 @@ from sonic_bullet.records.contacts import first_bodies
 
 
 class KnownBodies:
-    """State of that for one world. records: by index, in its order, of all or, not keeping who is gone, of the living;
-    count: of all there ever were. body (b,): indices of those in the roster last asked for, ascending; the same array
-    while they are the same.
+    """Records of the bodies of one world.
+
+    Attributes
+    ----------
+    records
+        By index, in its order: of all bodies or, where ended records are dropped, of the living.
+    count
+        Number of all there ever were.
+    body : Array, shape (b,)
+        Indices of those in the roster last asked for, ascending; the same array while they are the same.
     """
 
     def __init__(self) -> None:
@@ -32,14 +39,14 @@ class KnownBodies:
         self._start: Array = np.zeros(0)
 
     def append(self, code: int, record: Body) -> None:
-        """A record of the link of that code begins."""
+        """Begin a record of the link of that code."""
         self.live[code] = self.count
         self.records[self.count] = record
         self.count += 1
         self._roster = None
 
     def close(self, codes: Iterable[int], step: int, *, keep: bool) -> None:
-        """The records of the links of these codes end before that step; keep: they stay known."""
+        """End the records of these links before that step; keep: retain them, ended."""
         for code in codes:
             if code in self.live:
                 index = self.live.pop(code)
@@ -50,12 +57,12 @@ class KnownBodies:
         self._roster = None
 
     def gone(self, roster: Roster) -> list[int]:
-        """Codes of those who live and whom a roster does not hold."""
+        """List the codes of living links that a roster does not hold."""
         codes = np.array(list(self.live), np.int64)
         return [int(code) for code in codes[rows_of(roster, codes) < 0]]
 
     def enter(self, start: Array) -> None:
-        """Fill index and pose of START rows (n,), -1 for who never met anybody; `body` are those in it."""
+        """Fill index and pose of START rows (n,), -1 for links without a record; set `body` to those indices."""
         start["index"] = index = np.array([self.live.get(code, -1) for code in start["code"].tolist()], np.int64)
         body = np.sort(index[index >= 0])
         if not np.array_equal(body, self.body):
@@ -65,8 +72,9 @@ class KnownBodies:
         start["pose"] = np.searchsorted(self.body, index)
 
     def start(self, roster: Roster) -> Array:
-        """START rows (n,) of a roster, with code, static, index and pose filled; the same table while neither
-        changes.
+        """Return START rows (n,) of a roster with code, static, index and pose filled.
+
+        The table is the same while roster and records are.
         """
         if self._roster is not roster:
             self._roster, self._start = roster, start_table(roster)
@@ -75,6 +83,6 @@ class KnownBodies:
 
 
 def alike(first: Body, second: Body) -> bool:
-    """Whether two records can be of one body: the same mass, inertia and curvature."""
+    """Tell whether two records can be of one body: same mass, inertia and curvature."""
     same = first.mass_kg == second.mass_kg and np.array_equal(first.inertia_kg_m2, second.inertia_kg_m2)
     return same and np.array_equal(first.curvature_per_m, second.curvature_per_m, equal_nan=True)

@@ -1,7 +1,7 @@
-"""What a listener remembers from step to step, and how a step's rows are made of it.
+"""State that a listener keeps from step to step, and the assembly of a step's rows.
 
 RAW + MOTION before and after -> `usual`, one compiled call     -> CONTACT rows -> Step
-Touches + START               -> `made`, where it is not so     /
+Touches + START               -> `made`, where a case is unusual  /
 """
 
 from __future__ import annotations
@@ -21,14 +21,20 @@ from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
 from sonic_bullet.records.errors import LogError, SceneError
 
 Poses = tuple[Array, Array, Array]
-"""Of a step's bodies: position (b, 3), quaternion (b, 4), and who was moved by hand (b,)."""
+"""Position (b, 3) and quaternion (b, 4) of a step's bodies, and whether each was moved by hand (b,)."""
 
 
 class Memory:
-    """State of that for one world.
+    """Contacts and poses of the last steps of one world.
 
-    touches: the step before's, None before the first. raw, raw_before: RAW rows of the last poll and the one before it.
-    time_s: of the coming step.
+    Attributes
+    ----------
+    touches
+        Of the step before; None before the first.
+    raw, raw_before
+        RAW rows of the last poll and the one before it.
+    time_s
+        Start of the coming step.
     """
 
     def __init__(self) -> None:
@@ -43,14 +49,12 @@ class Memory:
         self._poses = _room(0), first_bodies(0)
 
     def forget(self) -> None:
-        """All that touched is gone."""
+        """Drop all contacts."""
         self._traces.clear()
         self.touches = None
 
     def poll(self, raw: Array, *, stepped: bool) -> None:
-        """Keep the contacts just polled; not `stepped`: only where they are others, for polled twice a world tells the
-        same twice.
-        """
+        """Store the contacts just polled; where no step is known to be made, only if they differ from the last ones."""
         if stepped or raw.tobytes() != self.raw.tobytes():
             self.raw_before, self.raw = self.raw, raw
 
@@ -64,9 +68,7 @@ class Memory:
         gravity: tuple[float, ...],
         hooked: bool,
     ) -> Step | None:
-        """The step of a world of the same roster as the step before, in one call; None where something is unusual, and
-        nothing is changed then.
-        """
+        """Assemble a step of an unchanged roster in one call; None, with nothing changed, where a case is unusual."""
         k, traces = len(self.raw), self._traces
         traces.reserve(k)
         touch, row = np.empty(k, TOUCH), np.empty(k, CONTACT)
@@ -99,10 +101,19 @@ class Memory:
     def made(
         self, known: KnownBodies, start: Array, touches: Touches, past: Touches | None, dt_s: float
     ) -> tuple[Array, int]:
-        """CONTACT rows (k,) of touches and how many of them are filled; STRANGERS where `start` marks links that meet
-        somebody for the first time.
+        """Fill CONTACT rows (k,) of contacts.
 
-        Raises SceneError for a touch of a link that `start` does not hold, RecordError for numbers beyond what can be.
+        Returns
+        -------
+        tuple
+            The rows, and how many are filled; STRANGERS where `start` marks links in their first contact.
+
+        Raises
+        ------
+        SceneError
+            A contact names a link that `start` does not hold.
+        RecordError
+            A number is beyond what can be.
         """
         traces, row = self._traces, np.zeros(len(touches), CONTACT)
         traces.reserve(len(touches))
@@ -130,13 +141,13 @@ class Memory:
     def unusual(
         self, known: KnownBodies, start: Array, row: Array, made: int, dt_s: float, gravity: tuple[float, ...]
     ) -> Step:
-        """The step of rows that `made` made; `start` is as `known.enter` left it."""
+        """Assemble the step of rows that `made` filled; `start` is as `known.enter` left it."""
         poses = _room(len(known.body))
         place_bodies(start, *poses)
         return self._step(dt_s, gravity, poses, known.body, row, made)
 
     def nothing(self, dt_s: float, gravity: tuple[float, ...]) -> Step:
-        """A step in which nothing happens: all is where it was in the last one."""
+        """Return a step without contacts in which all bodies are where they were in the last one."""
         self._check(dt_s, gravity)
         poses, body = self._poses
         still = poses[0], poses[1], np.zeros(len(body), bool)
@@ -168,7 +179,7 @@ def _room(bodies: int) -> Poses:
 
 
 def make_ready() -> None:
-    """Have the machine code of a step, compiled now where it is not kept: what the first step would else wait for."""
+    """Compile, or load, the machine code of a step, for which the first step would else wait."""
     memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
     motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, MOTION))
     touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)

@@ -1,10 +1,10 @@
-"""Names of links: each is one living link's alone, whoever gave it.
+"""Names of links, each unique among the living links.
 
     a name given by hand | the simulator's own -> "cube", "cube 2", … in order of appearance
-    silent: names whose bearers no sensor hears
+    silent: names whose links no sensor receives
 
-A link keeps its name for as long as it lives. A number is never given anew, so that a default name means one thing in
-a log; a name given by hand may be given again once its bearer has gone.
+A link keeps its name for as long as it lives. A number is never reused, so that a default name means one link in a
+log; a name given by hand may be given again once its link has gone.
 """
 
 from __future__ import annotations
@@ -15,10 +15,7 @@ from sonic_bullet.records.errors import SceneError
 
 
 def matched(name: str, asked: Collection[str]) -> str | None:
-    """Which of the names asked for means a link: its own, else that of the body ("panda") that it ("panda/hand") is of.
-
-    None where none does.
-    """
+    """Find which of the names asked for means a link: its own, else its body's ("panda" of "panda/hand"); or None."""
     while name not in asked:
         name, slash, _ = name.rpartition("/")
         if not slash:
@@ -27,7 +24,7 @@ def matched(name: str, asked: Collection[str]) -> str | None:
 
 
 class Names:
-    """State of that for one world. Links are known by their code (frames.encode)."""
+    """Names of the links of one world, by their code (frames.encode)."""
 
     def __init__(self) -> None:
         self._living: dict[int, str] = {}
@@ -38,11 +35,17 @@ class Names:
 
     @property
     def codes(self) -> Collection[int]:
-        """Those that have a name."""
+        """Codes of the links that have a name."""
         return self._living.keys()
 
     def call(self, code: int, name: str) -> None:
-        """Call a link so from now on. Raises SceneError where another living link has that name."""
+        """Give a link a name.
+
+        Raises
+        ------
+        SceneError
+            Another living link has it.
+        """
         if self._bearer.get(name, code) != code:
             raise SceneError(f"the name '{name}' is another body's already", "give each its own")
         self.forget([code])
@@ -50,18 +53,18 @@ class Names:
         self._living[code], self._bearer[name] = name, code
 
     def of(self, code: int, default: str) -> str:
-        """The link's name; where it has none yet, the default one, with a number where that has been used."""
+        """Return the link's name; where it has none, assign the default one, with a number where that has been used."""
         if code not in self._living:
             name = self._unused(default)
             self._living[code], self._bearer[name] = name, code
         return self._living[code]
 
     def called(self, code: int, default: str) -> str:
-        """The link's name; where it has none yet, the default one as it is, which is kept for nobody."""
+        """Return the link's name; where it has none, the default one, which is not assigned."""
         return self._living.get(code, default)
 
     def expected(self, links: Sequence[tuple[int, str, str | None]]) -> list[str]:
-        """What links of (code, default name, name given by hand) would be called if all were called so now, in turn."""
+        """Predict the names of links (code, default name, name given by hand) if all were named now, in turn."""
         trial = Names()
         trial._living, trial._bearer = dict(self._living), dict(self._bearer)
         trial._given, trial._count = set(self._given), dict(self._count)
@@ -71,13 +74,13 @@ class Names:
         return [trial.of(code, default) for code, default, _ in links]
 
     def forget(self, codes: Iterable[int]) -> None:
-        """These links are no more."""
+        """Remove these links."""
         for code in codes:
             if code in self._living:
                 del self._bearer[self._living.pop(code)]
 
     def hand_over(self, codes: Iterable[int], other: Names) -> None:
-        """Call these links in another world of names as they were called by hand; who is silent stays so."""
+        """Copy the names given by hand of these links to another `Names`, and the silent names."""
         other.silent = self.silent
         for code in codes:
             if self._living.get(code) in self._given:

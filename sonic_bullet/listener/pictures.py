@@ -1,9 +1,9 @@
-"""What draws a scene: figures at poses, seen by a camera.
+"""Interface to draw a scene: meshes at poses, seen by a camera.
 
     Figure (triangles, colour) … -> open_pictures -> Pictures.picture(poses, Camera) -> (height, width, 3) uint8
 
 PyBullet's own renderer is one (listener/pybullet/staged/picture_world.py), without a window or a graphics card; another
-one answers `picture` and takes the place.
+renderer has to provide `picture`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,16 @@ VIEW_DEG = 40.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Figure:
-    """A rigid thing to be drawn: vertex_m (v, 3) in its own frame, face (f, 3), counter-clockwise seen from outside,
-    colour (3,): red, green, blue, 0 … 1.
+    """A rigid mesh to be drawn.
+
+    Parameters
+    ----------
+    vertex_m : Array, shape (v, 3)
+        In its own frame.
+    face : Array, shape (f, 3)
+        Counter-clockwise seen from outside.
+    colour
+        Red, green, blue, 0 … 1.
     """
 
     vertex_m: Array
@@ -35,20 +43,29 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """Where pictures are taken from: eye_m, target_m (3,) in the world, z up; view_deg: height of the view."""
+    """Position and view of a camera.
+
+    Parameters
+    ----------
+    eye_m, target_m : Array, shape (3,)
+        World frame, z up.
+    view_deg
+        Angle of view along the height.
+    """
 
     eye_m: Array
     target_m: Array
     view_deg: float = VIEW_DEG
 
     def __post_init__(self) -> None:
+        """Check and normalise the fields."""
         eye, target = (frozen_array(getattr(self, name), float, (3,), f"camera: {name}") for name in self.__slots__[:2])
         require(bool((eye != target).any()), "the camera looks at itself", "give it another place or target")
         view = as_number(self.view_deg, "camera: view_deg", "give degrees, 40 say", least=1, most=170)
         store(self, eye_m=eye, target_m=target, view_deg=view)
 
     def seen(self, place_m: Array) -> Array:
-        """(k, 3) points of the world as the camera has them: to its right, up, and ahead, in m."""
+        """Transform points (k, 3) of the world to the camera's axes: right, up, ahead, in m."""
         ahead = (self.target_m - self.eye_m) / np.linalg.norm(self.target_m - self.eye_m)
         right = np.cross(ahead, self.up)
         right = right / np.linalg.norm(right)
@@ -56,18 +73,18 @@ class Camera:
 
     @property
     def up(self) -> Array:
-        """What is up in its pictures: z, or y where it looks along z."""
+        """Upward axis of its pictures: z, or y where it looks along z."""
         ahead = self.target_m - self.eye_m
         return np.array([0.0, 1.0, 0.0] if np.linalg.norm(ahead[:2]) < 1e-6 * abs(ahead[2]) else [0.0, 0.0, 1.0])
 
     def focal(self, height: int) -> float:
-        """Pixels that a thing as large as its distance covers, in pictures so high."""
+        """Return the pixels that an object as large as its distance covers in pictures of that height."""
         return float(height / 2 / np.tan(np.radians(self.view_deg) / 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Standing:
-    """A link of a world as it is: whose, its figure, its pose (body frame)."""
+    """A link of a world with its mesh and its present pose (body frame)."""
 
     body_id: int
     link: int
@@ -78,20 +95,33 @@ class Standing:
 
 
 class Pictures(Protocol):
-    """Figures that are drawn wherever they are set."""
+    """A renderer of a fixed set of meshes."""
 
     def picture(self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera) -> Array:
-        """(height, width, 3) uint8 of all k figures at poses (k, 3), (k, 4); who is not shown (k,) is left out."""
+        """Draw the meshes at poses (k, 3), (k, 4) where shown (k,) is True; (height, width, 3) uint8."""
 
     def close(self) -> None:
-        """Give back what drawing takes."""
+        """Release the renderer."""
 
 
 def open_pictures(
     figures: Sequence[Figure], size: tuple[int, int], *, shadows: bool = False, still: Array | None = None
 ) -> Pictures:
-    """A world of figures to take pictures of, width and height in pixels. still (k,): who will stand as it is in all
-    pictures, and before the same camera. Raises SceneError.
+    """Open a renderer of meshes.
+
+    Parameters
+    ----------
+    figures
+    size
+        Width and height in pixels.
+    shadows
+    still : Array of bool, shape (k,)
+        Meshes that keep their pose, before the same camera, in all pictures.
+
+    Raises
+    ------
+    SceneError
+        A mesh cannot be drawn.
     """
     from sonic_bullet.listener.pybullet.staged.picture_world import PyBulletPictures
 
@@ -99,7 +129,7 @@ def open_pictures(
 
 
 def standing_in(client_id: int) -> tuple[Standing, ...]:
-    """All links of a PyBullet world that have a shape, as they stand now."""
+    """List all links of a PyBullet world that have a shape, at their present poses."""
     from sonic_bullet.listener.pybullet.staged.picture_world import standing
 
     return standing(client_id)

@@ -1,4 +1,4 @@
-"""From PyBullet's contact tuples to a table of loaded contacts.
+"""Convert PyBullet's contact tuples to a table of loaded contacts.
 
     getContactPoints() -> RAW rows, packed in one pass -> TOUCH rows (`load`)
 
@@ -6,7 +6,7 @@
 
 with dt the time step set at the moment of the query: that product, and no other, balances m·Δv - m·g·dt (measured to
 1e-13). Only the unfiltered getContactPoints() is right: with a body filter that swaps the pair, normal and positions
-are turned round and the friction fields are not (bullet3 issues 2765, 3026). k rows.
+are inverted and the friction fields are not (bullet3 issues 2765, 3026). k rows.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -44,7 +44,7 @@ RAW = np.dtype(
     ],
     align=True,
 )
-"""A contact as getContactPoints() tells it, in its order, without its first entry."""
+"""A contact as getContactPoints() reports it, in its order, without its first entry."""
 RAW_ROW = struct.Struct("4q19d")
 
 TOUCH = np.dtype(
@@ -67,41 +67,50 @@ NO_RAW, NO_TOUCH = np.zeros(0, RAW), np.zeros(0, TOUCH)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Touches:
-    """Loaded contacts as PyBullet tells them, row (k,) of TOUCH: code_a, code_b (k,) of frames.encode; points, normal
-    (k, 3) world frame; gap_m (k,); impulse_n_s (k, 3) on a; elapsed_s (k,): from the start of the step to the start of
-    the sub-step that loaded it."""
+    """Loaded contacts as PyBullet reports them.
+
+    Parameters
+    ----------
+    row : Array of TOUCH, shape (k,)
+        code_a, code_b (k,) of frames.encode; points, normal (k, 3) world frame; gap_m (k,); impulse_n_s (k, 3) on a;
+        elapsed_s (k,): from the start of the step to the start of the sub-step that loaded it.
+    """
 
     row: Array
 
     def __len__(self) -> int:
+        """Return the number of contacts."""
         return len(self.row)
 
     @property
     def code_a(self) -> Array:
+        """Code of the first link (k,)."""
         return self.row["code_a"]
 
     @property
     def code_b(self) -> Array:
+        """Code of the second link (k,)."""
         return self.row["code_b"]
 
     @property
     def usable(self) -> Array:
-        """(k,) False where a force or place is NaN or `BEYOND` what can be."""
+        """Mask (k,): False where a force or place is NaN or `BEYOND`."""
         number = self.row.view(np.float64).reshape(len(self.row), -1)[:, 2:]
         return np.asarray((np.abs(number) < BEYOND).all(axis=1))
 
     def kept(self, mask: Array) -> Touches:
-        """Only the rows where mask (k,) is True."""
+        """Select the rows where mask (k,) is True."""
         return Touches(self.row[mask])
 
     def equals(self, other: Touches) -> bool:
-        """Whether every number is the same, bit for bit."""
+        """Compare two tables, bit for bit."""
         return self.row.tobytes() == other.row.tobytes()
 
 
 def packed(contacts: Iterable[RawContact], count: int) -> Array:
-    """Those of `count` contacts that carry a force, (k,) of RAW: Bullet lists neighbours up to 2 cm apart too. NaN
-    counts as force, to be caught.
+    """Pack those of `count` contacts that carry a force into RAW rows (k,).
+
+    Bullet lists neighbours up to 2 cm apart too. NaN counts as a force, so that it is found.
     """
     buffer, at = bytearray(count * RAW_ROW.size), 0
     into, size = RAW_ROW.pack_into, RAW_ROW.size
@@ -119,7 +128,7 @@ def packed(contacts: Iterable[RawContact], count: int) -> Array:
 
 @njit(nogil=True, error_model="numpy")
 def stale(raw, i, before):
-    """Whether row i, without normal force, keeps the friction that it had in `before`, to the bit."""
+    """Tell whether row i, without normal force, has the friction of its row in `before`, to the bit."""
     row, k = raw[i], len(before)
     for j in range(k):
         old = before[(i + j) % k]  # Bullet tells them in nearly the same order again
@@ -137,12 +146,12 @@ def stale(raw, i, before):
 
 @njit(nogil=True, error_model="numpy")
 def load(raw, before, dt, touch):
-    """Fill touch (k,) of TOUCH from raw (k,) of RAW; how many it are, numbers or not.
+    """Fill touch (k,) of TOUCH from raw (k,) of RAW and return how many are filled; numbers are not checked.
 
     before: RAW rows polled after the step before. A contact farther off than its contactProcessingThreshold is not
-    solved and keeps the friction of the step in which it last was, to the bit, beside no normal force: that acts on
-    nobody. (Friction without normal force that is new does act: the solver ended between the two, and without it
-    momentum does not balance.)
+    solved. It keeps the friction of the step in which it last was, to the bit, with no normal force: that friction does
+    not act. Friction without normal force that is new does act: the solver ended between the two, and without it
+    momentum does not balance.
     """
     count = 0
     for i in range(len(raw)):
@@ -164,7 +173,7 @@ def load(raw, before, dt, touch):
 
 @njit(nogil=True, error_model="numpy")
 def all_usable(touch, count):
-    """Whether no number of the first `count` touches is NaN or `BEYOND` what can be."""
+    """Tell whether all numbers of the first `count` contacts are within `BEYOND` and none is NaN."""
     for i in range(count):
         row = touch[i]
         if not abs(row.gap_m) < BEYOND:
@@ -181,6 +190,6 @@ def all_usable(touch, count):
 
 
 def loaded(raw: Array, before: Array, dt_s: float) -> Touches:
-    """Touches of RAW rows (k,), numbers or not (`Touches.usable`); before: as `load`'s."""
+    """Return the contacts of RAW rows (k,), numbers unchecked (`Touches.usable`); before: as for `load`."""
     touch = np.empty(len(raw), TOUCH)
     return Touches(touch[: load(raw, before, dt_s, touch)])

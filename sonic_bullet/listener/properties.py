@@ -1,4 +1,4 @@
-"""What a simulator says of engine and links for the log: names, values when a record begins, and what changes later.
+"""Properties of engine and links for the log: names, values when a record begins, and later changes.
 
 the simulator's answers + values that hooks saw being set -> Body.dynamics, Simulator.engine -> Change, where one
 is set otherwise
@@ -17,35 +17,35 @@ from sonic_bullet.records.arrays import store
 from sonic_bullet.records.simulated import Change, Simulator, Values, finite
 
 ENGINE = None
-"""Stands for the engine where a body's index would."""
+"""The engine, in place of a body's index."""
 OF_WHOLE_BODY = ("linearDamping", "angularDamping")
 """Values that PyBullet has once for a body, whatever link they are set on."""
 
 
 class SetValues:
-    """What was set since hooks are in place, of engine and links; a simulator does not say all of it when asked."""
+    """Values set on engine and links since hooks are installed; a simulator does not report all of them when asked."""
 
     def __init__(self) -> None:
         self.engine: dict[str, float] = {}
         self._links: dict[int, dict[int | None, dict[str, float]]] = {}
 
     def set_engine(self, values: dict[str, object]) -> None:
-        """Values of the engine were set."""
+        """Store values set on the engine."""
         self.engine |= finite(values)
 
     def set_link(self, body: int, link: int, values: dict[str, object]) -> None:
-        """Values of a link were set."""
+        """Store values set on a link."""
         for name, value in finite(values).items():
             whom = None if name in OF_WHOLE_BODY else link
             self._links.setdefault(body, {}).setdefault(whom, {})[name] = value
 
     def of(self, body: int, link: int) -> Values:
-        """What was set of a link."""
+        """Return the values set on a link."""
         links = self._links.get(body, {})
         return links.get(None, {}) | links.get(link, {})
 
     def forget(self, body: int | None = None) -> None:
-        """A body is no more; None: all are, and the engine has its defaults again."""
+        """Drop the values of a body; None: of all bodies, and of the engine, which has its defaults again."""
         if body is None:
             self.engine.clear()
             self._links.clear()
@@ -54,7 +54,7 @@ class SetValues:
 
 
 class Properties:
-    """State of that for one world. ask_link, ask_engine: the simulator's own answers."""
+    """Names and properties in one world. ask_link, ask_engine: query the simulator."""
 
     def __init__(self, ask_link: Callable[[int, int], Values], ask_engine: Callable[[], Values]) -> None:
         self.names = Names()
@@ -65,7 +65,7 @@ class Properties:
         self._changes: dict[tuple[int, int | None], dict[str, float | None]] = {}
 
     def begin(self, code: int, index: int, record: Body) -> Body:
-        """The record of a link, with its name and all that is known of it; index: its own among the bodies."""
+        """Return the record of a link with its name and all values known; index: its own among the bodies."""
         dynamics = {**self.set_values.of(*decode(code)), **record.dynamics}
         self._now[index] = dynamics
         made = copy(record) if record.dynamics == dynamics else replace(record, dynamics=dynamics)
@@ -74,26 +74,26 @@ class Properties:
         return made
 
     def end(self, indices: Iterable[int]) -> None:
-        """These records end."""
+        """End these records."""
         for index in indices:
             self._now.pop(index, None)
 
     def first_step(self) -> None:
-        """Read the engine's settings, the first step being made with them."""
+        """Read the engine's settings, with which the first step is made."""
         self._engine = self._now[ENGINE] = self._engine_now()
 
     def link_changed(self, code: int, index: int, step: int) -> None:
-        """Values of a link were set before that step."""
+        """Note that values of a link were set before that step."""
         body, link = decode(code)
         self._note(index, {**self.set_values.of(body, link), **self._ask_link(body, link)}, step)
 
     def engine_changed(self, step: int) -> None:
-        """Values of the engine were set before that step; those before the first are no change."""
+        """Note that values of the engine were set before that step; those before the first are no change."""
         if ENGINE in self._now:
             self._note(ENGINE, self._engine_now(), step)
 
     def simulator(self, versions: dict[str, str]) -> Simulator:
-        """All of it so far."""
+        """Return engine, versions and changes so far."""
         changes = tuple(Change(step, index, values) for (step, index), values in self._changes.items())
         return Simulator(self._engine, versions, changes)
 

@@ -1,7 +1,7 @@
-"""What PyBullet disturbs, kept quiet.
+"""Suppress PyBullet's side effects on the process.
 
-It prints to the process's own stdout ("argv[0]=", "?"); these bytes would spoil JSON and pipes. It answers with
-thousands of tuples a step; the garbage collector would walk through them, and through all else, in vain.
+PyBullet prints to the process's own stdout ("argv[0]=", "?"), which would spoil JSON and pipes. It answers with
+thousands of tuples a step, which the garbage collector would traverse in vain.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def _c_library() -> ctypes.CDLL:
 
 @contextmanager
 def quiet_stdout() -> Iterator[None]:
-    """Send what C code writes to file descriptor 1 nowhere; Python's own prints belong outside the block."""
+    """Discard what C code writes to file descriptor 1; Python's own prints belong outside the block."""
     flush = _c_library().fflush
     try:
         sys.stdout.flush()
@@ -43,14 +43,16 @@ def quiet_stdout() -> Iterator[None]:
 
 
 class collector_waiting:
-    """Let the garbage collector wait within the block; afterwards it is as it was found."""
+    """Pause the garbage collector within the block and restore its state afterwards."""
 
     __slots__ = ("_was_on",)
 
     def __enter__(self) -> None:
+        """Pause the collector."""
         self._was_on = gc.isenabled()
         gc.disable()
 
     def __exit__(self, *_: object) -> None:
+        """Restore the collector."""
         if self._was_on:
             gc.enable()

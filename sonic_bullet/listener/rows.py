@@ -1,8 +1,8 @@
-"""Rows of one step: which touches count, and what the sound needs to know of each.
+"""Contact rows of one step: which contacts count, and what the synthesis needs of each.
 
-    TOUCH (k,) + START (n,) -> CONTACT rows, traces for the next step, poses of the bodies that the log knows
+    TOUCH (k,) + START (n,) -> CONTACT rows, traces for the next step, poses of the bodies in the log
 
-Compiled; `take_step` is a whole step of a world in which nothing unusual happened, in one call.
+Compiled; `take_step` makes a whole step in one call where no case is unusual.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -26,7 +26,7 @@ UNKNOWN, STRANGERS, ABSURD, UNUSUAL = -1, -2, -3, -4
 
 @njit(nogil=True, error_model="numpy")
 def find(start, code):
-    """Row of a code in START (n,), or -1."""
+    """Find the row of a code in START (n,), or -1."""
     low, high = 0, len(start)
     while low < high:
         middle = (low + high) // 2
@@ -39,14 +39,14 @@ def find(start, code):
 
 @njit(nogil=True, error_model="numpy")
 def still(body):
-    """Whether every speed is exactly 0."""
+    """Tell whether every speed is exactly 0."""
     v, w = body.velocity_m_s, body.spin_rad_s
     return v[0] == 0 and v[1] == 0 and v[2] == 0 and w[0] == 0 and w[1] == 0 and w[2] == 0
 
 
 @njit(nogil=True, error_model="numpy")
 def seen(touch, i, past):
-    """Whether touch i is one of `past`, to the bit."""
+    """Tell whether contact i is one of `past`, to the bit."""
     row, k = touch[i], len(past)
     p, j = row.point_a_m, row.impulse_n_s
     for n in range(k):
@@ -68,10 +68,10 @@ def seen(touch, i, past):
 
 @njit(nogil=True, error_model="numpy")
 def counts(touch, i, past, a, b, approach, dt):
-    """Whether a touch of the links a, b (START rows) counts: none asleep, moved by hand, or of a body in its first step
-    and deeper inside its partner than its speed explains.
+    """Tell whether a contact of the links a, b (START rows) counts.
 
-    past: the touches of the step before.
+    It does not where it is asleep, where a body was moved by hand, or where a body in its first step is deeper inside
+    its partner than its speed explains. past: contacts of the step before.
     """
     if a.moved or b.moved:
         return False
@@ -83,7 +83,7 @@ def counts(touch, i, past, a, b, approach, dt):
 
 @njit(nogil=True, error_model="numpy")
 def fill(row, touch, fresh, slip, approach):
-    """A CONTACT row of a touch, but for who meets and the sweep; whether its numbers are numbers within `LARGEST`."""
+    """Fill a CONTACT row except its bodies and sweep; return whether all numbers are within `LARGEST`."""
     row.approach_m_s = approach
     row.gap_m = touch.gap_m + max(approach, 0.0) * touch.elapsed_s
     fine = abs(approach) <= LARGEST and abs(row.gap_m) <= LARGEST  # False for NaN too
@@ -98,10 +98,24 @@ def fill(row, touch, fresh, slip, approach):
 
 @njit(nogil=True, error_model="numpy")
 def contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row):
-    """Fill row (k,) of CONTACT and the newest trace; how many rows it are, or UNKNOWN, STRANGERS or ABSURD.
+    """Fill row (k,) of CONTACT and the newest trace.
 
-    touch: `count` of TOUCH; past: those of the step before. start (n,) of START. dt, time: the step's length and start
-    in s. table, counted, newest, scratch: `Traces` with room for `count`.
+    Parameters
+    ----------
+    touch, count
+        `count` rows of TOUCH.
+    past
+        Those of the step before.
+    start : Array of START, shape (n,)
+    dt, time
+        Length and start of the step in s.
+    table, counted, newest, scratch
+        `Traces` with space for `count`.
+
+    Returns
+    -------
+    int
+        Number of rows, or UNKNOWN, STRANGERS or ABSURD.
     """
     made, strangers, fine, work = np.int64(0), False, True, scratch[0]  # a literal 0 would compile sort_pairs twice
     for i in range(count):
@@ -134,8 +148,9 @@ def contact_rows(touch, count, past, start, dt, time, table, counted, newest, sc
 
 @njit(nogil=True, error_model="numpy")
 def place_bodies(start, position, quaternion, teleported):
-    """Poses of those of START (n,) whom the log knows: position (b, 3), quaternion (b, 4), and who was moved by hand
-    (b,), each in its row START.pose.
+    """Write the poses of START rows (n,) that have an index, each to its row START.pose.
+
+    position (b, 3), quaternion (b, 4), teleported (b,): moved by hand.
     """
     for i in range(len(start)):
         body = start[i]
@@ -149,7 +164,7 @@ def place_bodies(start, position, quaternion, teleported):
 
 @njit(nogil=True, error_model="numpy")
 def unmoved(earlier, later):
-    """Whether every number of two MOTION tables is the same."""
+    """Tell whether every number of two MOTION tables is the same."""
     for i in range(len(later)):
         a, b = earlier[i], later[i]
         for x in range(3):
@@ -185,12 +200,12 @@ def take_step(
     quaternion,
     teleported,
 ):
-    """A step of a world of the same roster as the step before: how many touches, and how many rows or why none.
+    """Make a step of an unchanged roster; return how many contacts and rows it has, or why it has none.
 
     raw, before (k,) of RAW: polled after this step and the last. touch (k,) of TOUCH, start (n,) of START, row (k,) of
     CONTACT, position, quaternion, teleported: filled. The rest: see `begin`, `contact_rows`, `place_bodies`. UNUSUAL:
-    a number that is none, or, unhooked, who was moved by hand or a step that changed nothing; UNKNOWN, STRANGERS,
-    ABSURD: see there. Nothing that lives on is changed then.
+    a number is NaN or too large or, without hooks, a body was moved by hand or the step changed nothing; UNKNOWN,
+    STRANGERS, ABSURD: see there. The state that outlives the step is not changed then.
     """
     count = load(raw, before, dt, touch)
     if not all_usable(touch, count) or (not hooked and unmoved(earlier, later)):

@@ -1,12 +1,12 @@
-"""Poses and twists at the start of a step, and who was moved by hand or is new.
+"""Poses and twists at the start of a step, and which bodies were moved by hand or are new.
 
     MOTION rows before and after -> `begin` -> START rows
 
-Hooked, they were read before the step. Otherwise those left by the step before hold, but not for bodies that are new or
-were moved since: there the simulator's own step is taken back (`Undo`). A semi-implicit integrator has
-x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved by hand. What has mass 0 may be
-driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, and it carries the velocity of that move;
-beyond it, it is a jump.
+With hooks they were read before the step. Otherwise those left by the step before hold, except for bodies that are new
+or were moved since: there the simulator's own step is undone (`Undo`). A semi-implicit integrator has
+x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved by hand. A body of mass 0 may be
+driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, and the body has the velocity of that
+move; above it, it is a jump.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -46,13 +46,13 @@ LEFT_OUT = -2
 NOBODY = np.zeros(0, np.int64)
 
 Undo = Callable[[Motion, Array, Touches, float], Motion]
-"""(motion after the step, rows (n,) to take back, the step's contacts, its length) -> the motion one step earlier,
+"""(motion after the step, rows (n,) to undo, the step's contacts, its length) -> the motion one step earlier,
 right in those rows.
 """
 
 
 def start_table(roster: Roster) -> Array:
-    """START rows (n,) of a roster, of which code and static are filled and nobody is known."""
+    """Make START rows (n,) of a roster with code and static filled and no body known."""
     table = np.zeros(len(roster.code), START)
     table["code"], table["static"], table["index"] = roster.code, roster.static, -1
     return table
@@ -60,7 +60,7 @@ def start_table(roster: Roster) -> Array:
 
 @njit(nogil=True, error_model="numpy")
 def jump(earlier, later, static, dt):
-    """Whether a link is farther from where it was than 1.5 × both speeds (static: DRIVEN_SPEED_M_S) explain."""
+    """Tell whether a link moved farther than 1.5 × both speeds (static: DRIVEN_SPEED_M_S) explain."""
     moved, v, w = 0.0, 0.0, 0.0
     for x in range(3):
         moved += (later.position_m[x] - earlier.position_m[x]) ** 2
@@ -92,10 +92,10 @@ def drive(earlier, later, dt, body):
 
 @njit(nogil=True, error_model="numpy")
 def begin(earlier, later, dt, by_hand, hooked, start):
-    """Fill start (n,) of START for a step of length dt; how many of them were moved.
+    """Fill start (n,) of START for a step of length dt; return how many were moved.
 
-    earlier, later (n,) of MOTION: hooked, read before the step before and before this one; else after those. by_hand
-    (h,): ids of bodies known to be moved. Nobody is new: the roster is the same.
+    earlier, later (n,) of MOTION: with hooks, read before the step before and before this one; else after those.
+    by_hand (h,): ids of bodies known to be moved. The roster is unchanged, so no body is new.
     """
     count = 0
     for i in range(len(start)):
@@ -119,8 +119,16 @@ def begin(earlier, later, dt, by_hand, hooked, start):
 
 
 def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_s: float) -> Array:
-    """START rows (n,) from the motion read before this step and the one read before the last (None: no step yet);
-    by_hand: bodies known to be moved.
+    """Make START rows (n,) from motions read before steps.
+
+    Parameters
+    ----------
+    past, now
+        Read before the last step (None: no step yet) and before this one.
+    by_hand
+        Bodies known to be moved.
+    dt_s
+        Length of the step.
     """
     start = start_table(now.roster)
     if past is None:
@@ -137,11 +145,11 @@ def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_
 
 
 def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, undo: Undo, first: bool) -> Array:
-    """START rows (n,) from the motions read after the last step and after this one.
+    """Make START rows (n,) from the motions read after the last step and after this one.
 
-    What stands still by mass 0 stands where it stands now.
+    A body that is static by mass 0 starts at its pose of now.
 
-    undo: takes a step back where nothing was read before it.
+    undo: undoes a step where no pose was read before it.
     """
     start, old = start_table(now.roster), rows_of(past.roster, now.roster.code)
     begin(_earlier(past, now, old), now.row, dt_s, NOBODY, False, start)
@@ -159,20 +167,20 @@ def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, un
 
 
 def set_motion(start: Array, row: Array, mask: Array | slice) -> None:
-    """Poses and twists of START rows where mask (n,) is True: those of row (n,) of MOTION."""
+    """Copy poses and twists of row (n,) of MOTION to START rows where mask (n,) is True."""
     for name in MOTION.names or ():
         start[name][mask] = row[name][mask]
 
 
 def jumped(past: Motion, now: Motion, dt_s: float) -> Array:
-    """(n,) of `now`: moved farther in one step than both speeds together explain, so by hand; never who is new."""
+    """Mark the links (n,) of `now` that one step moved farther than both speeds explain, so by hand; new ones never."""
     start, old = start_table(now.roster), rows_of(past.roster, now.roster.code)
     begin(_earlier(past, now, old), now.row, dt_s, NOBODY, True, start)
     return np.asarray((start["moved"] != 0) & (old >= 0))
 
 
 def _earlier(past: Motion, now: Motion, old: Array) -> Array:
-    """MOTION rows (n,) of `past` in the order of `now`; who was not there stands where it stands now."""
+    """Return MOTION rows (n,) of `past` in the order of `now`; a new link has its pose of now."""
     row, known = now.row.copy(), old >= 0
     row[known] = past.row[old[known]]
     return row

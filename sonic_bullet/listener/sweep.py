@@ -1,14 +1,14 @@
-"""How fast a contact moves over either surface.
+"""Speed of a contact over either surface.
 
     u_b - u_a = v_a - v_b = slip                 u: velocity of the contact relative to a body's material (exact)
     u_a ≈ ½ (d_a + d_b - slip), u_b = u_a + slip
 
 d_a, d_b: displacement of the contact in either body's frame since the same contact was last seen, over the time between
 [the frames of Montana 1988, The kinematics of contact and grasp, eq. 20-24, by differences instead of curvatures].
-PyBullet names no contact from step to step, and a resting box shows one to four of its corners at a time, in turn: a
-contact is recognised as the nearest earlier one of its pair among the last MEMORY_STEPS steps. Without slip a contact
-travels no faster than |ω_rel|·R: a match is refused if it moves faster than that over both surfaces at once. Without a
-match the pair keeps its last velocity; a new pair's contact stays on the smaller body.
+PyBullet does not identify contacts from step to step, and a resting box shows one to four of its corners at a time, in
+turn. A contact is therefore matched to the nearest earlier one of its pair among the last MEMORY_STEPS steps. Without
+slip a contact travels no faster than |ω_rel|·R: a match is refused if it moves faster than that over both surfaces at
+once. Without a match the pair keeps its last velocity; a new pair's contact stays on the smaller body.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -38,14 +38,20 @@ TRACE = np.dtype(
 """A contact of one step, and its place in the order of pairs."""
 
 SCRATCH = np.dtype([("x", "f8", (2, 3)), ("q", "f8", (2, 4)), ("slip", "f8", (3,))], align=True)
-"""What a contact's place is worked out on: poses of both bodies at its sub-step, and its slip."""
+"""Work space of a contact: poses of both bodies at its sub-step, and its slip."""
 
 
 class Traces:
-    """What is remembered of the last MEMORY_STEPS steps: a ring of tables, one more than are looked at.
+    """Contacts of the last MEMORY_STEPS steps, in a ring of one table more.
 
-    table (MEMORY_STEPS + 1, capacity) of TRACE; count: contacts of each; newest: where the coming step's go; work (1,)
-    of SCRATCH.
+    Attributes
+    ----------
+    table : Array of TRACE, shape (MEMORY_STEPS + 1, capacity)
+    count
+        Contacts of each table.
+    newest
+        Table of the coming step.
+    work : Array of SCRATCH, shape (1,)
     """
 
     def __init__(self) -> None:
@@ -55,27 +61,27 @@ class Traces:
         self.work = np.zeros(1, SCRATCH)
 
     def clear(self) -> None:
-        """Know of no contact."""
+        """Forget all contacts."""
         self.count[:] = 0
 
     def reserve(self, rows: int) -> None:
-        """Let a step have that many contacts."""
+        """Make space for that many contacts in a step."""
         if rows > self.table.shape[1]:
             grown = np.zeros((len(self.table), 2 * rows), TRACE)
             grown[:, : self.table.shape[1]] = self.table
             self.table = grown
 
     def turn(self) -> None:
-        """The coming step's are known; the oldest are forgotten."""
+        """Advance the ring by a step; the oldest table is reused."""
         self.newest = (self.newest - 1) % len(self.count)
 
 
 @njit(nogil=True, error_model="numpy")
 def surface_velocity(dx, dy, dz, age, q, normal):
-    """Velocity of a contact over a surface, world axes, that went by (dx, dy, dz) in the frame of a body turned by q.
+    """Return the velocity, world axes, of a contact displaced by (dx, dy, dz) in the frame of a body of orientation q.
 
-    Laid into the tangent plane at full length: the chord of a rolling step leaves the plane by half the angle rolled;
-    its length, not its projection, is the path.
+    The displacement is rotated into the tangent plane at full length: the chord of a rolling step leaves the plane by
+    half the angle rolled; its length, not its projection, is the path.
     """
     dx, dy, dz = turn(q[0], q[1], q[2], q[3], dx, dy, dz)
     length2 = dx * dx + dy * dy + dz * dz
@@ -88,7 +94,7 @@ def surface_velocity(dx, dy, dz, age, q, normal):
 
 @njit(nogil=True, error_model="numpy")
 def slower(x, y, z, slip):
-    """The smaller of |u_a| and |u_b|, u_a = (x, y, z)."""
+    """Return the smaller of |u_a| and |u_b|, u_a = (x, y, z)."""
     a = x * x + y * y + z * z
     b = (x + slip[0]) ** 2 + (y + slip[1]) ** 2 + (z + slip[2]) ** 2
     return np.sqrt(min(a, b))
@@ -96,7 +102,7 @@ def slower(x, y, z, slip):
 
 @njit(nogil=True, error_model="numpy")
 def first_of(table, count, pair):
-    """The first of `count` entries, in the order of pairs, that is not before `pair`."""
+    """Find the first of `count` entries, in the order of pairs, that is not before `pair`."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -109,9 +115,9 @@ def first_of(table, count, pair):
 
 @njit(nogil=True, error_model="numpy")
 def recognise(fresh, pair, table, count, newest, work, normal, limit):
-    """Fill u_a of a TRACE row, whose time and points stand already; False where nothing of the pair is known that fits.
+    """Fill u_a of a TRACE row whose time and points are set; False where no earlier contact of the pair matches.
 
-    table, count, newest: `Traces`. limit: how slow the slower sweep must be, m/s.
+    table, count, newest: `Traces`. limit: largest speed of the slower sweep, m/s.
     """
     best, held = np.inf, False
     slip, u = work.slip, fresh.u_a_m_s
@@ -143,9 +149,9 @@ def recognise(fresh, pair, table, count, newest, work, normal, limit):
 
 @njit(nogil=True, error_model="numpy")
 def place(touch, a, b, work, fresh):
-    """Fill the points of a TRACE row: a touch in the frames of both bodies, by their poses when it was loaded.
+    """Fill the points of a TRACE row: a contact in the frames of both bodies, by their poses when it was loaded.
 
-    Returns how far they are from both centres, m; both poses go to `work`.
+    Returns the distances from both centres, m; both poses are written to `work`.
     """
     pose_after(a, touch.elapsed_s, work.x[0], work.q[0])
     pose_after(b, touch.elapsed_s, work.x[1], work.q[1])
@@ -160,10 +166,10 @@ def place(touch, a, b, work, fresh):
 
 @njit(nogil=True, error_model="numpy")
 def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
-    """Speeds (2,) in m/s at which a touch moves over the bodies a and b (START rows), and its TRACE row `fresh`, whose
-    time is set.
+    """Write the speeds (2,) in m/s of a contact over the bodies a and b (START rows), and its TRACE row `fresh`.
 
-    work: SCRATCH, with the slip. What cannot move has a far-off centre that says nothing of its size.
+    work: SCRATCH, with the slip; the time of `fresh` is set. The distant centre of a static body says nothing of its
+    size.
     """
     far_a, far_b = place(touch, a, b, work, fresh)
     v, w, slip, u = a.spin_rad_s, b.spin_rad_s, work.slip, fresh.u_a_m_s
@@ -182,9 +188,9 @@ def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
 
 @njit(nogil=True, error_model="numpy")
 def sort_pairs(row, count, trace):
-    """Write pair and order of the first `count` entries of a trace: CONTACT rows by (a, b), equal ones as they came.
+    """Write pair and order of the first `count` entries of a trace: CONTACT rows by (a, b), stable.
 
-    Merge sort from the bottom: runs of 1, 2, 4 … are joined, from one buffer to the other and back.
+    Merge sort from the bottom: runs of 1, 2, 4 … are joined, alternating between two buffers.
     """
     key, order = np.empty((2, count), np.int64), np.empty((2, count), np.int64)
     for i in range(count):

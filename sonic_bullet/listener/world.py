@@ -1,10 +1,10 @@
-"""What a simulator must tell a listener.
+"""Interface that a simulator implements for a listener.
 
-PyBullet is one (listener/pybullet/), a contact log played back is another (tests).
+PyBullet implements it (listener/pybullet/); a contact log played back is another implementation (tests).
 
     the simulator steps -> after_step() -> Step (records.contacts)
 
-A second simulator derives from `World` and is handed to `sonic_bullet.attach` in place of a client.
+A second simulator derives from `World` and is passed to `sonic_bullet.attach` in place of a client.
 """
 
 from __future__ import annotations
@@ -26,20 +26,21 @@ class World(ABC):
     stepped: bool
     """Whether the last `after_step` found a step: a second call without one between finds none."""
     emptied = 0
-    """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is seen."""
+    """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
     logged = True
-    """False where nobody keeps a log: what only a log needs may be dropped, records of who is gone first of all."""
+    """False where no log is kept: data that only a log needs may be dropped, records of removed bodies above all."""
 
     @property
     @abstractmethod
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, in the order that Contacts.a and Contacts.b count them; the living alone where
-        `logged` is False.
+        """All bodies ever met, in the order that Contacts.a and Contacts.b count them.
+
+        Only the living ones where `logged` is False.
         """
 
     @property
     def records(self) -> Sequence[Body] | Mapping[int, Body]:
-        """`bodies` by what Contacts.a and Contacts.b count: an index is of one body for ever, whoever is dropped."""
+        """`bodies` by the index in Contacts.a and Contacts.b; an index means one body, whichever are dropped."""
         return self.bodies
 
     @property
@@ -49,17 +50,17 @@ class World(ABC):
 
     @property
     def untouched(self) -> frozenset[int]:
-        """Ids of the bodies that are in the world and have met nobody yet."""
+        """Ids of the bodies in the world that have had no contact yet."""
         return frozenset()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the world is left out of the sound, and why."""
+        """Messages that say what of the world the sound leaves out, and why."""
         return ()
 
     @property
     def simulator(self) -> Simulator:
-        """What the simulator says of itself, for the log: nothing, unless it has something to say."""
+        """Properties of the simulator for the log; empty by default."""
         return Simulator()
 
     @property
@@ -69,28 +70,54 @@ class World(ABC):
 
     @abstractmethod
     def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
-        """The body's id and its links of that number or name, "all" of them. Raises SceneError."""
+        """Return the body's id and its links of that number or name, "all" of them.
+
+        Raises
+        ------
+        SceneError
+            There is no such body or link.
+        """
 
     @abstractmethod
     def name_of(self, body: int, link: int = -1) -> str:
-        """What people call a link. Raises SceneError for an unknown one."""
+        """Return the name of a link for messages.
+
+        Raises
+        ------
+        SceneError
+            There is no such link.
+        """
 
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
-        """What the records of links (body, link, name to be given) are or would be called, if all were added now."""
+        """Return the names that records of links (body, link, given name) have, or would have if all were added now."""
         return [given or self.name_of(body, link) for body, link, given in links]
 
     def all_links(self) -> tuple[tuple[int, int], ...]:
-        """(body, link) of every link in the world that could touch something; by default of those in `living`."""
+        """List (body, link) of every link in the world that could touch something; by default of those in `living`."""
         return tuple((body.body_id, body.link) for body in self.living)
 
     def silence(self, names: Collection[str]) -> None:
-        """Records of links, or of all links of bodies, called so are `silent` from now on. Raises SceneError."""
+        """Mark as `silent`, from now on, records of links, or of all links of bodies, of these names.
+
+        Raises
+        ------
+        SceneError
+            The simulator cannot do that.
+        """
         if names:
             raise SceneError("this simulator silences nobody", "leave silent out")
 
     @abstractmethod
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
-        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
+        """Return the geometry of a link in its body frame.
+
+        Raises
+        ------
+        SceneError
+            There is no such link.
+        MeshError
+            It has no geometry.
+        """
 
     @abstractmethod
     def add(
@@ -104,42 +131,71 @@ class World(ABC):
         options: ModalOptions | None = None,
         mounting: Mounting | None = None,
     ) -> Body:
-        """Make a link known with what it is made of; its record, which `bodies` holds from now on.
+        """Register a link with its material or model; return its record, which `bodies` holds from now on.
 
-        options: what was asked of its modes, for the record. mounting: how it is held, None: as is usual.
+        Parameters
+        ----------
+        body, link
+        material, model, shapes
+            What it is made of.
+        options
+            Modal options asked for, for the record.
+        mounting
+            How it is held; None: the usual mounting.
 
-        Raises SceneError.
+        Raises
+        ------
+        SceneError
+            The link cannot be added.
         """
 
     def call(self, body: int, link: int, name: str) -> None:
-        """Call a link so from now on. Raises SceneError where that cannot be."""
+        """Give a link a name.
+
+        Raises
+        ------
+        SceneError
+            That is not possible.
+        """
         raise SceneError("this simulator's bodies bring their names", "leave name out")
 
     def link_name(self, body: int, link: int) -> str:
-        """A link's own name, without its body's."""
+        """Return a link's own name, without its body's."""
         return str(link)
 
     @abstractmethod
     def after_step(self) -> Step:
-        """The record of the step just made. Raises SceneError."""
+        """Return the record of the step just made.
+
+        Raises
+        ------
+        SceneError
+            The world cannot be read.
+        """
 
     def reset(self) -> None:
-        """Begin anew, as a world that has just been opened and of which the same bodies were added, in the order in
-        which they last were: steps and indices count from 0, who was met by itself is met anew, who is gone is
-        forgotten, `notes` are empty. Raises SceneError, having changed nothing, where that is not possible.
+        """Restart, as a world just opened to which the same bodies were added, in the order in which they last were.
+
+        Steps and indices count from 0, bodies met by contact alone are met anew, ended records are dropped, `notes` are
+        empty.
+
+        Raises
+        ------
+        SceneError
+            That is not possible; nothing has changed then.
         """
         raise SceneError("this world cannot begin anew", "attach a new listener, or give its World a `reset`")
 
     def listen(self, after: Callable[[], object]) -> bool:
-        """Call ``after`` after every step from now on, if the simulator can; whether it does.
+        """Call ``after`` after every step from now on, if the simulator can; return whether it does.
 
-        Else somebody calls `Listener.step`.
+        Otherwise the caller has to call `Listener.step`.
         """
         return False
 
     def make_ready(self) -> None:  # noqa: B027 - not every simulator has any
-        """Have the machine code that the first step would else wait for."""
+        """Compile, or load, the machine code for which the first step would else wait."""
 
     @abstractmethod
     def unhook(self) -> None:
-        """Leave the simulator as it was; harmless when nothing listens."""
+        """Remove the hooks from the simulator; harmless without any."""

@@ -1,1 +1,1 @@
-"""The only place that imports pybullet: worlds, hooks, shapes, scripts, and what would spoil their sound."""
+"""PyBullet worlds: hooks, shapes, scripts and findings; the only package that imports pybullet."""

@@ -1,4 +1,4 @@
-"""Facts of one link by value: name, mass, inertia. Bullet takes NaN, negative and 1e300 masses silently; we do not."""
+"""Name, mass and inertia of a link by value, checked: Bullet accepts masses that are NaN, negative or 1e300."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ DYNAMICS = {
     "contactStiffness": 9,
     "collisionMargin": 11,
 }
-"""Places in getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set."""
+"""Indices into getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set."""
 
 PLACEHOLDER = "link0"
-"""What createMultiBody calls the base of a body, which has no name then."""
+"""Name that createMultiBody gives to the base of a body without a name."""
 
 
 def check_exists(client_id: int, body: int, link: int) -> None:
     """Raise SceneError unless the world holds this link.
 
-    (getDynamicsInfo would end the process on a link that is not there.)
+    getDynamicsInfo would end the process on a link that is not there.
     """
     known = body_ids(client_id)
     if body not in known:
@@ -77,7 +77,7 @@ def check_usable(client_id: int, body: int) -> None:
 
 
 def link_name(client_id: int, body: int, link: int) -> str:
-    """A name for people: the body's, and the link's where it is not the base; "body 2" where nobody gave any."""
+    """Return a name for messages: the body's, and the link's where it is not the base; "body 2" without any."""
     base, whole = (text.decode(errors="replace") for text in pybullet.getBodyInfo(body, physicsClientId=client_id))
     name = whole or (base if base != PLACEHOLDER else "") or f"body {body}"
     return (
@@ -88,12 +88,12 @@ def link_name(client_id: int, body: int, link: int) -> str:
 
 
 def describe_link(client_id: int, body: int, link: int = -1) -> str:
-    """A link in a message: its name and its body's id."""
+    """Return a link's name and its body's id for a message."""
     return with_body_id(link_name(client_id, body, link), body)
 
 
 def link_names(client_id: int, body: int) -> list[str]:
-    """The names that PyBullet has for a body's links, the base's first."""
+    """Return the names that PyBullet has for a body's links, the base's first."""
     base = pybullet.getBodyInfo(body, physicsClientId=client_id)[0].decode(errors="replace")
     joints = range(pybullet.getNumJoints(body, physicsClientId=client_id))
     return [
@@ -106,8 +106,12 @@ def link_names(client_id: int, body: int) -> list[str]:
 
 
 def checked_mass_kg(info: tuple[Any, ...], body: int, link: int) -> float:
-    """Mass of getDynamicsInfo's answer; SceneError where it is negative, absurd or not a number, or the inertia is
-    not one.
+    """Return the mass in getDynamicsInfo's answer.
+
+    Raises
+    ------
+    SceneError
+        It is negative, absurd or not a number, or the inertia is not a number.
     """
     mass, inertia = info[0], info[2]
     if not (math.isfinite(mass) and 0 <= mass < HEAVIEST_KG):
@@ -124,9 +128,11 @@ def checked_mass_kg(info: tuple[Any, ...], body: int, link: int) -> float:
 
 
 def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
-    """The silent record of a link that exists. getDynamicsInfo's inertia is diagonal in the body frame: both are the
-    inertial frame (measured: R·diag·Rᵀ·ω stays constant in free spin, whatever localInertialOrn). Raises SceneError on
-    absurd mass or inertia."""
+    """Return the silent record of a link that exists; SceneError on absurd mass or inertia.
+
+    getDynamicsInfo's inertia is diagonal in the body frame: both are the inertial frame (measured: R·diag·Rᵀ·ω stays
+    constant in free spin, whatever localInertialOrn).
+    """
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     mass = checked_mass_kg(info, body, link)
     pieces = collision_pieces(client_id, body, link)
@@ -148,19 +154,19 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
 
 
 def dynamics(client_id: int, body: int, link: int) -> Values:
-    """What PyBullet says of a link that exists, under the names that changeDynamics has for it."""
+    """Query the properties of a link that exists, under the names of changeDynamics."""
     return dynamics_of(pybullet.getDynamicsInfo(body, link, physicsClientId=client_id))
 
 
 def dynamics_of(info: tuple[Any, ...]) -> Values:
-    """What getDynamicsInfo answered, under the names that changeDynamics has for it."""
+    """Name the entries of getDynamicsInfo's answer as changeDynamics does."""
     inertia = {f"localInertiaDiagonal{axis}": x for axis, x in zip("XYZ", info[2], strict=True)}
     return finite({**{name: info[place] for name, place in DYNAMICS.items()}, **inertia})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AddedLink:
-    """how: arguments of `added_body`; record: as it was when it began; likeness: see there."""
+    """A link that was added. how: arguments of `added_body`; record: as it began; likeness: see `likeness`."""
 
     how: dict[str, Any]
     record: Body
@@ -168,24 +174,24 @@ class AddedLink:
 
 
 class AddedLinks:
-    """State of that for one client. by_code: of a link, in the order in which they last were added."""
+    """The links added to one client, by code, in the order in which they last were."""
 
     def __init__(self, client_id: int) -> None:
         self._client_id = client_id
         self.by_code: dict[int, AddedLink] = {}
 
     def tell(self, code: int, how: dict[str, Any], record: Body) -> None:
-        """A link that exists was added; how: arguments of `added_body`; record: what was made of it."""
+        """Store a link that was added; how: arguments of `added_body`; record: the result."""
         self.by_code.pop(code, None)
         self.by_code[code] = AddedLink(how, record, likeness(self._client_id, *decode(code)))
 
     def forget(self, codes: Iterable[int]) -> None:
-        """Links are gone."""
+        """Drop links that are gone."""
         for code in codes:
             self.by_code.pop(code, None)
 
     def still_there(self, roster: Roster) -> dict[int, AddedLink]:
-        """Those whom a roster holds: a link of the same code is the same only where its name and shape are."""
+        """Select those that a roster holds with the same name and shape."""
         there = set(roster.code.tolist())
         return {
             code: one
@@ -194,13 +200,14 @@ class AddedLinks:
         }
 
     def again(self, code: int, one: AddedLink, was_set: Values) -> Body:
-        """The record of a link that is still there, as if it were added now, before the first step. was_set: of its
-        values, where the simulator does not say. Raises SceneError on absurd mass or inertia.
+        """Return a link's record as if it were added now, before the first step; SceneError on absurd mass or inertia.
+
+        was_set: its values that were set, where the simulator does not report them.
         """
         body, link = decode(code)
         info = pybullet.getDynamicsInfo(body, link, physicsClientId=self._client_id)
         if one.record.dynamics == {**was_set, **dynamics_of(info)}:
-            made = copy(one.record)  # proven already; its inertia is among the dynamics
+            made = copy(one.record)  # checked already; its inertia is among the dynamics
             store(made, name=link_name(self._client_id, body, link), epoch=0, since_step=0, until_step=-1)
             return made
         return added_body(self._client_id, body, link, 0, **one.how)
@@ -219,9 +226,16 @@ def added_body(
     options: ModalOptions | None,
     mounting: Mounting | None = None,
 ) -> Body:
-    """The record of a link that exists, with what it is made of. volume_m3 None: the model's, or 0; shapes: in place of
-    its collision shape; a lone sphere tells its curvature. mounting: how it is held, None: as is usual for its mass.
-    Raises SceneError on absurd mass or inertia.
+    """Return the record of a link that exists, with what it is made of; SceneError on absurd mass or inertia.
+
+    Parameters
+    ----------
+    volume_m3
+        None: the model's, or 0.
+    shapes
+        In place of its collision shape; a single sphere determines the curvature.
+    mounting
+        How it is held; None: the usual mounting of its mass.
     """
     record = describe(client_id, body, link, epoch)
     volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
@@ -234,7 +248,7 @@ def added_body(
 
 
 def likeness(client_id: int, body: int, link: int) -> Hashable:
-    """What tells a link from another's that was given its id: its name and its shape, which nobody can change."""
+    """Return name and shape, which cannot change, to tell a link from another that reuses its id."""
     pieces = collision_pieces(client_id, body, link)
     return link_name(client_id, body, link), tuple(
         (piece.kind, piece.file, *(tuple(map(float, part)) for part in (piece.size, piece.position, piece.quaternion)))
@@ -243,55 +257,55 @@ def likeness(client_id: int, body: int, link: int) -> Hashable:
 
 
 class AskedLinks(World):
-    """What a world says without remembering steps. client_id: which client; properties: names and what was set."""
+    """The queries of a world that need no step. client_id: the client; properties: names and values set."""
 
     client_id: int
     properties: Properties
 
     @property
     def left_out(self) -> BodiesLeftOut:
-        """Who of the world is left out, and what was said of it."""
+        """The bodies left out, and the messages about them."""
         raise NotImplementedError
 
     def likeness(self, body: int, link: int) -> Hashable:
-        """What tells a link that exists from another's that was given its id."""
+        """Return what tells a link that exists from another that reuses its id."""
         return likeness(self.client_id, body, link)
 
     def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
-        """The body's id and its links of that number or name, "all" of them. Raises SceneError, MeshError."""
+        """Return the body's id and its links of that number or name, "all" of them; raises SceneError, MeshError."""
         from sonic_bullet.listener.pybullet.clients import links_called
 
         return links_called(self, body, link)
 
     def name_of(self, body: int, link: int = -1) -> str:
-        """What people call a link: its name and its body's id. Raises SceneError for an unknown one."""
+        """Return a link's name and its body's id for messages; SceneError for an unknown link."""
         check_connected(self.client_id)
         check_exists(self.client_id, body, link)
         own = link_name(self.client_id, body, link)
         return with_body_id(self.properties.names.called(int(encode(body, link)), own), body)
 
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
-        """What the records of links (body, link, name to be given) are or would be called, if all were added now."""
+        """Return the names that records of links (body, link, given name) have, or would have if all were added now."""
         return self.properties.names.expected(
             [(int(encode(body, link)), link_name(self.client_id, body, link), given) for body, link, given in links]
         )
 
     def all_links(self) -> tuple[tuple[int, int], ...]:
-        """(body, link) of every link in the world that has a collision shape; none where the connection is lost."""
+        """List (body, link) of every link that has a collision shape; none where the connection is lost."""
         from sonic_bullet.listener.pybullet.clients import is_connected, links_with_shapes
 
         return links_with_shapes(self.client_id) if is_connected(self.client_id) else ()
 
     def silence(self, names: Collection[str]) -> None:
-        """Records of links, or of all links of bodies, called so are `silent` from now on."""
+        """Mark as `silent`, from now on, records of links, or of all links of bodies, of these names."""
         self.properties.names.silent = frozenset(names)
 
     def link_name(self, body: int, link: int) -> str:
-        """The link's own name, without its body's."""
+        """Return the link's own name, without its body's."""
         return link_names(self.client_id, body)[link + 1]
 
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
-        """Geometry of a link in its body frame. Raises SceneError for an unknown one, MeshError where it has none."""
+        """Return the geometry of a link in its body frame; SceneError for an unknown one, MeshError without any."""
         from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
 
         check_connected(self.client_id)
@@ -302,14 +316,14 @@ class AskedLinks(World):
         return shapes
 
     def make_ready(self) -> None:
-        """Have the machine code that the first step would else wait for."""
+        """Compile, or load, the machine code for which the first step would else wait."""
         make_ready()
 
     def call(self, body: int, link: int, name: str) -> None:
-        """Call a link so from now on. Raises SceneError where another living link has that name."""
+        """Give a link a name; SceneError where another living link has it."""
         self.properties.names.call(int(encode(body, link)), name)
 
     @property
     def simulator(self) -> Simulator:
-        """What PyBullet says of itself; without hooks, no more than it says when asked at the first step."""
+        """Properties that PyBullet reports; without hooks, only those it reported at the first step."""
         return self.properties.simulator({"pybullet": find_version("pybullet")})

@@ -1,7 +1,7 @@
-"""Who is in a world and where: read from PyBullet before a step, and no other numbers than numbers are handed on.
+"""Bodies in a world and their poses, read from PyBullet before a step and checked to be numbers.
 
-getNumBodies -> the roster, kept while nobody comes or goes -> poses and twists -> Motion; whose are no numbers is muted
-    (left_out)
+getNumBodies -> the roster, kept while no body comes or goes -> poses and twists -> Motion; bodies with other numbers
+    are muted (left_out)
 """
 
 from __future__ import annotations
@@ -21,9 +21,7 @@ from sonic_bullet.records.errors import SceneError
 
 
 class Census:
-    """State of that for one client. on_roster is given each new roster, on_mute the bodies that are left out from now
-    on.
-    """
+    """Roster of one client. on_roster is called with each new roster, on_mute with the bodies muted from now on."""
 
     def __init__(
         self, client_id: int, on_roster: Callable[[Roster], None], on_mute: Callable[[Collection[int]], None]
@@ -34,11 +32,11 @@ class Census:
         self.left_out = BodiesLeftOut()
 
     def stale(self) -> None:
-        """Read anew who is there, and who of them is static, before the next poses."""
+        """Read the roster anew before the next poses."""
         self._roster = None
 
     def read(self) -> Motion:
-        """Poses and twists now. Raises SceneError where the connection is lost."""
+        """Read poses and twists; SceneError where the connection is lost."""
         motion = self._read_raw()
         while motion.broken:
             self._mute(motion.broken, NO_NUMBER)
@@ -46,19 +44,19 @@ class Census:
         return motion
 
     def usable(self, touches: Touches) -> Touches:
-        """Those whose numbers are numbers, of bodies that are not left out."""
+        """Select contacts whose numbers are usable and whose bodies are not left out."""
         if not len(touches):
             return touches
         kept = touches.usable
         if not kept.all():
-            self.read()  # names those whose poses this step has broken
+            self.read()  # reports the bodies whose poses this step has broken
             self.left_out.name_pairs(touches.kept(~kept))
         if self.left_out.muted or self.left_out.soft:
             kept &= ~self.left_out.concerned(touches)
         return touches if kept.all() else touches.kept(kept)
 
     def described(self, code: int, epoch: int) -> Body | None:
-        """The silent record of a link, or None, and it is muted, where its mass or inertia is not one."""
+        """Return the silent record of a link; None, and mute it, where mass or inertia cannot be."""
         body, link = decode(code)
         if body in self.left_out.muted:
             return None

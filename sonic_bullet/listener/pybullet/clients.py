@@ -1,4 +1,4 @@
-"""Clients of PyBullet, and who in their worlds could sound."""
+"""Clients of PyBullet, and the links in their worlds that can sound."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ from sonic_bullet.records.errors import MeshError, SceneError
 
 
 def direct_client() -> BulletClient:
-    """A fresh PyBullet world without a window, connected without a word on stdout.
+    """Open a PyBullet world without a window, and without output on stdout.
 
-    Raises SceneError where PyBullet gives no more.
+    Raises
+    ------
+    SceneError
+        PyBullet gives no further client.
     """
     with quiet_stdout():
         client = BulletClient(pybullet.DIRECT)
@@ -33,7 +36,7 @@ def direct_client() -> BulletClient:
 
 
 def clear_file_cache() -> None:
-    """Have PyBullet read files anew: it keeps meshes by name, and a name may be another file by now."""
+    """Clear PyBullet's cache of meshes: it is keyed by file name, and the file may have changed."""
     client = direct_client()
     for kept in (0, 1):
         client.setPhysicsEngineParameter(enableFileCaching=kept)
@@ -41,14 +44,14 @@ def clear_file_cache() -> None:
 
 
 def watch_settings(client: BulletClient) -> None:
-    """See from now on what is set of engine and bodies, for whoever listens later: PyBullet does not say all of it."""
+    """Record from now on the values set on engine and bodies, not all of which PyBullet reports later."""
     hooks.Hooks.of(client, client._client)
 
 
 def disconnect(client: BulletClient) -> None:
     """End a client; one that has ended already is left alone.
 
-    Its id is cleared, for BulletClient's finaliser would end whoever has it next.
+    Its id is cleared, as BulletClient's finaliser would end the next client of that id.
     """
     client_id, client._client = client._client, -1
     begin(client_id)
@@ -57,9 +60,7 @@ def disconnect(client: BulletClient) -> None:
 
 
 def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[int, int], ...]:
-    """(body, link) of every link, or those of one body, that has a collision shape; soft bodies have none that could
-    sound.
-    """
+    """List (body, link) of every link, or of one body's, with a collision shape; none of soft bodies."""
     ask: Any = pybullet
     cid = client_id
     bodies = (
@@ -77,17 +78,19 @@ def links_with_shapes(client_id: int, body: int | None = None) -> tuple[tuple[in
 
 
 def is_static(client_id: int, body: int, link: int) -> bool:
-    """Whether a link that exists can never move: the base of a body of mass 0."""
+    """Tell whether a link that exists can never move: the base of a body of mass 0."""
     return link < 0 and pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[0] == 0
 
 
 def links_called(world: facts.AskedLinks, body: Any, link: Any) -> tuple[int, tuple[int, ...]]:
-    """The body's id and its links of that number or name; "all": every link that has a collision shape.
+    """Return the body's id and its links of that number or name; "all": every link that has a collision shape.
 
-    All have a mass and an inertia that are some.
-
-    Raises SceneError (no such body or link, a soft body, an absurd mass, a pose that is no number), and MeshError where
-    "all" are none.
+    Raises
+    ------
+    SceneError
+        There is no such body or link, the body is soft, a mass or inertia is absurd, or a pose is not a number.
+    MeshError
+        "all" are none.
     """
     cid = world.client_id
     check_connected(cid)
@@ -112,7 +115,7 @@ def links_called(world: facts.AskedLinks, body: Any, link: Any) -> tuple[int, tu
 
 
 def _link_named(client_id: int, body: int, name: str) -> int:
-    """The link of that name, by PyBullet; the base has one too. Raises SceneError listing the nearest names."""
+    """Find the link, or base, that PyBullet calls so; SceneError lists the nearest names."""
     names = facts.link_names(client_id, body)
     if name not in names:
         raise SceneError(
@@ -122,9 +125,12 @@ def _link_named(client_id: int, body: int, name: str) -> int:
 
 
 def client_id_of(client: Any) -> int:
-    """The client id of a BulletClient, the pybullet module (its default client 0) or an id.
+    """Return the client id of a BulletClient, the pybullet module (its default client 0) or an id.
 
-    Raises SceneError where nothing is connected.
+    Raises
+    ------
+    SceneError
+        Nothing is connected.
     """
     if client is pybullet:
         client_id = 0
@@ -139,20 +145,20 @@ def client_id_of(client: Any) -> int:
 
 
 def is_connected(client_id: int) -> bool:
-    """Whether a physics server answers under this number."""
+    """Tell whether a physics server answers under this id."""
     if isinstance(client_id, bool) or not 0 <= client_id < 2**31:
         return False
     return bool(pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"])
 
 
 def is_bullet_client(thing: Any) -> bool:
-    """Whether a thing is a connected BulletClient, or a wrapper like it, whose steps can be hooked."""
+    """Tell whether an object is a connected BulletClient, or a wrapper like it, whose steps can be hooked."""
     client_id = getattr(thing, "__dict__", {}).get("_client")
     return isinstance(client_id, int) and hasattr(thing, "stepSimulation") and is_connected(client_id)
 
 
 def bodies_called(client_id: int, name: str) -> tuple[int, ...]:
-    """Ids of all bodies of that name, their own or their base's. Raises SceneError listing the nearest names."""
+    """Return the ids of all bodies of that name, their own or their base's; SceneError lists the nearest names."""
     found, names = [], set()
     for body in body_ids(client_id):
         own = {text.decode(errors="replace") for text in pybullet.getBodyInfo(body, physicsClientId=client_id)}
@@ -165,8 +171,11 @@ def bodies_called(client_id: int, name: str) -> tuple[int, ...]:
 
 
 def open_world(client: Any) -> PyBulletWorld:
-    """Listen to a BulletClient, the pybullet module (its client 0) or a client id.
+    """Open a world of a BulletClient, the pybullet module (its client 0) or a client id.
 
-    Raises SceneError where nothing is connected there.
+    Raises
+    ------
+    SceneError
+        Nothing is connected there.
     """
     return PyBulletWorld(client, client_id_of(client))

@@ -1,13 +1,13 @@
 """Geometry of a link in its body frame (centre of mass, axes of getBasePositionAndOrientation).
 
     getCollisionShapeData[5, 6]
-        placement of a shape, body frame (measured: also through an inertial frame that is turned)
+        placement of a shape, body frame (measured: also with a rotated inertial frame)
     getMeshData                   vertices in the body frame, of a hull only; "?" and nothing for a triangle mesh
 
-Bullet collides with the convex hull of a mesh; the sound wants the surface itself. So for a mesh: the file named by the
-shape; or the visual mesh where it fills the same space (createMultiBody forgets the collision file's name); or the
-hull's vertices. URDF cylinders collide as hulls of 32-gons without a name: they are recognised and given back as
-cylinders.
+Bullet collides with the convex hull of a mesh; the sound needs the surface itself. So a mesh is taken from the file
+named by the shape; or from the visual mesh where it fills the same space (createMultiBody forgets the collision file's
+name); or from the hull's vertices. URDF cylinders collide as hulls of 32-gons without a name: they are recognised and
+returned as cylinders.
 """
 
 from __future__ import annotations
@@ -43,9 +43,12 @@ SAME_SPACE = 0.1
 
 
 def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
-    """All pieces of a link's collision geometry.
+    """Return all pieces of the collision geometry of a link that exists.
 
-    The link must exist. Raises MeshError where there are none or PyBullet keeps them to itself.
+    Raises
+    ------
+    MeshError
+        There are none, or PyBullet does not describe them.
     """
     if is_maximal(client_id, body):
         with reduced_body(client_id, body) as other:
@@ -79,7 +82,7 @@ def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
 
 
 def _takes_its_box(client_id: int, body: int, vertex_m: Array) -> bool:
-    """Whether vertices (v, 3) in the frame of a base take the box that it takes."""
+    """Tell whether vertices (v, 3) in the frame of a base have its bounding box."""
     position, turn = link_pose(client_id, body, -1)
     local = np.array([vertex_m.min(axis=0), vertex_m.max(axis=0)])
     half, middle = np.abs(turn) @ np.ptp(local, axis=0) / 2, turn @ local.mean(axis=0) + position
@@ -93,9 +96,12 @@ def _file(piece: Piece) -> Path | None:
 
 
 def primitive(piece: Piece, where: str) -> Shape:
-    """A sphere, box, capsule, cylinder or plane as getCollisionShapeData tells it.
+    """Convert a sphere, box, capsule, cylinder or plane from getCollisionShapeData.
 
-    Raises MeshError for another kind.
+    Raises
+    ------
+    MeshError
+        It is of another kind.
     """
     kind, size, _, position, quaternion = piece
     if kind == pybullet.GEOM_SPHERE:
@@ -115,7 +121,7 @@ def primitive(piece: Piece, where: str) -> Shape:
 
 
 def _up_to(normal: Array) -> Array:
-    """Quaternion that turns +z to a unit normal (3,)."""
+    """Compute the quaternion that rotates +z to a unit normal (3,)."""
     if normal[2] < -1 + 1e-12:
         return np.array([1.0, 0, 0, 0])
     q = np.array([-normal[1], normal[0], 0, 1 + normal[2]])
@@ -123,7 +129,7 @@ def _up_to(normal: Array) -> Array:
 
 
 def outward(vertex_m: Array, face: Array) -> Shape:
-    """A mesh in the body frame, turned inside out where it encloses a negative volume."""
+    """Return a mesh in the body frame, its faces inverted where it encloses a negative volume."""
     return Shape("mesh", vertex_m=vertex_m, face=face if volume_m3(vertex_m, face) >= 0 else face[:, ::-1])
 
 
@@ -141,9 +147,7 @@ def _from_file(client_id: int, body: int, link: int, index: int, piece: Piece) -
 
 
 def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Array]]) -> tuple[Shape, ...]:
-    """Meshes whose file PyBullet forgot: cylinders by their vertices, else the visual mesh of the same extent, else
-    hulls.
-    """
+    """Return meshes whose file PyBullet forgot: cylinders by vertices, else the visual mesh of the extent, or hulls."""
     if not hulls:
         return ()
     cylinders = [_as_cylinder(piece, vertices) for piece, vertices in hulls]
@@ -169,7 +173,7 @@ def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Arra
 
 
 def _same_space(one: Array, other: Array) -> bool:
-    """Whether two point sets have the same bounding box within a tenth of its diagonal."""
+    """Tell whether two point sets have the same bounding box within a tenth of its diagonal."""
     size = np.linalg.norm(np.ptp(other, axis=0))
     return bool(
         np.abs(one.min(0) - other.min(0)).max() < SAME_SPACE * size
@@ -178,7 +182,7 @@ def _same_space(one: Array, other: Array) -> bool:
 
 
 def _as_cylinder(piece: Piece, vertices: Array) -> Shape | None:
-    """The cylinder along z whose two rims the vertices are, or None."""
+    """Return the cylinder along z whose two rims the vertices are, or None."""
     if len(vertices) < 24 or len(vertices) % 2:
         return None
     local = (vertices - piece.position) @ turn_matrix(piece.quaternion)
@@ -190,7 +194,7 @@ def _as_cylinder(piece: Piece, vertices: Array) -> Shape | None:
 
 
 def visual_surface(client_id: int, body: int, link: int) -> MeshSurface | None:
-    """The link's visual mesh files together in the body frame, or None where there are none or they cannot be read."""
+    """Join the link's visual mesh files in the body frame; None where there are none or they cannot be read."""
     surfaces: list[MeshSurface] = []
     for piece in visual_pieces(client_id, body, link):
         path = _file(piece)

@@ -1,8 +1,7 @@
-"""Settings of a PyBullet world that spoil its sound, and how to mend them.
+"""Settings of a PyBullet world that spoil its sound, and their remedies.
 
-Nothing here is a guess about taste: each finding names what was measured to go wrong. What PyBullet does not tell is
-left out: damping and activation states cannot be read at all (sleep is recognised by bodies that bear load and stand
-exactly still).
+Each finding names an effect that was measured. Settings that PyBullet does not report are left out: damping and
+activation states cannot be read at all (sleep is recognised by bodies that bear load and are exactly still).
 """
 
 from __future__ import annotations
@@ -39,11 +38,21 @@ LID_SHARE = 0.15
 def diagnose_world(
     world: PyBulletWorld | Any, steps: int = 0, *, seen: Mapping[int, SetValues] | None = None
 ) -> tuple[Finding, ...]:
-    """What in a world would spoil its sound. world: a PyBulletWorld, or what `open_world` takes.
+    """Find what in a world would spoil its sound.
 
-    steps: physics steps to look ahead, undone afterwards (saveState); 0 takes the world as it stands. seen: what was
-    set, by the client's number; None: what the world's own hooks saw. Raises SceneError where the client is not
-    connected.
+    Parameters
+    ----------
+    world
+        A PyBulletWorld, or what `open_world` takes.
+    steps
+        Physics steps to look ahead, undone afterwards (saveState); 0: the present state alone.
+    seen
+        Values that were set, by client id; None: those the world's own hooks saw.
+
+    Raises
+    ------
+    SceneError
+        The client is not connected.
     """
     client_id = world.client_id if isinstance(world, PyBulletWorld) else client_id_of(world)
     known = (seen or {}).get(client_id) or (
@@ -98,7 +107,7 @@ def _settings(client_id: int) -> list[Finding]:
 
 
 def _empty(client_id: int) -> list[Finding]:
-    """A world in which nothing can touch."""
+    """Find a world in which nothing can touch."""
     links = all_links(client_id)
     if not links:
         what, remedy = "there is no body in this world", "load some before stepping, into the client that steps"
@@ -127,9 +136,7 @@ def _masses(client_id: int) -> list[Finding]:
 
 
 def _lids(client_id: int) -> list[Finding]:
-    """Moving meshes whose hull closes what is open: judged object by object, as Bullet makes a hull of each object of a
-    file.
-    """
+    """Find moving meshes whose hull closes an opening, by object, as Bullet makes a hull of each object of a file."""
     found = []
     for body, link in all_links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
@@ -169,7 +176,7 @@ def _hulled(client_id: int, body: int, link: int) -> list[MeshSurface]:
 
 
 def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
-    """Links that sound, whose size `_oversized` looks at."""
+    """Return the links that sound, whose size `_oversized` checks."""
     return (
         {(body.body_id, body.link) for body in world.bodies if body.model is not None}
         if isinstance(world, PyBulletWorld)
@@ -199,7 +206,7 @@ def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
 
 
 def _ahead(client_id: int, steps: int) -> list[Finding]:
-    """Bodies that bear load and stand exactly still, now or within the next steps."""
+    """Find bodies that bear load and are exactly still, now or within the next steps."""
     if not steps:
         return _sleepers(client_id)
     state = pybullet.saveState(physicsClientId=client_id)
@@ -241,7 +248,7 @@ def _sleepers(client_id: int) -> list[Finding]:
 
 
 def _oversized(world: PyBulletWorld) -> list[Finding]:
-    """Bodies that sound, and are larger than anything that is struck to: planes and terrains among them."""
+    """Find bodies that sound and are larger than anything that is struck, planes and terrains among them."""
     large = [
         (body, oversize(body.model.vertex_m, body.model.mass_kg))
         for body in world.bodies

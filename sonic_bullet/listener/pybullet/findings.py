@@ -1,4 +1,4 @@
-"""What is found of a world that would spoil its sound, and whose it is."""
+"""Findings about a world that would spoil its sound, and the links they concern."""
 
 from __future__ import annotations
 
@@ -13,9 +13,16 @@ Severity = Literal["error", "warning", "info"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """id: of the kind.
+    """A condition that would spoil the sound.
 
-    severity: "error" (no sound), "warning" (wrong sound), "info". what is so, and its remedy: one line each.
+    Parameters
+    ----------
+    id
+        Of the kind of finding.
+    severity
+        "error" (no sound), "warning" (wrong sound), "info".
+    what, remedy
+        One line each.
     """
 
     id: str
@@ -25,11 +32,11 @@ class Finding:
 
 
 def all_links(client_id: int) -> list[tuple[int, int]]:
-    """Body and link of everything in a world, bases too."""
+    """List body and link of every link in a world, bases too."""
     return [(body, link) for body, joints, _ in read_roster(client_id).bodies for link in range(-1, joints)]
 
 
 def name_links(client_id: int, links: list[tuple[int, int]]) -> str:
-    """The first of them in words, and how many more."""
+    """Name the first of these links, and count the others."""
     first = describe_link(client_id, *links[0])
     return first if len(links) == 1 else f"{first} and {len(links) - 1} more"

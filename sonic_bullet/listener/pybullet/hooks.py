@@ -1,14 +1,14 @@
-"""Catching steps and removals of a BulletClient without touching its class.
+"""Hooks on steps and removals of a BulletClient that leave its class alone.
 
-BulletClient forwards unknown attributes to the module, so a function set on the instance takes its place: every
-stepSimulation of this client is caught, those hidden in a gym environment's step too, and no other client notices.
+BulletClient forwards unknown attributes to the module, so a function set on the instance replaces it: every
+stepSimulation of this client is hooked, also inside a gym environment's step, and no other client is affected.
 `disconnect` must never be looked up on it: the look-up alone clears its client id.
 
-A client has one set of hooks however many listen (`Hooks`): the first to come puts it in place and the last to go takes
-it away, in whatever order they go. Nothing here holds the client: dropped, it disconnects at once and does not wait for
-the garbage collector.
+A client has one set of hooks for all its listeners (`Hooks`): the first listener installs it and the last removes it,
+in whatever order they leave. No reference to the client is held: once dropped, it disconnects at once and does not
+wait for the garbage collector.
 
-A client that is known by its number has no instance: there `module_steps` catches the steps made within a block.
+A client known by its id alone has no instance: there `module_steps` hooks the steps made within a block.
 """
 
 from __future__ import annotations
@@ -49,27 +49,36 @@ DYNAMICS_IN_ORDER = (
     "contactDamping",
     "frictionAnchor",
 )
-"""changeDynamics' arguments as far as anybody gives them by place."""
+"""Positional arguments of changeDynamics."""
 SETTERS = ("changeDynamics", "setPhysicsEngineParameter", "removeBody", "resetSimulation")
 BODY_KEYWORDS = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
 
 
 class Watcher(Protocol):
-    """What a hook tells: World."""
+    """The part of a world that hooks notify."""
 
     client_id: int
 
     @property
-    def client(self) -> Any: ...
-    def forget(self, body: int | None = None) -> None: ...
-    def mark_moved(self, body: int | None) -> None: ...
-    def mark_changed(self, body: int, link: int) -> None: ...
-    def mark_engine_changed(self) -> None: ...
+    def client(self) -> Any:
+        """The hooked client."""
+
+    def forget(self, body: int | None = None) -> None:
+        """Note that a body was removed; None: all."""
+
+    def mark_moved(self, body: int | None) -> None:
+        """Note that a body was moved by hand; None: all."""
+
+    def mark_changed(self, body: int, link: int) -> None:
+        """Note that values of a link were set."""
+
+    def mark_engine_changed(self) -> None:
+        """Note that settings of the engine were set."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listening:
-    """One of those who listen: called before and after each step, and told of what happens to bodies."""
+    """A listener: a world that is notified about bodies, and functions called before and after each step."""
 
     world: Watcher
     before: Callable[[], object]
@@ -77,16 +86,16 @@ class Listening:
 
 
 def body_argument(args: tuple[Any, ...], kwargs: dict[str, Any]) -> int:
-    """The body id among a PyBullet function's arguments."""
+    """Return the body id among a PyBullet function's arguments."""
     if args:
         return int(args[0])
     return int(next(kwargs[name] for name in BODY_KEYWORDS if name in kwargs))
 
 
 class Hooks:
-    """The functions put in place of a client's own, and all who listen to them.
+    """The functions that replace a client's own, and their listeners.
 
-    Once nobody does, they only pass calls on.
+    Without listeners, they only pass calls on.
     """
 
     def __init__(self, client: Any, client_id: int) -> None:
@@ -110,14 +119,12 @@ class Hooks:
 
     @classmethod
     def of(cls, client: Any, client_id: int) -> Hooks:
-        """Those in place on a client; new ones where there are none, or another's functions lie over one of them."""
+        """Return the hooks of a client; new ones where there are none, or where other functions replace one of them."""
         found = getattr(vars(client).get("stepSimulation"), "hooks", None)
         return found if isinstance(found, Hooks) and found._in_place(client) else cls(client, client_id)
 
     def leave(self, one: Listening) -> None:
-        """Tell one no more; with the last the client's own functions come back, except under those that someone else
-        put over ours.
-        """
+        """Remove a listener; with the last one, restore the client's own functions that were not replaced again."""
         if one in self.listening:
             self.listening.remove(one)
         client = self._client()
@@ -133,7 +140,7 @@ class Hooks:
         return all(vars(client).get(name) is function for name, function in self._ours.items())
 
     def _below(self, client: Any, name: str) -> Callable[..., Any]:
-        """What the client's function of that name was."""
+        """Return the client's function of that name before the hooks."""
         if name in vars(client):
             return vars(client)[name]  # type: ignore[no-any-return]
 
@@ -185,7 +192,7 @@ class Hooks:
         return setting
 
     def _setting_engine(self, below: Callable[..., Any], name: str | None = None) -> Callable[..., Any]:
-        """name: what its only argument is called elsewhere; None: all have their names."""
+        """Wrap a setter of the engine; name: of its only argument, None: arguments have their names."""
 
         def setting(*args: Any, **kwargs: Any) -> Any:
             result = below(*args, **kwargs)
@@ -199,22 +206,25 @@ class Hooks:
 
 
 def named_dynamics(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[int, int, dict[str, Any]]:
-    """Body, link and what is set of it, of changeDynamics' arguments."""
+    """Return body, link and values of changeDynamics' arguments."""
     values = {**dict(zip(DYNAMICS_IN_ORDER, args, strict=False)), **kwargs}
     return int(values.pop("bodyUniqueId")), int(values.pop("linkIndex")), without_client(values)
 
 
 def without_client(values: dict[str, Any]) -> dict[str, Any]:
-    """What was set, without whose it is."""
+    """Remove the client id from arguments."""
     return {name: x for name, x in values.items() if name != "physicsClientId"}
 
 
 def install(
     world: Watcher, before: Callable[[], object], after: Callable[[], object]
 ) -> tuple[SetValues, Callable[[], None]]:
-    """Hook the world's client: what is set of engine and bodies from then on, and a function that ends it.
+    """Install hooks on the world's client; return the values set from then on, and a function that removes the hooks.
 
-    Raises SceneError where the client is no instance of a wrapper.
+    Raises
+    ------
+    SceneError
+        The client is not an instance of a wrapper.
     """
     client = world.client
     if client is None or isinstance(client, (int, type(pybullet))):
@@ -231,8 +241,8 @@ def install(
 def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
     """Call ``after`` after every step of that client made by `pybullet.stepSimulation` within the block.
 
-    The module's function gives way to one that tells; a BulletClient passes its number on to built-in functions only,
-    so it is made to do so here too. Who imported the function itself by name goes unnoticed.
+    BulletClient passes its id on to built-in functions only, so its look-up is replaced too. A script that imported the
+    function itself by name is not observed.
     """
     real_step, forward = pybullet.stepSimulation, BulletClient.__getattr__
 
@@ -251,7 +261,7 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def seen_settings() -> Iterator[dict[int, SetValues]]:
-    """What is set of engines and links within the block, by the client's number, whoever sets it."""
+    """Record the values set on engines and links within the block, by client id."""
     seen: dict[int, SetValues] = {}
     forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in SETTERS}
 

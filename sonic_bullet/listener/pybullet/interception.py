@@ -1,10 +1,10 @@
-"""Calls into PyBullet that build and drive a world, seen as they are made and, where a plan says so, made otherwise.
+"""Intercept the calls into PyBullet that build and drive a world and, where a plan says so, substitute their arguments.
 
     scene: createMultiBody(0.004, 3) -> Call by value -> Plan -> calls of another scene first, then this one, changed
 
-The functions of the module give way while this lasts, so that it is all one whether a scene calls the module or a
-BulletClient, or this package calls for it. Questions (get…) and pictures are not looked at. Who imported a function by
-name before goes unnoticed; a run that leaves no trace of its inputs is seen by its effects alone.
+The functions of the module are replaced within the block, so that calls are intercepted whether a scene calls the
+module or a BulletClient, or this package calls for it. Queries (get…) and pictures are not intercepted. Functions that
+were imported by name before are not either; a run of which no inputs were recorded is compared by its effects alone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PREFIXES = ("create", "load", "change", "set", "reset", "apply", "remove", "enab
 NO_INPUTS = re.compile(
     "Visual|Texture|Debug|VR|AdditionalSearchPath|TimeOut|RealTime|Plugin|Flags|UserData|State$|SensorJoint|createSoft"
 )
-"""Functions that change a picture, a window, or what is asked; restoreState has no value to compare."""
+"""Functions that change a picture, a window, or what is queried; restoreState has no value to compare."""
 IN_ORDER: dict[str, tuple[str, ...]] = {
     "changeDynamics": DYNAMICS_IN_ORDER,
     "createCollisionShape": ("shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal"),
@@ -62,9 +62,9 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
     "removeConstraint": ("userConstraintUniqueId",),
     "changeConstraint": ("userConstraintUniqueId",),
 }  # fmt: skip
-"""Arguments that are given by place, by the names that PyBullet has for them."""
+"""Positional arguments, by PyBullet's names for them."""
 BESIDES = ("stepSimulation", "setAdditionalSearchPath")
-"""Functions that are looked at though they set nothing."""
+"""Functions that are intercepted though they set nothing."""
 BODY = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
 CONSTRAINT = "userConstraintUniqueId"
 SHAPES = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
@@ -72,7 +72,7 @@ PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "spec
 
 
 def watched() -> list[str]:
-    """The names of the functions that are looked at."""
+    """List the names of the functions that are intercepted."""
     return [
         name
         for name in dir(pybullet)
@@ -83,14 +83,24 @@ def watched() -> list[str]:
 
 
 class Interception:
-    """The calls of one run. side: whose bodies these are; plan: what to ask instead; look: called before each step."""
+    """The calls of one run.
+
+    Parameters
+    ----------
+    side
+        Run that the bodies belong to.
+    plan
+        Calls to substitute.
+    look
+        Called before each step.
+    """
 
     def __init__(self, side: str, plan: Plan | None = None, look: Callable[[], None] = lambda: None) -> None:
         self.side, self.plan, self.look = side, plan, look
         self.calls: list[Call] = []
         self.steps = 0
         self.client = 0
-        self.ids: dict[Who, int] = {}  # living or not, the latest bearer of an id is the last
+        self.ids: dict[Who, int] = {}  # living or not; the latest owner of an id is the last
         self._bearer: dict[tuple[str, int], Who] = {}
         self._shapes: dict[int, Mapping[str, Any]] = {}
         self._count = {"body": 0, "constraint": 0}
@@ -99,19 +109,19 @@ class Interception:
         self._real: dict[str, Any] = {}
 
     def who(self, body: int, kind: str = "body") -> Who:
-        """Who has that id now."""
+        """Return the body, or constraint, that has that id now."""
         return self._bearer.get((kind, body)) or Who("", body, kind)
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """The module's functions give way while this lasts."""
+        """Replace the module's functions within the block."""
         self._real = {name: getattr(pybullet, name) for name in (*watched(), *BESIDES)}
         ours: dict[str, Any] = {name: functools.partial(self._called, name) for name in watched()}
         ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search}
         forward = BulletClient.__getattr__
 
         def forwarded(client: Any, name: str) -> Any:
-            if name in ours and vars(pybullet)[name] is ours[name]:  # else someone put his own over it
+            if name in ours and vars(pybullet)[name] is ours[name]:  # else another function replaces it
                 return functools.partial(ours[name], physicsClientId=client._client)
             return forward(client, name)
 
@@ -151,7 +161,7 @@ class Interception:
         return self._made(call, self._ask(name, {**own, **self._to_ask(changed)}, client))
 
     def make(self, calls: list[Call]) -> None:
-        """Make calls of another scene, of the client that was asked last."""
+        """Make calls of another scene, in the client that was called last."""
         for call in calls:
             if call.name in self._real and call.name != "createCollisionShape":
                 result = self._ask(call.name, self._to_ask(call.arguments), self.client)
@@ -189,7 +199,7 @@ class Interception:
         return [("body", body) for body in _ids(result)] if makes else []
 
     def _whom(self, name: str, result: Any) -> list[Who]:
-        """New ones for what a call made."""
+        """Assign serial numbers to the bodies and constraints that a call made."""
         found = []
         for kind, _ in self._kinds(name, result):
             found.append(Who(self.side, self._count[kind], kind))
@@ -214,7 +224,7 @@ class Interception:
         return Call(name, self.steps, arguments, whom)
 
     def _to_ask(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments as PyBullet takes them."""
+        """Convert arguments by value to those that PyBullet takes."""
         return {key: self._handle(key, value) for key, value in arguments.items()}
 
     def _handle(self, key: str, value: Any) -> Any:
@@ -242,7 +252,7 @@ def _ids(result: Any) -> list[int]:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers, texts and tuples of them."""
+    """Convert to numbers, texts and tuples of them."""
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     return tuple(map(_plain, value)) if isinstance(value, (list, tuple)) else value

@@ -1,14 +1,14 @@
-"""Who in a world is left out of the sound, and why; each is named once, as a warning and as a note.
+"""Bodies and contacts that the sound leaves out; each is reported once, as a warning and as a note.
 
 muted
-    a body whose pose, speed, mass or inertia ceased to be a number: its record ends, its contacts are dropped, what
-    rings of it rings out.
-        It stays mute until it is removed or added anew, even where its numbers come back: what it is then, nobody has
-            said.
+    a body whose pose, speed, mass or inertia is no longer a number: its record ends, its contacts are dropped, its
+    modes decay. It stays muted until it is removed or added anew, even where its numbers come back, as its state is
+    not known then.
 soft
-    a soft body: PyBullet tells neither its mass nor its speed (what it answers is memory that nobody wrote), so it
-    neither sounds nor strikes.
-A contact whose force or place is not a number is dropped, and its pair named once.
+    a soft body: PyBullet reports neither its mass nor its speed (its answer is uninitialised memory), so it neither
+    sounds nor strikes.
+
+A contact whose force or place is not a number is dropped, and its pair reported once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sonic_bullet.records.simulated import with_body_id
 
 
 class BodiesLeftOut:
-    """State of that for one world. notes: what was said, in order."""
+    """The bodies left out of one world. notes: the messages, in order."""
 
     def __init__(self) -> None:
         self.muted: set[int] = set()
@@ -35,7 +35,7 @@ class BodiesLeftOut:
         self._pairs: set[tuple[int, int]] = set()
 
     def mute(self, bodies: Mapping[int, str], what: str) -> None:
-        """Leave bodies, with their names, out from now on. what: they have that is wrong."""
+        """Leave bodies, by id and name, out from now on. what: their fault."""
         self.muted.update(bodies)
         who = ", ".join(with_body_id(name, body) for body, name in bodies.items())
         subject, be, them = (f"{who} has", "it is", "it") if len(bodies) == 1 else (f"{who} have", "they are", "them")
@@ -54,20 +54,20 @@ class BodiesLeftOut:
         self.soft = set(soft)
 
     def meet_drawn(self, body: int, name: str) -> None:
-        """Note a body whose drawn shape stands in for what it collides as."""
+        """Note a body whose visual shape replaces its collision shape."""
         who = with_body_id(name, body)
         text = f"{who} sounds as what is drawn, which fills the same space: how it was made was not seen"
         if text not in self.notes:
             self._say(text)
 
     def forget(self, body: int | None) -> None:
-        """A body was removed (None: all); its id may be given anew."""
+        """Drop a removed body (None: all); its id may be reused."""
         for group in (self.muted, self.soft):
             group.intersection_update(() if body is None else group - {body})
         self._pairs = {pair for pair in self._pairs if body is not None and body not in pair}
 
     def name_pairs(self, touches: Touches) -> None:
-        """Say which pairs these contacts belong to, except those of bodies left out already."""
+        """Report the pairs of these contacts, except those of bodies left out already."""
         for a, b in zip(touches.code_a // LINK_SPAN, touches.code_b // LINK_SPAN, strict=True):
             pair = int(min(a, b)), int(max(a, b))
             if pair not in self._pairs and not (self.muted | self.soft).intersection(pair):
@@ -78,7 +78,7 @@ class BodiesLeftOut:
                 )
 
     def concerned(self, touches: Touches) -> Array:
-        """(k,) whether a contact is one of a body that is left out."""
+        """Mark the contacts (k,) of a body that is left out."""
         out = list(self.muted | self.soft)
         return np.isin(touches.code_a // LINK_SPAN, out) | np.isin(touches.code_b // LINK_SPAN, out)
 

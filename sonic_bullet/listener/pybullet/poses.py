@@ -1,4 +1,4 @@
-"""PyBullet's centre-of-mass frames, read; and Bullet's semi-implicit step, taken back where nothing was read before it.
+"""PyBullet's centre-of-mass frames, and Bullet's semi-implicit step undone where no pose was read before it.
 
 getBasePositionAndOrientation, getBaseVelocity            base (link -1)
 getLinkStates(computeLinkVelocity=1, computeForwardKinematics=1)[0, 1, 6, 7]   links
@@ -34,7 +34,7 @@ from sonic_bullet.records.errors import SceneError
 POSE, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
 MOTION_BYTES = MOTION.itemsize
 SOFT = 3
-"""What getDynamicsInfo tells of a soft body as its last entry but one (Bullet's BT_SOFT_BODY)."""
+"""Last entry but one of getDynamicsInfo for a soft body (Bullet's BT_SOFT_BODY)."""
 
 
 def check_connected(client_id: int) -> None:
@@ -47,7 +47,7 @@ def check_connected(client_id: int) -> None:
 
 
 def body_ids(client_id: int) -> list[int]:
-    """Ids of all bodies in the world, ascending."""
+    """Return the ids of all bodies in the world, ascending."""
     return sorted(
         pybullet.getBodyUniqueId(i, physicsClientId=client_id)
         for i in range(pybullet.getNumBodies(physicsClientId=client_id))
@@ -55,12 +55,12 @@ def body_ids(client_id: int) -> list[int]:
 
 
 def is_soft(client_id: int, body: int) -> bool:
-    """Whether an existing body is a soft one."""
+    """Tell whether an existing body is soft."""
     return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == SOFT)
 
 
 def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
-    """List bodies, their links and which of them cannot move; without those to be left out and the soft ones."""
+    """List bodies, links and which of them are static, without soft bodies and those of `leave_out`."""
     bodies: list[tuple[int, int, bool]] = []
     codes: list[int] = []
     static: list[bool] = []
@@ -83,14 +83,17 @@ def read_roster(client_id: int, leave_out: Collection[int] = ()) -> Roster:
 
 @cache
 def link_numbers(joints: int) -> list[int]:
-    """0 … joints-1."""
+    """Return 0 … joints-1."""
     return list(range(joints))
 
 
 def read_motion(client_id: int, roster: Roster) -> Motion:
-    """Poses and twists now, numbers or not (`Motion.broken`); of bases that cannot move the pose alone.
+    """Read poses and twists, numbers unchecked (`Motion.broken`); of static bases the pose alone.
 
-    Raises pybullet.error where a body of the roster is gone or has other links.
+    Raises
+    ------
+    pybullet.error
+        A body of the roster is gone or has other links.
     """
     if not len(roster.code):
         return Motion(roster, np.zeros(0, MOTION))
@@ -99,7 +102,7 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
     count = pybullet.getNumJoints
     with collector_waiting():
         for body, joints, fixed in roster.bodies:
-            # another body has taken over the id: asking for a link that is not there would end the process
+            # another body reuses the id: asking for a link that is not there would end the process
             if count(body, client_id) != joints:
                 raise pybullet.error(f"body {body} has other links than before")
             (x, y, z), (i, j, k, r) = pose(body, client_id)
@@ -124,7 +127,7 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
 
 
 def undone(now: Motion, which: Array, touches: Touches, dt_s: float, client_id: int) -> Motion:
-    """The motion one step earlier, right in the rows `which` (n,)."""
+    """Return the motion one step earlier, right in the rows `which` (n,)."""
     settings = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)
     gravity = np.array([settings[f"gravityAcceleration{axis}"] for axis in "XYZ"])
     single = {body for body, joints, _ in now.roster.bodies if joints == 0}

@@ -1,14 +1,14 @@
-"""A PyBullet world as the sound sees it: bodies by value, and one `Step` for each physics step.
+"""A PyBullet world as the sound needs it: bodies by value, and one `Step` for each physics step.
 
     before_step():  poses and twists                (with a hook; else those left by the previous step)
     stepSimulation
     after_step():   contacts, asked for once -> rows in body frames -> Step
 
-Contact positions belong to the pose at the start of the step, so that is the pose all rows use. No row is made of:
-pairs without force; islands asleep (speeds exactly 0, contacts bit-identical to the step before); a second poll without
-a step between (everything bit-identical); a body moved by hand since the last step; and the first step of a body that
-began its life inside another, for then the position correction leaks into the impulse; and whoever `left_out` names:
-one body whose numbers break takes nothing from the sound of the others.
+Contact positions belong to the pose at the start of the step, so all rows use that pose. No row is made of: pairs
+without force; islands asleep (speeds exactly 0, contacts bit-identical to the step before); a second poll without a
+step between (everything bit-identical); a body moved by hand since the last step; the first step of a body created
+inside another, where the position correction leaks into the impulse; and bodies that `left_out` names. One body whose
+numbers break leaves the sound of the others as it is.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from sonic_bullet.records.modal_options import ModalOptions
 
 
 class PyBulletWorld(facts.AskedLinks):
-    """State of listening to one client: who lives, what was last seen, what is remembered of contacts.
+    """A `World` that reads one client: its living bodies, their last poses, and the contacts of the last steps.
 
     Made by open_world.
     """
@@ -57,7 +57,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._begin()
 
     def _begin(self) -> None:
-        """Know nobody, and what there is to see before the first step."""
+        """Clear all state and read what the world holds before the first step."""
         self.epoch = self.step_count = 0
         self.stepped = False
         self._known = KnownBodies()
@@ -77,17 +77,17 @@ class PyBulletWorld(facts.AskedLinks):
 
     @property
     def client(self) -> Any:
-        """What is listened to; None once it was dropped."""
+        """The client that is read; None once it was dropped."""
         return self._client()
 
     @property
     def left_out(self) -> BodiesLeftOut:
-        """Who of the world is left out, and what was said of it."""
+        """The bodies left out, and the messages about them."""
         return self._census.left_out
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, as Contacts.a and Contacts.b count them; the living alone where not `logged`."""
+        """All bodies ever met, as Contacts.a and Contacts.b count them; only the living where not `logged`."""
         return tuple(self._known.records.values())
 
     @property
@@ -102,32 +102,32 @@ class PyBulletWorld(facts.AskedLinks):
 
     @property
     def untouched(self) -> frozenset[int]:
-        """Ids of the bodies that were in the world at the last step and have met nobody yet."""
+        """Ids of the bodies that were in the world at the last step and have had no contact yet."""
         return frozenset(body for body, _, _ in self._past.roster.bodies) - {body.body_id for body in self.living}
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What of the world is left out of the sound, and why."""
+        """Messages that say what of the world the sound leaves out, and why."""
         return tuple(self.left_out.notes)
 
     def listen(self, after: Callable[[], object]) -> bool:
-        """Hook the client's steps, unless it is the pybullet module or a client id: those have no instance to hook."""
+        """Install hooks on the client's steps; False for the pybullet module or a client id, which have no instance."""
         if isinstance(self.client, numbers.Integral) or inspect.ismodule(self.client):
             return False
         self.hook(self.before_step, after)
         return True
 
     def make_ready(self) -> None:
-        """Have the machine code that the first step would else wait for."""
+        """Compile, or load, the machine code for which the first step would else wait."""
         make_ready()
 
     @property
     def has_bodies(self) -> bool:
-        """Whether anybody was in the world at the last step."""
+        """Whether any body was in the world at the last step."""
         return bool(self._past.roster.bodies)
 
     def index_of(self, body: int, link: int = -1) -> int:
-        """Index into `bodies` of the living record of a link, or -1."""
+        """Return the index into `bodies` of the living record of a link, or -1."""
         return self._known.live.get(int(encode(body, link)), -1)
 
     def add(
@@ -142,11 +142,11 @@ class PyBulletWorld(facts.AskedLinks):
         options: ModalOptions | None = None,
         mounting: str | float | None = None,
     ) -> Body:
-        """Make a link known, with what it is made of; its record, which `bodies` holds from now on.
+        """Register a link with its material or model; return its record, which `bodies` holds from now on.
 
         A record that exists already (a silent partner, or an earlier add) ends with this step and a new one begins. A
-        body that was muted is listened to again. Arguments: see `facts.added_body`. Raises SceneError for an unknown
-        body or link, a soft body, a mass, pose or speed that is not one, or a body that came while a step was made.
+        muted body is active again. Arguments: see `facts.added_body`. Raises SceneError for an unknown body or link, a
+        soft body, a mass, pose or speed that cannot be, or a body that was created while a step was made.
         """
         check_connected(self.client_id)
         facts.check_exists(self.client_id, body, link)
@@ -167,10 +167,10 @@ class PyBulletWorld(facts.AskedLinks):
         return record
 
     def reset(self) -> None:
-        """Begin anew with what was added, where it is still there: see `World.reset`.
+        """Restart with the links added, where they are still there: see `World.reset`.
 
-        A body of the same id, name and shape is the same: not every removal is told. What was set stays known. Raises
-        SceneError, having changed nothing: lost connection, called while a step is made, an absurd mass.
+        A body of the same id, name and shape is the same, as not every removal is observed. Values set stay known.
+        Raises SceneError, having changed nothing: lost connection, called while a step is made, an absurd mass.
         """
         check_connected(self.client_id)
         if self._before is not None:
@@ -186,9 +186,7 @@ class PyBulletWorld(facts.AskedLinks):
             self._append(code, records[code])
 
     def forget(self, body: int | None = None) -> None:
-        """Say that a body was removed (None: all, by resetSimulation); its id may be given anew. With a hook, nobody
-        need call this.
-        """
+        """Note that a body was removed (None: all, by resetSimulation); its id may be reused. Hooks call this."""
         self.epoch += 1
         self.left_out.forget(body)
         self._lose([code for code in self.properties.names.codes if body in (None, code // LINK_SPAN)])
@@ -206,7 +204,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._moved.update([body] if body is not None else [entry[0] for entry in self._past.roster.bodies])
 
     def mark_changed(self, body: int, link: int) -> None:
-        """Note that friction, mass and the like of a link may have changed: who is static is read again."""
+        """Note that friction, mass and the like of a link may have changed: its static flag is read again."""
         self._census.stale()
         index = self.index_of(body, link)
         if index >= 0 and self.logged:
@@ -218,14 +216,16 @@ class PyBulletWorld(facts.AskedLinks):
             self.properties.engine_changed(self.step_count)
 
     def hook(self, before: Callable[[], object], after: Callable[[], object]) -> None:
-        """Call `before` and `after` round every stepSimulation of a BulletClient; `before` is, or calls, `before_step`.
-        Raises SceneError for the pybullet module or a client id: they have no instance to hook.
+        """Call `before` and `after` around every stepSimulation of a BulletClient.
+
+        `before` is, or calls, `before_step`. Raises SceneError for the pybullet module or a client id, which have no
+        instance.
         """
         self.unhook()
         self.properties.set_values, self._uninstall = hooks.install(self, before, after)
 
     def unhook(self) -> None:
-        """Leave the client as it was and end the sub-step log; harmless when not hooked."""
+        """Restore the client's own functions and end the sub-step log; harmless when not hooked."""
         if self._uninstall is not None:
             self._uninstall()
             self._uninstall = None
@@ -233,19 +233,18 @@ class PyBulletWorld(facts.AskedLinks):
         (self._log.abandon if self.client is None else self._log.close)()  # its id may be another's by now
 
     def before_step(self) -> None:
-        """Read poses and twists at the start of the step. Raises SceneError (lost connection)."""
+        """Read poses and twists at the start of the step; SceneError where the connection is lost."""
         self._settings = settings(self.client_id)
         if self._settings.substeps > 1 and not self._log.is_open:
             self._log.open()
         self._before = self._census.read()
 
     def after_step(self) -> Step:
-        """This step's record. Call once after each stepSimulation; a second call without a step between finds no
-        contacts.
+        """Return this step's record; call it once after each stepSimulation. A second call finds no contacts.
 
-        `stepped` tells whether there was a step. Without a hook, a missing one is known by a world in motion that
-        stands where it stood, to the bit; where nothing moves at all, a second call passes for a step. Raises
-        SceneError: lost connection, sub-steps that cannot be heard.
+        `stepped` tells whether there was a step. Without a hook, a missing one is recognised by a world in motion that
+        is where it was, to the bit; where nothing moves at all, a second call counts as a step. Raises SceneError: lost
+        connection, sub-steps that cannot be read.
         """
         before, self._before = self._before, None
         hooked = before is not None
@@ -264,7 +263,7 @@ class PyBulletWorld(facts.AskedLinks):
         return step
 
     def _poll(self, hooked: bool) -> Touches | None:
-        """Ask for this step's contacts, once: they go to the memory; those of sub-steps are returned."""
+        """Poll this step's contacts, once: store them in the memory, or return those of sub-steps."""
         last, raw = contact_points(self.client_id)
         if self._settings.substeps > 1:
             return self._log.touches(last, self._settings.dt_s, self._settings.substeps)
@@ -274,7 +273,7 @@ class PyBulletWorld(facts.AskedLinks):
         return None
 
     def _usual(self, now: Motion, hooked: bool) -> Step | None:
-        """The step where nobody came, went or is left out, and nothing else is unusual."""
+        """Return the step where no body came, went or is left out and no case is unusual; else None."""
         left_out = self.left_out
         if now.roster is not self._past.roster or not self.step_count or left_out.muted or left_out.soft:
             return None
@@ -283,7 +282,7 @@ class PyBulletWorld(facts.AskedLinks):
         return self._memory.usual(self._known, self._past, now, by_hand, dt, gravity, hooked)
 
     def _unusual(self, now: Motion, hooked: bool, touches: Touches | None) -> Step:
-        """Any step; touches: of sub-steps, else those of the memory."""
+        """Return any step; touches: of sub-steps, else those of the memory."""
         memory, known, (dt, _, gravity) = self._memory, self._known, self._settings
         first, past_touches = self.step_count == 0, memory.touches
         if first:
@@ -314,18 +313,18 @@ class PyBulletWorld(facts.AskedLinks):
         return memory.unusual(known, start, row, made, dt, gravity)
 
     def _bury(self, roster: Roster) -> None:
-        """Close the records of bodies that have gone without a hook seeing it."""
+        """Close the records of bodies that were removed without a hook observing it."""
         gone = self._known.gone(roster)
         if gone:
             self.epoch += 1
             self._lose(gone)
 
     def _end(self, bodies: Collection[int]) -> None:
-        """Close the records of bodies that are left out from now on; after a reset they are listened to again."""
+        """Close the records of bodies that are left out from now on."""
         self._close([code for code in self._known.live if code // LINK_SPAN in bodies])
 
     def _expose_impostors(self, now: Motion, dt: float) -> None:
-        """Where nobody saw removals: what jumped and has another name, mass or inertia has taken over an old id."""
+        """Close records, without hooks, of links that jumped and changed name, mass or inertia: their id was reused."""
         for code in now.roster.code[jumped(self._past, now, dt)].tolist():
             before = self._known.records.get(self._known.live.get(code, -1))
             seen = None if before is None else self._census.described(code, self.epoch)
@@ -339,7 +338,7 @@ class PyBulletWorld(facts.AskedLinks):
         self._known.close(codes, self.step_count, keep=self.logged)
 
     def _lose(self, codes: Collection[int]) -> None:
-        """Links are no more: their records end, and their names too."""
+        """End the records and free the names of links that are gone."""
         self._close(codes)
         self._added.forget(codes)
         self.properties.names.forget(codes)

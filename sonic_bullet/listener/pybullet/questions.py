@@ -1,4 +1,4 @@
-"""What is asked of PyBullet once a step, and what it costs: a step of one box takes it 6 µs, these 2 µs and more."""
+"""Queries to PyBullet that every step makes: 2 µs and more, beside 6 µs for a step of one box."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sonic_bullet.records.simulated import Values, finite
 
 
 class Settings(NamedTuple):
-    """The engine's: length of a step, how many sub-steps it has (1: none), gravity in the world."""
+    """Settings of the engine: length of a step, its sub-steps (1: none), gravity in the world."""
 
     dt_s: float
     substeps: int
@@ -23,7 +23,7 @@ class Settings(NamedTuple):
 
 
 def ask(client_id: int, question: Callable[..., Any]) -> Any:
-    """What PyBullet answers. Raises SceneError where nobody does."""
+    """Return PyBullet's answer; SceneError where the client does not answer."""
     try:
         return question(physicsClientId=client_id)
     except pybullet.error as error:
@@ -33,20 +33,20 @@ def ask(client_id: int, question: Callable[..., Any]) -> Any:
 
 
 def settings(client_id: int) -> Settings:
-    """The engine's settings now. Raises SceneError."""
+    """Read the engine's settings; raises SceneError."""
     found = ask(client_id, pybullet.getPhysicsEngineParameters)
     gravity = found["gravityAccelerationX"], found["gravityAccelerationY"], found["gravityAccelerationZ"]
     return Settings(found["fixedTimeStep"], max(1, found["numSubSteps"]), gravity)
 
 
 def engine(client_id: int) -> Values:
-    """All numbers that the engine says of itself, without gravity, which each step tells. Raises SceneError."""
+    """Read all numbers that the engine reports, without gravity, which each step holds; raises SceneError."""
     found = ask(client_id, pybullet.getPhysicsEngineParameters)
     return finite({name: x for name, x in found.items() if not name.startswith("gravity")})
 
 
 def contact_points(client_id: int) -> tuple[list[RawContact], Array]:
-    """All contacts now, and those of them that carry a force, (k,) of RAW. Raises SceneError."""
+    """Read all contacts, and those of them that carry a force, (k,) of RAW; raises SceneError."""
     with collector_waiting():
         contacts = ask(client_id, pybullet.getContactPoints)
         return contacts, packed(contacts, len(contacts))

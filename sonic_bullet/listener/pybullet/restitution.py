@@ -1,7 +1,7 @@
-"""Bounces that a world loses, and those that it never ends.
+"""Bounces that a world loses, and bounces that never end.
 
-Bullet tells neither contactProcessingThreshold nor restitutionVelocityThreshold: `keep_restitution` leaves a mark (user
-data) beside the first, and what a scene sets is seen as it does (`hooks.seen_settings`).
+Bullet reports neither contactProcessingThreshold nor restitutionVelocityThreshold: `keep_restitution` leaves a mark
+(user data) beside the first, and `hooks.seen_settings` observes what a scene sets.
 """
 
 from __future__ import annotations
@@ -21,10 +21,20 @@ KEPT = "sonic_bullet.contactProcessingThreshold"
 
 
 def keep_restitution(client: Any) -> int:
-    """Let small steps bounce: contactProcessingThreshold = 0 on every link of every body loaded so far; how many links.
+    """Set contactProcessingThreshold = 0 on every link of every body loaded so far, so that small steps bounce.
 
     With the default, restitution 0.5 gives rebounds of 0.36–0.57 at 1/240 s and 0.000 at 1/4000 s; with 0, 0.51–0.59 at
-    both (bullet3 issues 3094, 1530, 4341). Call it after loading. Raises SceneError for a client that is not connected.
+    both (bullet3 issues 3094, 1530, 4341). Call it after loading.
+
+    Returns
+    -------
+    int
+        Number of links.
+
+    Raises
+    ------
+    SceneError
+        The client is not connected.
     """
     client_id = client_id_of(client)
     links = all_links(client_id)
@@ -35,7 +45,7 @@ def keep_restitution(client: Any) -> int:
 
 
 def lost_restitution(client_id: int, known: SetValues) -> list[Finding]:
-    """Bounces that are asked for, and that Bullet's default contact threshold takes."""
+    """Find bounces that are asked for and that Bullet's default contact threshold suppresses."""
     links = all_links(client_id)
     bouncy = {entry: pybullet.getDynamicsInfo(*entry, physicsClientId=client_id)[5] for entry in links}
     movable = [
@@ -66,8 +76,9 @@ def lost_restitution(client_id: int, known: SetValues) -> list[Finding]:
 
 
 def endless_bounces(client_id: int, known: SetValues) -> list[Finding]:
-    """What bounces for ever: with restitution e, steps of dt bring nothing below g·dt·e/(1-e) to rest, unless bounces
-    slower than the threshold are none.
+    """Find bodies that never come to rest, as the restitution threshold is too low.
+
+    With restitution e, steps of dt bring nothing below g·dt·e/(1-e) to rest.
     """
     threshold = known.engine.get(THRESHOLD)
     if threshold is None:

@@ -1,8 +1,9 @@
-"""Run an ordinary PyBullet script as it stands, with ears and without a window.
+"""Run an ordinary PyBullet script unchanged, hooked and without a window.
 
-While it runs, pybullet.connect turns every window into DIRECT, stepSimulation tells the hooks and counts physics time,
-disconnect waits, and time.sleep returns at once (with real-time simulation on, it steps for as long as it would have
-slept). The script ends where it ends, or at the step that completes ``seconds``. Everything is put back afterwards.
+While it runs, pybullet.connect opens DIRECT in place of a window, stepSimulation calls the hooks and counts physics
+time, disconnect waits, and time.sleep returns at once (with real-time simulation on, it steps for as long as it would
+have slept). The script ends at its end, or at the step that completes ``seconds``. All functions are restored
+afterwards.
 """
 
 from __future__ import annotations
@@ -34,13 +35,14 @@ MOST_CLIENTS = 1024
 
 
 class _TimeIsUp(BaseException):
-    """Unwinds the user's script; no `except Exception` of theirs catches it."""
+    """Ends the user's script; no `except Exception` of the script catches it."""
 
 
 @contextmanager
 def own_clients() -> Iterator[None]:
-    """Clients that are opened while this lasts end with it: a script's that stays open would be client 0 to the next
-    script's calls, which name none.
+    """Disconnect at the end of the block the clients that were opened in it.
+
+    A client that stays open would be client 0 of the next script's calls without a client id.
     """
     before, objects, init = _open_clients(), weakref.WeakSet[BulletClient](), BulletClient.__init__
 
@@ -71,13 +73,29 @@ def run_script(
     names: dict[str, Any] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
-    """Run a script for at most ``seconds`` of physics time; its top-level names.
+    """Run a script for at most ``seconds`` of physics time.
 
-    hooks: (before, after) each step, or after alone, called with the client id of the first client that steps. Clients
-    that the script opened stay connected, so that what it built can be looked at. names: a dictionary that its
-    top-level names go into, there also when it breaks. progress: given the share of ``seconds`` that is done. Raises
-    SceneError that names the line where the script breaks, what the hooks raise, and SceneError where the file cannot
-    be read or a client is stepped that the script did not open.
+    Clients that the script opened stay connected, so that its world can be inspected.
+
+    Parameters
+    ----------
+    hooks
+        (before, after) each step, or after alone, called with the client id of the first client that steps.
+    names
+        A dictionary to receive the script's top-level names, also where it fails.
+    progress
+        Called with the fraction of ``seconds`` that is done.
+
+    Returns
+    -------
+    dict
+        The script's top-level names.
+
+    Raises
+    ------
+    SceneError
+        The script fails (it names the line), its file cannot be read, or it steps a client that it did not open. What
+        the hooks raise passes through.
     """
     path = Path(path)
     refuse_lfs_pointer(path, SceneError)
@@ -104,7 +122,7 @@ def run_script(
         except (SonicBulletError, KeyboardInterrupt):
             raise
         except BaseException as error:
-            if stop_word():  # what an interrupt became on its way out
+            if stop_word():  # an interrupt that became another exception
                 raise KeyboardInterrupt(stop_word()) from error
             if isinstance(error, SystemExit) and not error.code and observed:
                 return names
@@ -120,7 +138,7 @@ def run_script(
 def _stage(
     before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None
 ) -> Iterator[list[int]]:
-    """Gives a list that the client is in once it steps."""
+    """Replace PyBullet's functions; yield a list that gets the client's id once it steps."""
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
     opened: set[int] = set()
     observed: list[int] = []
@@ -196,7 +214,7 @@ def _stage(
     forward = BulletClient.__getattr__
 
     def forward_stand_ins(self: Any, name: str) -> Any:
-        """BulletClient passes its client id to built-in functions only, and ours are none."""
+        """Pass the client id on: BulletClient does so only for built-in functions."""
         if name in stand_ins and name != "connect":
             return functools.partial(stand_ins[name], physicsClientId=self._client)
         return forward(self, name)

@@ -1,14 +1,14 @@
 """Contacts of every sub-step, from Bullet's contact log.
 
-With numSubSteps > 1 getContactPoints() tells only the last sub-step (a third of the impulse at 4). The file that
+With numSubSteps > 1 getContactPoints() reports only the last sub-step (a third of the impulse at 4). The file that
 startStateLogging(STATE_LOGGING_CONTACT_POINTS) writes gets one record for each contact and sub-step, and is flushed
 before stepSimulation returns, so it can be read step by step. Measured format: two text lines (names, type letters
 "IfIiiiifffffffffff"), then per record the mark 0xAA 0xBB and 18 little-endian 4-byte numbers. No friction, float32.
 
     J = h N n,  h = dt / numSubSteps        + friction in the ratio f/N that the pair had in the last sub-step
 
-The ratio is exact for what slides (Coulomb) and a guess for what sticks; where no friction acts nothing is added.
-resetSimulation ends the log without a word: records that stop while contacts are reported raise SceneError.
+The ratio is exact for a sliding contact (Coulomb) and an estimate for a sticking one; without friction nothing is
+added. resetSimulation ends the log without notice: records that stop while contacts are reported raise SceneError.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ REWIND_BYTES = 1 << 26
 
 @dataclass(slots=True)
 class SubstepLog:
-    """An open contact log of one client: where it is read up to, and the sub-step count it stands at."""
+    """An open contact log of one client: how far it was read, and the number of the next sub-step."""
 
     client_id: int
     path: str = ""
@@ -74,10 +74,11 @@ class SubstepLog:
 
     @property
     def is_open(self) -> bool:
+        """Whether a log is being written."""
         return self.handle >= 0
 
     def open(self) -> None:
-        """Start logging into a temporary file. Raises SceneError where no log appears."""
+        """Start logging into a temporary file; SceneError where no log appears."""
         self.close()
         self.folder = tempfile.TemporaryDirectory(prefix="sonic-bullet-")
         note_leftover(self.folder.name)
@@ -98,14 +99,14 @@ class SubstepLog:
         self.abandon()
 
     def abandon(self) -> None:
-        """Forget a log that Bullet has ended itself."""
+        """Drop a log that Bullet has ended itself."""
         self.handle = -1
         if self.folder is not None:
             self.folder.cleanup()
             self.folder = None
 
     def records(self) -> Array:
-        """Records (k,) of RECORD written since the last call. Raises SceneError where the file is not as measured."""
+        """Read the records (k,) of RECORD written since the last call; SceneError where the file is not as measured."""
         with open(self.path, "rb") as file:
             if self.offset == 0:
                 header = file.readline() + file.readline()
@@ -127,9 +128,12 @@ class SubstepLog:
         return rows
 
     def touches(self, last: list[RawContact], dt_s: float, substeps: int) -> Touches:
-        """Loaded contacts of all sub-steps of the step just made; last: what getContactPoints() tells of it.
+        """Return the loaded contacts of all sub-steps of the step just made; last: getContactPoints() of it.
 
-        Raises SceneError where the log was not open, or is not as measured.
+        Raises
+        ------
+        SceneError
+            The log was not open, or is not as measured.
         """
         if not self.is_open:
             self.open()
@@ -144,11 +148,20 @@ class SubstepLog:
 def gather_substeps(
     records: Array, last: list[RawContact], dt_s: float, substeps: int, first: int
 ) -> tuple[Touches, int]:
-    """Loaded contacts (k,) of all sub-steps of one step, and the number of the next sub-step.
+    """Return the loaded contacts (k,) of all sub-steps of one step, and the number of the next sub-step.
 
-    last: what getContactPoints() tells after the step. first: number of the step's first sub-step, corrected where
-    `last` shows the log's newest records to be the step's last sub-step. Raises SceneError where the log lacks the
-    sub-step that `last` reports.
+    Parameters
+    ----------
+    last
+        What getContactPoints() reports after the step.
+    first
+        Number of the step's first sub-step, corrected where `last` shows the log's newest records to be the step's last
+        sub-step.
+
+    Raises
+    ------
+    SceneError
+        The log lacks the sub-step that `last` reports.
     """
     number = records["step"].astype(np.int64)
     if last:
@@ -174,9 +187,7 @@ def gather_substeps(
 
 
 def friction_ratio(code_a: Array, code_b: Array, last: list[RawContact]) -> Array:
-    """Friction over normal force (k, 3), world frame, of each row's pair in the last sub-step; 0 where it says
-    nothing.
-    """
+    """Return friction over normal force (k, 3), world frame, of each row's pair in the last sub-step, or 0."""
     ratio = np.zeros((len(code_a), 3))
     friction = [raw for raw in last if raw[FORCE] > 0 and (raw[FRICTION_1] or raw[FRICTION_2])]
     if not friction:

@@ -1,6 +1,4 @@
-"""The mesh file behind a collision shape, in its own frame and unit, cut into objects as Bullet cuts it; hulls, and
-how far they close what is open.
-"""
+"""Mesh files of collision shapes in their own frame and unit, split into objects as Bullet does; convex hulls."""
 
 from __future__ import annotations
 
@@ -20,8 +18,12 @@ LID_GRID = 5
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file: (vertices (v, 3), faces (f, 3)) each, identical vertices made one. Raises FileError,
-    MeshError.
+    """Read the objects of a mesh file, (vertices (v, 3), faces (f, 3)) each, identical vertices merged.
+
+    Raises
+    ------
+    FileError, MeshError
+        The file cannot be read or holds no triangle.
     """
     whole = [welded(vertex, face) for vertex, face in meshes.read_surfaces(path) if len(face)]
     whole = [(vertex, face) for vertex, face in whole if len(face) and np.isfinite(vertex).all()]
@@ -31,7 +33,7 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
 
 
 def joined(surfaces: list[MeshSurface]) -> MeshSurface:
-    """All surfaces as one: (v, 3), (f, 3)."""
+    """Join all surfaces: (v, 3), (f, 3)."""
     offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])
     return np.concatenate([v for v, _ in surfaces]), np.concatenate(
         [f + o for (_, f), o in zip(surfaces, offset, strict=False)]
@@ -39,7 +41,13 @@ def joined(surfaces: list[MeshSurface]) -> MeshSurface:
 
 
 def hull(vertex_m: Array) -> MeshSurface:
-    """Convex hull of points (v, 3), faces outward. Raises MeshError where they lie in a plane."""
+    """Compute the convex hull of points (v, 3), faces outward.
+
+    Raises
+    ------
+    MeshError
+        The points lie in a plane.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -55,10 +63,9 @@ def hull(vertex_m: Array) -> MeshSurface:
 
 
 def lid_height_m(vertex_m: Array, face: Array) -> float:
-    """How far the convex hull's surface stands at most from the true one: the depth below the lid over a bowl, 0 for a
-    convex body.
+    """Return the largest distance of the convex hull from the surface: the depth of a bowl, 0 for a convex body.
 
-    Looked at on a grid of LID_GRID points a side on each of the hull's triangles.
+    Sampled on a grid of LID_GRID points a side on each triangle of the hull.
     """
     try:
         shell_m, shell = hull(vertex_m)

@@ -1,1 +1,1 @@
-"""What links collide as: asked of PyBullet, or found otherwise where asking would end the process."""
+"""Collision shapes of links: queried from PyBullet, or found otherwise where a query would end the process."""

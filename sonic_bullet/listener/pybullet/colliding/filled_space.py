@@ -1,6 +1,6 @@
-"""Whether pieces are what a link collides as, as far as the box that it takes in the world tells.
+"""Check by bounding boxes whether pieces are the collision shape of a link.
 
-box of a shape in a turned frame: |R| h round R c + x           (Bullet's rule for all but spheres: h, whatever R is)
+box of a shape in a rotated frame: |R| h around R c + x           (Bullet's rule for all but spheres: h for any R)
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def link_pose(client_id: int, body: int, link: int) -> tuple[Array, Array]:
-    """Position (3,) and rotation (3, 3) of a link's body frame."""
+    """Return position (3,) and rotation (3, 3) of a link's body frame."""
     if link < 0:
         position, quaternion = pybullet.getBasePositionAndOrientation(body, physicsClientId=client_id)
     else:
@@ -36,7 +36,7 @@ def _turn(quaternion: object) -> Array:
 
 
 def half_size(piece: Piece) -> tuple[Array, Array] | None:
-    """Half the sides (3,) and the centre (3,) of a piece's box in its own frame; None of what has none."""
+    """Return half the sides (3,) and the centre (3,) of a piece's box in its own frame; None where it has none."""
     size = piece.size
     if piece.kind == pybullet.GEOM_SPHERE:
         return np.full(3, size[0]), np.zeros(3)
@@ -63,10 +63,14 @@ def fills(
     grown_m: Sequence[float] | None = None,
     fine: float = 1.0,
 ) -> bool:
-    """Whether pieces together take the box that the link takes.
+    """Tell whether pieces together have the bounding box of the link.
 
-    grown_m: of capsules that are two spheres, by what their box is larger on each side, 0 of all others. fine: part of
-    the usual tolerance.
+    Parameters
+    ----------
+    grown_m
+        By how much the box of a capsule made of two spheres is larger on each side; 0 for all other pieces.
+    fine
+        Fraction of the usual tolerance.
     """
     boxes = [half_size(piece) for piece in pieces]
     known = [box for box in boxes if box is not None]

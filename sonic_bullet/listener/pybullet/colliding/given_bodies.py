@@ -1,10 +1,11 @@
-"""What bodies were made of, as the calls that made them said: PyBullet forgets it of bodies in maximal coordinates, of
-triangle meshes that were given by their vertices, and of where it looks for files.
+"""Arguments of the calls that made bodies, which PyBullet does not always keep.
+
+It forgets the shape of bodies in maximal coordinates, triangle meshes given by their vertices, and its search paths.
 
     createCollisionShape -> its arguments -> createMultiBody, loadURDF -> GivenBody -> made anew in reduced ones
 
-It is made anew by the same call in a world of its own, where PyBullet can be asked. Whoever uses what is remembered
-holds it against the box that the body takes: an id may have been given anew unseen.
+The body is made anew by the same call in a world of its own, where PyBullet can be queried. Users of a stored call
+compare the bounding boxes first: an id may have been reused unobserved.
 """
 
 from __future__ import annotations
@@ -38,23 +39,23 @@ MAKERS = {
     "loadBullet": ("bulletFileName",),
     "setAdditionalSearchPath": ("path",),
 }
-"""Calls that say what a body is made of, and their arguments as far as they are given by place."""
+"""Calls that determine a body's shape, and their positional arguments."""
 ENDERS = {"removeBody": ("bodyUniqueId",), "resetSimulation": ("flags",)}
-"""Calls after which ids may be given anew."""
+"""Calls after which ids may be reused."""
 OF_SHAPE = {
     "createMultiBody": ("baseInertialFramePosition", "baseInertialFrameOrientation"),
     "loadURDF": ("fileName", "useFixedBase", "flags", "globalScaling"),
 }
-"""What of a call decides the shape of a body in its own frame."""
+"""Arguments that determine the shape of a body in its own frame."""
 SAME_M, SAME_SHARE = 2e-3, 0.01
 """How far boxes of one shape may differ: Bullet's margins of 1 mm, and what it rounds."""
 RIGID_BODY = 1
-"""What getDynamicsInfo tells of a body in maximal coordinates as its last entry but one."""
+"""Last entry but one of getDynamicsInfo for a body in maximal coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GivenBody:
-    """call: what made it, with arguments; shape: those of createCollisionShape, where that was called for it."""
+    """The call that made a body. shape: arguments of createCollisionShape, where that was called for it."""
 
     call: str
     arguments: Mapping[str, Any]
@@ -63,7 +64,7 @@ class GivenBody:
 
 @dataclass(slots=True)
 class GivenBodies:
-    """All that calls said of one client. whose: that client's object, None once it is no more."""
+    """All calls stored of one client. whose: returns the client's object, None once it was dropped."""
 
     whose: Callable[[], object]
     shapes: dict[int, Mapping[str, Any]] = field(default_factory=dict)
@@ -72,16 +73,16 @@ class GivenBodies:
 
 _of_client: dict[int, GivenBodies] = {}
 search_folders: list[str] = []
-"""Where PyBullet was told to look for files: it has one such list for the process, and does not give it back."""
+"""PyBullet's search paths for files: it has one such list for the process, and does not report it."""
 
 
 def begin(client_id: int) -> None:
-    """A client of that number was opened, closed or emptied: what was said before is not of it."""
+    """Drop what was stored of a client id: a client was opened, closed or emptied."""
     _of_client.pop(client_id, None)
 
 
 def given_body(client_id: int, body: int) -> GivenBody | None:
-    """What is known of how a body was made."""
+    """Return the call that made a body, where it is known."""
     found = _of_client.get(client_id)
     return None if found is None or found.whose() is None else found.bodies.get(body)
 
@@ -89,9 +90,14 @@ def given_body(client_id: int, body: int) -> GivenBody | None:
 def remembering(
     name: str, below: Callable[..., Any], client_id: int = 0, whose: Callable[[], object] = lambda: True
 ) -> Callable[..., Any]:
-    """The function of that name (of MAKERS or ENDERS); what it is told is remembered.
+    """Wrap the function of that name (of MAKERS or ENDERS) to store its arguments.
 
-    client_id: of calls that name none. whose: the client's object, where it has one.
+    Parameters
+    ----------
+    client_id
+        Of calls without one.
+    whose
+        Returns the client's object, where it has one.
     """
 
     def remembered(*args: Any, **kwargs: Any) -> Any:
@@ -121,15 +127,15 @@ def _remember(client_id: int, name: str, given: dict[str, Any], made: Any, whose
 
 
 def is_maximal(client_id: int, body: int) -> bool:
-    """Whether an existing body is in maximal coordinates."""
+    """Tell whether an existing body is in maximal coordinates."""
     return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == RIGID_BODY)
 
 
 @contextmanager
 def reduced_body(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
-    """Client and id of the same base in reduced coordinates, alone in a world.
+    """Make the same base in reduced coordinates, alone in a world; yield client and body id.
 
-    None where the call is not known, or what it makes does not take the box that the body takes.
+    None where the call is not known, or its result has another bounding box than the body.
     """
     given = given_body(client_id, body)
     if given is None or given.call not in OF_SHAPE or (given.call == "createMultiBody" and given.shape is None):
@@ -155,7 +161,7 @@ def reduced_body(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
 
 
 def _one_box(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether two bodies, the other set where the one is, take the same box."""
+    """Tell whether two bodies have the same bounding box, the second moved to the pose of the first."""
     pose = pybullet.getBasePositionAndOrientation(one[1], physicsClientId=one[0])
     pybullet.resetBasePositionAndOrientation(other[1], *pose, physicsClientId=other[0])
     box, same = (np.array(pybullet.getAABB(body, -1, physicsClientId=client)) for client, body in (one, other))
@@ -163,7 +169,7 @@ def _one_box(one: tuple[int, int], other: tuple[int, int]) -> bool:
 
 
 def given_triangles(client_id: int, body: int) -> tuple[Array, Array] | None:
-    """Vertices (v, 3) in the body frame and faces (f, 3) of a base whose shape was given by them."""
+    """Return vertices (v, 3) in the body frame and faces (f, 3) of a base whose shape was given by them."""
     given = given_body(client_id, body)
     shape = given.shape if given is not None else None
     if given is None or shape is None or not shape.get("vertices") or not shape.get("indices"):

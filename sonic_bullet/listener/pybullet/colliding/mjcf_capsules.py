@@ -1,11 +1,13 @@
-"""Capsules that an MJCF file gives by their two ends (fromto): asked for one, PyBullet's getCollisionShapeData ends the
-process, and what is drawn has lost its place. So they are read from the file, and held against the space they take.
+"""Capsules that an MJCF file gives by their two ends (fromto), read from the file.
+
+PyBullet's getCollisionShapeData ends the process on them, and the visual shape has lost its position. The capsules that
+were read are checked by the link's bounding box.
 
     saveWorld -> names of the MJCF files that a client ever loaded -> geoms of each body of them
     a link that draws a capsule -> a body of as many geoms, capsules as long -> drawn pieces, placed by fromto
 
-Bullet makes such a capsule of two spheres, whose box is larger by its margin (measured: 0.04 m on each side). By that
-it is told from a capsule that may be asked for.
+Bullet makes such a capsule of two spheres, whose box is larger by its margin (measured: 0.04 m on each side). That
+tells it from a capsule that can be queried.
 """
 
 from __future__ import annotations
@@ -34,11 +36,11 @@ FINE = 0.2
 LARGEST_FILE = 1 << 24
 LOADED = re.compile(r'^objects = p\.loadMJCF\("(.*)"\)$', re.MULTILINE)
 Ends = tuple[float, ...] | None
-"""from and to of a geom, 6 numbers, or None where it has none."""
+"""Both ends of a geom, 6 numbers, or None where it has no fromto."""
 
 
 def loaded_files(client_id: int) -> tuple[str, ...]:
-    """Names of the MJCF files that a client ever loaded, as they were given."""
+    """List the MJCF files that a client ever loaded, by the names given."""
     with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder, quiet_stdout():
         place = Path(folder, "world.py")
         try:
@@ -50,7 +52,7 @@ def loaded_files(client_id: int) -> tuple[str, ...]:
 
 
 def must_not_be_asked(client_id: int, body: int, drawn: tuple[Piece, ...]) -> bool:
-    """Whether asking for the shape of a link that draws this could end the process."""
+    """Tell whether a query for the shape of a link with these visual pieces could end the process."""
     given = given_body(client_id, body)
     if all(piece.kind != pybullet.GEOM_CAPSULE for piece in drawn) or (given is not None and given.call != "loadMJCF"):
         return False
@@ -58,7 +60,7 @@ def must_not_be_asked(client_id: int, body: int, drawn: tuple[Piece, ...]) -> bo
 
 
 def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]) -> tuple[Piece, ...] | None:
-    """What a link that must not be asked collides as, in its body frame, or None where nobody can say."""
+    """Return the collision pieces, body frame, of a link that must not be queried; None where they cannot be known."""
     if fills(client_id, body, link, drawn, fine=FINE):
         return drawn
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
@@ -79,7 +81,7 @@ def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]
 
 
 def _place(name: str) -> Path | None:
-    """The file of that name, looked for where PyBullet does."""
+    """Find the file of that name where PyBullet looks for it."""
     import pybullet_data
 
     main = getattr(sys.modules.get("__main__"), "__file__", None)
@@ -89,8 +91,9 @@ def _place(name: str) -> Path | None:
 
 @lru_cache(maxsize=64)
 def bodies_with_ends(place: Path, _changed_ns: int) -> tuple[tuple[Ends, ...], ...]:
-    """Geoms of each body of an MJCF file, those with fromto by their ends; bodies without one are left out, and each of
-    the world's own geoms is a body.
+    """Return the geoms of each body of an MJCF file, those with fromto by their ends.
+
+    Bodies without one are left out, and each of the world's own geoms is a body.
     """
     try:
         data = place.read_bytes() if place.stat().st_size <= LARGEST_FILE else b""
@@ -117,7 +120,7 @@ def _ends(geom: ElementTree.Element) -> Ends:
 
 
 def _placed(drawn: tuple[Piece, ...], geoms: tuple[Ends, ...], back: tuple[object, object]) -> tuple[Piece, ...] | None:
-    """Drawn pieces, capsules among them placed by the ends of geoms; None where they are not of one length."""
+    """Place the capsules among visual pieces by the ends of geoms; None where the lengths differ."""
     if len(drawn) != len(geoms):
         return None
     placed = []
@@ -136,7 +139,7 @@ def _placed(drawn: tuple[Piece, ...], geoms: tuple[Ends, ...], back: tuple[objec
 
 
 def _z_to(axis: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, ...]:
-    """Quaternion that turns z to a unit vector (3,), or to its opposite: a capsule has no end that is the first."""
+    """Compute the quaternion that rotates z to a unit vector (3,) or its opposite: the ends of a capsule are equal."""
     x, y, z = axis if axis[2] >= 0 else -axis
     q = np.array([-y, x, 0.0, 1 + z])
     return tuple((q / np.linalg.norm(q)).tolist())

@@ -1,8 +1,8 @@
-"""The pieces a link's collision geometry is made of, as PyBullet describes them, placed in the body frame.
+"""Pieces of a link's collision geometry, as PyBullet describes them, placed in the body frame.
 
 getCollisionShapeData ends the process on capsules that an MJCF file gives by their ends: they are read from the file
-(mjcf_capsules). It has no answer for bodies in maximal coordinates: the same body in reduced ones is asked instead
-(given_bodies), else what is drawn stands in, where it fills the same space. Height fields are left out.
+(mjcf_capsules). It has no answer for bodies in maximal coordinates: the same body in reduced ones is queried
+(given_bodies), else the visual shape replaces it, where it fills the same space. Height fields are left out.
 """
 
 from __future__ import annotations
@@ -29,8 +29,18 @@ KINDS = {
 
 
 class Piece(NamedTuple):
-    """kind: pybullet.GEOM_…; size (3): as getCollisionShapeData's dimensions; file: mesh file or ""; position (3),
-    quaternion (4): body frame.
+    """A piece of a link.
+
+    Parameters
+    ----------
+    kind
+        pybullet.GEOM_…
+    size : shape (3,)
+        getCollisionShapeData's dimensions.
+    file
+        Mesh file or "".
+    position, quaternion : shapes (3,), (4,)
+        Body frame.
     """
 
     kind: int
@@ -45,17 +55,17 @@ NOBODY_KNOWS = (Piece(UNKNOWN, (0.0, 0.0, 0.0), "", (0.0, 0.0, 0.0), (0.0, 0.0, 
 
 
 def turn_matrix(quaternion_xyzw: Any) -> Array:
-    """Rotation matrix (3, 3) of a quaternion."""
+    """Convert a quaternion to a rotation matrix (3, 3)."""
     return np.array(pybullet.getMatrixFromQuaternion(quaternion_xyzw)).reshape(3, 3)
 
 
 def collision_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:
-    """Pieces of an existing link; none where it cannot be touched, one UNKNOWN where nobody can say what it is."""
+    """Return the pieces of an existing link; none where it cannot be touched, one UNKNOWN where they are not known."""
     return described_pieces(client_id, body, link)[0]
 
 
 def described_pieces(client_id: int, body: int, link: int) -> tuple[tuple[Piece, ...], bool]:
-    """The same, and whether they are what is drawn, standing in for what collides where both fill the same space."""
+    """Return the same, and whether they are visual pieces in place of collision pieces that fill the same space."""
     if is_maximal(client_id, body):
         return _maximal_pieces(client_id, body)
     drawn = visual_pieces(client_id, body, link)
@@ -74,7 +84,7 @@ def described_pieces(client_id: int, body: int, link: int) -> tuple[tuple[Piece,
 
 
 def _maximal_pieces(client_id: int, body: int) -> tuple[tuple[Piece, ...], bool]:
-    """Pieces of a body in maximal coordinates: of the same body in reduced ones, else drawn ones that fill its box."""
+    """Return the pieces of a body in maximal coordinates: from reduced ones, else visual ones of its box."""
     with reduced_body(client_id, body) as other:
         if other is not None:
             return collision_pieces(*other, -1), False
@@ -82,12 +92,12 @@ def _maximal_pieces(client_id: int, body: int) -> tuple[tuple[Piece, ...], bool]
     if fills(client_id, body, -1, drawn):
         return drawn, True
     if len(drawn) == 1 and drawn[0].kind == pybullet.GEOM_MESH and len(hull_vertices(client_id, body, -1, 0)):
-        return (drawn[0]._replace(file=""),), False  # getMeshData tells the hull that collides, whatever is drawn
+        return (drawn[0]._replace(file=""),), False  # getMeshData returns the hull that collides, whatever is drawn
     return NOBODY_KNOWS, False
 
 
 def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
-    """Vertices (v, 3) of a convex collision piece in the body frame; none of a triangle mesh."""
+    """Return the vertices (v, 3) of a convex collision piece in the body frame; none of a triangle mesh."""
     with quiet_stdout():
         try:
             _, vertices = pybullet.getMeshData(body, link, index, physicsClientId=client_id)
@@ -97,8 +107,9 @@ def hull_vertices(client_id: int, body: int, link: int, index: int) -> Array:
 
 
 def visual_pieces(client_id: int, body: int, link: int) -> tuple[Piece, ...]:
-    """Visual shapes of an existing link: PyBullet places them in the link frame, and the body frame is the inertial
-    one within it.
+    """Return the visual shapes of an existing link in the body frame.
+
+    PyBullet places them in the link frame; the body frame is the inertial frame within it.
     """
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     back, turn = pybullet.invertTransform(info[3], info[4])

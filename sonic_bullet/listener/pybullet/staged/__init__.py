@@ -1,1 +1,1 @@
-"""PyBullet as a stage of poses that are set, not simulated: drawn as pictures, or asked who touches whom."""
+"""PyBullet with poses that are set, not simulated: to draw pictures, or to find contacts."""

@@ -1,6 +1,6 @@
-"""PyBullet as the stage of an animation, and the animation as a world that is listened to.
+"""PyBullet as the `PoseStage` of an animation, and the animation as a `World`.
 
-Nothing pushes bodies apart that overlap in a pose (contactERP = 0): poses of animations overlap by up to a centimetre,
+Bodies that overlap in a pose are not pushed apart (contactERP = 0): poses of animations overlap by up to a centimetre,
 and at 240 Hz Bullet's own correction (0.2 of the depth a step) would throw them at half a metre per second.
 """
 
@@ -29,9 +29,9 @@ queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m).
 
 
 MOMENT_S = 1e-6
-"""Length of the step that shows who overlaps: nothing moves in it."""
+"""Length of the step that finds overlaps: nothing moves in it."""
 SAME_FACE = 0.9
-"""Cosine of the angle between normals up to which places are of one face: tilts of small bodies are a quarter of it."""
+"""Cosine of the largest angle between normals of one face: tilts of small bodies are a quarter of it."""
 
 
 class AnimatedStage:
@@ -57,13 +57,15 @@ class AnimatedStage:
         self._holds = False
 
     def __enter__(self) -> AnimatedStage:
+        """Return the stage."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Close the stage."""
         self.close()
 
     def close(self) -> None:
-        """End the client; twice is once."""
+        """End the client; a second call does nothing."""
         disconnect(self.client)
 
     def _made(self, body: AnimatedBody) -> int:
@@ -85,18 +87,18 @@ class AnimatedStage:
         return made
 
     def boxes(self, motion: Array) -> tuple[Array, Array]:
-        """See PoseStage."""
+        """Return the corners of the bodies' boxes, see PoseStage."""
         frame = matrices(motion["quaternion_xyzw"])
         middle = motion["position_m"] + np.einsum("bij,bj->bi", frame, self.middle_m)
         half = np.einsum("bij,bj->bi", np.abs(frame), self.half_m)
         return middle - half, middle + half
 
     def rows(self, body_id: Array) -> Array:
-        """See PoseStage."""
+        """Map body ids to indices, see PoseStage."""
         return np.array([self.row_of[body] for body in body_id.tolist()], np.int64)
 
     def hold(self, holds: bool) -> None:
-        """Let who is driven stand against every force, as a hand does, or have its mass again."""
+        """Give driven bodies infinite mass, as a hand does, or their own mass again."""
         if holds == self._holds:
             return
         self._holds = holds
@@ -118,7 +120,7 @@ class AnimatedStage:
         )
 
     def closest(self, motion: Array, pairs: Sequence[tuple[int, int]], reach_m: float) -> Array:
-        """See PoseStage."""
+        """Find where pairs are near, see PoseStage."""
         for row in sorted({row for pair in pairs for row in pair}):
             self._set(row, motion[row])
         found: list[Array] = []
@@ -174,7 +176,7 @@ class AnimatedStage:
     def shoot(
         self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
     ) -> Shot:
-        """See PoseStage."""
+        """Simulate from a start, see PoseStage."""
         cid, many = self.client_id, len(self.ids)
         self.hold(True)
         pybullet.setTimeStep(dt_s, physicsClientId=cid)
@@ -203,7 +205,7 @@ class AnimatedStage:
         return Shot(motion, tuple(raws), touching | late[1])
 
     def _loaded(self, points: Sequence[tuple[Any, ...]]) -> Array:
-        """(b, b) who exchanges a force."""
+        """Return the pairs (b, b) that exchange a force."""
         found = np.zeros((len(self.ids), len(self.ids)), bool)
         for one in points:
             if one[9] > 0:
@@ -212,7 +214,7 @@ class AnimatedStage:
         return found
 
     def _after(self, course: Array) -> Array:
-        """MOTION (b,) now, of who is held as `course` says."""
+        """Return MOTION (b,) now; held bodies as `course` has them."""
         made, cid = course.copy(), self.client_id
         for row in np.flatnonzero(~self.held).tolist():
             out, body = made[row], self.ids[row]
@@ -225,8 +227,10 @@ class AnimatedStage:
     def _carry_back(
         self, points: Sequence[tuple[Any, ...]], fresh: Array, before: Array, after: Array, dt_s: float
     ) -> bool:
-        """Move bodies to where they were had they been struck as they met, and not when Bullet sees that they overlap:
-        at most a step earlier, `after` (b,) in place; whether there was such an impact. fresh (b, b): whose to look at.
+        """Move bodies to where they were had they been struck at contact, not at Bullet's first overlap.
+
+        That is at most a step earlier; `after` (b,) is changed in place. fresh (b, b): pairs to look at. Returns
+        whether there was such an impact.
         """
         early_s = np.zeros(len(self.ids))
         falls = 2 * float(np.linalg.norm(self.gravity_m_s2)) * dt_s
@@ -246,8 +250,10 @@ class AnimatedStage:
         return bool(early_s.any())
 
     def _struck_late(self, motion: Array, loaded: Array, dt_s: float, polled: bool) -> tuple[Array, Array]:
-        """RAW rows of who meets in the last step of a shot and overlaps at its end, which Bullet would see a step
-        later: one of a microsecond shows it. Who touches so (b, b) and where that leads, into the last of `motion`.
+        """Find pairs that meet in the last step of a shot and overlap at its end, by a step of a microsecond.
+
+        Bullet would find them a step later. Returns RAW rows and the pairs (b, b); their motion goes into the last of
+        `motion`.
         """
         cid = self.client_id
         pybullet.setTimeStep(MOMENT_S, physicsClientId=cid)
@@ -272,7 +278,7 @@ class AnimatedStage:
 
 
 def _point_speed(motion: Array, point_m: Any) -> Array:
-    """Velocity (3,) of a body's point at a place of the world."""
+    """Compute the velocity (3,) of a body's point at a place of the world."""
     return np.asarray(motion["velocity_m_s"] + np.cross(motion["spin_rad_s"], point_m - motion["position_m"]))
 
 
@@ -284,7 +290,7 @@ def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) ->
 
 
 def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
-    """MOTION (steps + 1, b) on the straight way from a pose to another, with the speed of that way."""
+    """Interpolate MOTION (steps + 1, b) straight from a pose to another, with the speed of that path."""
     course = np.zeros((steps + 1, len(start)), MOTION)
     move = end["position_m"] - start["position_m"]
     turn = rotation(start["quaternion_xyzw"], end["quaternion_xyzw"])
@@ -297,7 +303,7 @@ def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
 
 
 class AnimatedWorld(PyBulletWorld):
-    """The world of a stage, whose steps were found beforehand: MOTION (b,) at the start of each, RAW rows of it."""
+    """The world of a stage, whose steps were found beforehand: MOTION (b,) at the start of each, and its RAW rows."""
 
     def __init__(self, stage: AnimatedStage, steps: Sequence[tuple[Array, Array]], dt_s: float) -> None:
         self._stage, self._found, self._at = stage, steps, 0
@@ -309,23 +315,23 @@ class AnimatedWorld(PyBulletWorld):
             self.call(made, -1, body.name)
 
     def name_of(self, body: int, link: int = -1) -> str:
-        """The name that it has in the animation."""
+        """Return the name in the animation."""
         return self._stage.bodies[self._stage.row_of[body]].name
 
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
-        """The true geometry, not the hulls that collide."""
+        """Return the true geometry, not the hulls that collide."""
         return self._stage.bodies[self._stage.row_of[body]].shapes
 
     def listen(self, after: Any) -> bool:
-        """Nobody steps an animation but its listener."""
+        """Return False: the listener steps the animation itself."""
         return False
 
     def reset(self) -> None:
-        """An animation is played once."""
+        """Raise SceneError: an animation is played once."""
         raise SceneError("an animation cannot begin anew", "score it again")
 
     def after_step(self) -> Step:
-        """The next step; `stepped` is False behind the last."""
+        """Return the next step; `stepped` is False after the last."""
         self.stepped = self._at < len(self._found)
         if not self.stepped:
             return self._memory.nothing(self._settings.dt_s, self._settings.gravity_m_s2)

@@ -1,4 +1,4 @@
-"""The shapes of an animated body as PyBullet's collision shapes; meshes as the convex pieces that collide."""
+"""Shapes of an animated body as PyBullet's collision shapes; meshes as convex pieces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sonic_bullet.records import Array, Shape
 
 
 def compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
-    """A collision shape of one or several; several meshes go through files, of which PyBullet makes hulls."""
+    """Create a collision shape of one or several; several meshes pass through files, of which PyBullet makes hulls."""
     if len(shapes) == 1:
         return int(pybullet.createCollisionShape(**shapes[0], physicsClientId=client_id))
     with temporary_folder() as folder:
@@ -39,13 +39,13 @@ def compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:
 
 
 def _wavefront(vertex: Array) -> str:
-    """A hull's corners as a mesh file; which faces they have does not matter to who takes their hull."""
+    """Write a hull's corners as a mesh file; its faces are arbitrary, as PyBullet takes the hull."""
     corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertex.tolist()]
     return "\n".join([*corners, *(f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertex) - 1))]) + "\n"
 
 
 def collision_options(shape: Shape, body: AnimatedBody) -> Iterator[dict[str, Any]]:
-    """What createCollisionShapeArray wants of a shape; of a mesh its convex pieces."""
+    """Yield createCollisionShapeArray's arguments for a shape; for a mesh, of its convex pieces."""
     placed = {
         "collisionFramePosition": shape.position_m.tolist(),
         "collisionFrameOrientation": shape.quaternion_xyzw.tolist(),

@@ -1,10 +1,10 @@
-"""A mesh as convex pieces that collide: what moves as the hulls of its connected parts, what never moves as it is.
+"""Split a mesh into convex collision pieces: hulls of connected parts where it moves, else its own surface.
 
     part closed and convex -> its hull;  moves -> its hull;  else -> its flat faces, each a hull without thickness,
                                                              or, where they are many, no pieces: a mesh of triangles
 
-Bullet finds how deep a body is in a flat hull from either side. Of a mesh of triangles it looks at each by itself: a
-body that is a little deep meets the edges between those of one floor, too.
+Bullet finds the penetration depth in a flat hull from either side. Of a mesh it tests each triangle by itself: a body
+that penetrates a little also collides with the edges between the triangles of one floor.
 """
 
 from __future__ import annotations
@@ -19,16 +19,20 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError, MeshError
 
 MOST = 64
-"""Pieces of one body: beyond, PyBullet takes longer for them than for triangles."""
+"""Most pieces of one body: with more, PyBullet takes longer than for triangles."""
 CONVEX = 0.02
-"""By which share of it a hull may be larger than what is convex: rounded corners."""
+"""Fraction of volume or area by which the hull of a convex part may be larger: rounded corners."""
 FLAT = 1e-3
-"""By how much corners of a flat face may be off, of its size."""
+"""Deviation of a flat face's corners, relative to its size."""
 
 
 def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
-    """Corners (v, 3) of each; none where what never moves has so many faces that it collides triangle by triangle.
-    Raises AnimationError where a body that moves is flat.
+    """Return the corners (v, 3) of each piece; none where a static mesh has too many faces.
+
+    Raises
+    ------
+    AnimationError
+        A body that moves is flat.
     """
     vertex, face = welded(shape.vertex_m, shape.face)
     parts = list(_connected(vertex, face))
@@ -43,7 +47,7 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
 
 
 def _connected(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
-    """Vertices and faces of each connected part."""
+    """Yield vertices and faces of each connected part."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -60,7 +64,7 @@ def _used(vertex: Array, face: Array) -> tuple[Array, Array]:
 
 
 def _still(vertex: Array, face: Array) -> Iterator[Array]:
-    """Pieces of a part that never moves."""
+    """Yield the pieces of a static part."""
     try:
         corner, shell = hull(vertex)
         whole = volume_m3(corner, shell)
@@ -75,7 +79,7 @@ def _still(vertex: Array, face: Array) -> Iterator[Array]:
 
 
 def _flat_faces(vertex: Array, face: Array) -> Iterator[Array]:
-    """Triangles (f, 3) that hang together by edges and lie in one plane."""
+    """Yield triangles (f, 3) that are connected by edges and lie in one plane."""
     a, b, c = (vertex[face[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1)
@@ -102,7 +106,7 @@ def _flat_faces(vertex: Array, face: Array) -> Iterator[Array]:
 
 
 def _outline(vertex: Array, face: Array) -> Array | None:
-    """Corners of a flat face's outline; None where it is not convex."""
+    """Return the corners of a flat face's outline; None where it is not convex."""
     from scipy.spatial import ConvexHull, QhullError
 
     own, numbered = _used(vertex, face)

@@ -1,4 +1,4 @@
-"""Pictures by PyBullet's software renderer (TinyRenderer), in a world of their own that holds nothing but figures.
+"""Pictures by PyBullet's software renderer (TinyRenderer), in a world that holds only what is drawn.
 
 Figure -> visual shape of its triangles, a normal a corner -> a body of mass 0, set to a pose for each picture
 """
@@ -20,32 +20,34 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, SceneError
 
 FACES_MOST = 40_000
-"""Of a shape: PyBullet takes 131 072 vertices, and here each face has its own three."""
+"""Most faces of a shape: PyBullet takes 131 072 vertices, and here each face has its own three."""
 TILE = 32
-"""Pixels in which the part that is drawn grows: the renderer makes its memory anew for every other size."""
+"""Pixels by which the drawn part grows: the renderer allocates its memory anew for every other size."""
 LIGHT = (0.4, -0.6, 1.2)
 FAR_AWAY = (0.0, 0.0, -1e5)
 SMOOTH = 0.001
-"""Share of its size by which a figure may differ from its surface: less than a pixel of a picture it fills."""
+"""Deviation of a simplified mesh, relative to its size: less than a pixel of a picture that it fills."""
 PLANE_M = 100.0
 """Side of the square that is drawn of a plane."""
 
 
 class PyBulletPictures:
-    """`Pictures` by TinyRenderer, whose time goes by pixels: figures that stand still before a camera that does are
-    drawn once, and of what moves the part of the picture alone that it is in, set before or behind them by its depth.
+    """`Pictures` by TinyRenderer, whose time is proportional to pixels.
+
+    Meshes that stay still are drawn once. Of moving ones only the part of the picture that holds them is drawn, and
+    merged by depth.
     """
 
     def __init__(self, figures: Sequence[Figure], size: tuple[int, int], shadows: bool, still: Array) -> None:
         self._client, self._size, self._shadow = direct_client(), size, int(shadows)
         self._bodies = [self._made(figure) for figure in figures]
         self._radius_m = np.array([np.linalg.norm(figure.vertex_m, axis=1).max(initial=0) for figure in figures])
-        # a shadow falls on who stands still, too
+        # a shadow falls on still meshes, too
         self._still = still if not shadows else np.zeros(len(still), bool)
         self._backdrop: tuple[Array, Array] | None = None
 
     def _made(self, figure: Figure) -> list[int]:
-        """A body for every `FACES_MOST` triangles."""
+        """Create a body for every `FACES_MOST` triangles."""
         vertex, face = simplified(figure.vertex_m, figure.face)
         normals, bodies = corner_normals(vertex, face), []
         for at in range(0, len(face), FACES_MOST):
@@ -63,7 +65,7 @@ class PyBulletPictures:
         return bodies
 
     def picture(self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera) -> Array:
-        """(height, width, 3) uint8 of all figures at poses (k, 3), (k, 4); who is not shown (k,) is left out."""
+        """Draw the meshes at poses (k, 3), (k, 4) where shown (k,) is True; (height, width, 3) uint8."""
         poses, whole = (position_m, quaternion_xyzw), (0, 0, *self._size)
         if not self._still.any():
             return self._taken(*poses, shown, camera, whole)[0]
@@ -78,7 +80,7 @@ class PyBulletPictures:
         return made
 
     def _part(self, position_m: Array, radius_m: Array, camera: Camera) -> tuple[int, int, int, int]:
-        """Left, top, right and bottom of the part of the picture that spheres are in, in whole tiles."""
+        """Return left, top, right and bottom of the part of the picture that holds spheres, in whole tiles."""
         width, height = self._size
         x, y, z = camera.seen(position_m).T
         if (z <= 2 * radius_m).any():
@@ -96,7 +98,7 @@ class PyBulletPictures:
     def _taken(
         self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera, part: tuple[int, int, int, int]
     ) -> tuple[Array, Array]:
-        """Colours (height, width, 3) uint8 and depths (height, width) of a part of the picture."""
+        """Draw a part of the picture: colours (height, width, 3) uint8 and depths (height, width)."""
         (width, height), (x0, y0, x1, y1) = self._size, part
         for bodies, place, turn, there in zip(
             self._bodies, position_m.tolist(), quaternion_xyzw.tolist(), shown.tolist(), strict=True
@@ -128,7 +130,7 @@ class PyBulletPictures:
 
 
 def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
-    """The surface with fewer triangles, where it is closed."""
+    """Reduce the triangles of a surface, where it is closed."""
     import manifold3d
 
     size = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
@@ -141,7 +143,7 @@ def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 
 
 def standing(client_id: int) -> tuple[Standing, ...]:
-    """All links that have a shape, as they stand now; shapes that PyBullet does not tell are left out."""
+    """List all links that have a shape, at their present poses; without shapes that PyBullet does not report."""
     ask: Any = pybullet
     found = []
     for body, link in links_with_shapes(client_id):
@@ -161,8 +163,13 @@ def standing(client_id: int) -> tuple[Standing, ...]:
 
 
 def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
-    """(v, 3) vertices and (f, 3) faces of all shapes, body frame. Raises MeshError where there are none."""
+    """Join the vertices (v, 3) and faces (f, 3) of all shapes, body frame.
 
+    Raises
+    ------
+    MeshError
+        There are no shapes.
+    """
     vertices, faces, count = [], [], 0
     for shape in shapes:
         vertex, face = _triangles(shape)
@@ -176,7 +183,7 @@ def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
 
 
 def _triangles(shape: Shape) -> tuple[Array, Array]:
-    """Vertices and faces of a shape in its own frame."""
+    """Return vertices and faces of a shape in its own frame."""
     from trimesh import creation
 
     x, y, _ = shape.size_m.tolist()
