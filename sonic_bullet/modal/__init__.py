@@ -1,4 +1,4 @@
-"""The modal room: shapes and a material in, a body's vibration modes out.
+"""Vibration modes of a body, from its shapes and its material.
 
 Shape -> solid.Solid (structured.py, tetrahedra.py) -> K, M (fem.py) -> λ, U (eigen.py) -> ModalModel (model.py), kept
     under the names of keys.py

@@ -1,4 +1,4 @@
-"""Yardsticks: natural frequencies of bodies simple enough for pencil and paper.
+"""Natural frequencies of bodies that have a closed form: reference values for the solvers.
 
 All isotropic, free, SI units, Hz ascending.
 
@@ -23,10 +23,15 @@ FREE_SQUARE_PLATE = (13.468, 19.596, 24.270, 34.801, 34.801, 61.093, 61.093, 63.
 def bar_bending_hz(
     length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
 ) -> Array:
-    """Bending frequencies (count,) of a free rectangular Timoshenko bar that bends along depth_m.
+    """Compute the bending frequencies (count,) of a free rectangular Timoshenko bar that bends along depth_m.
 
-    κ = 10(1+ν)/(12+11ν) [Cowper 1966]. Solved exactly: a sign change of the free ends' determinant for each mode. Valid
-    below the shear cutoff, √(κGA/ρI)/2π. Raises ModalError where count reaches beyond it.
+    κ = 10(1+ν)/(12+11ν) [Cowper 1966]. Solved exactly: one sign change of the free ends' determinant per mode. Valid
+    below the shear cutoff, √(κGA/ρI)/2π.
+
+    Raises
+    ------
+    ModalError
+        Fewer than ``count`` modes lie below the cutoff.
     """
     from scipy.optimize import brentq
 
@@ -59,8 +64,9 @@ def bar_bending_hz(
 def bar_longitudinal_hz(
     length_m: float, width_m: float, depth_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
 ) -> Array:
-    """Longitudinal frequencies (count,) n c/2L with Rayleigh's correction for lateral inertia [Rayleigh 1894,
-    § 157].
+    """Compute the longitudinal frequencies (count,) of a free bar.
+
+    n c/2L with Rayleigh's correction for lateral inertia [Rayleigh 1894, § 157].
     """
     k = np.arange(1, count + 1) * np.pi / length_m
     polar = (width_m**2 + depth_m**2) / 12
@@ -70,16 +76,16 @@ def bar_longitudinal_hz(
 def square_bar_torsion_hz(
     length_m: float, side_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
 ) -> Array:
-    """Torsional frequencies (count,) n/2L √(GJ/ρI_p) of a square bar, J = 0.140577 a⁴ [Timoshenko & Goodier 1970, art.
+    """Compute the torsional frequencies (count,) of a free square bar.
 
-    109].
+    n/2L √(GJ/ρI_p), J = 0.140577 a⁴ [Timoshenko & Goodier 1970, art. 109].
     """
     speed = np.sqrt(youngs_pa / (2 * (1 + poisson)) * 0.1405770 * 6 / density_kg_m3)
     return np.asarray(np.arange(1, count + 1) * speed / (2 * length_m))
 
 
 def free_square_plate_hz(side_m: float, thickness_m: float, youngs_pa: float, density_kg_m3: float) -> Array:
-    """First ten frequencies (10,) of a thin free square plate of Poisson's ratio 0.3."""
+    """Compute the first ten frequencies (10,) of a thin free square plate of Poisson's ratio 0.3."""
     bending = youngs_pa * thickness_m**3 / (12 * (1 - 0.3**2))
     hz: Array = np.array(FREE_SQUARE_PLATE) / (2 * np.pi * side_m**2) * np.sqrt(bending / (density_kg_m3 * thickness_m))
     return hz
@@ -88,7 +94,7 @@ def free_square_plate_hz(side_m: float, thickness_m: float, youngs_pa: float, de
 def sphere_multiplets_hz(
     radius_m: float, youngs_pa: float, poisson: float, density_kg_m3: float, count: int
 ) -> list[tuple[float, int, str]]:
-    """First multiplets of a free ball: (Hz, how many modes = 2l+1, name such as "S2" or "T2"), ascending.
+    """Compute the first multiplets of a free ball: (Hz, number of modes = 2l+1, name such as "S2" or "T2"), ascending.
 
     With η = ωa/c_s, ξ = ηc_s/c_p, j the spherical Bessel functions:
     torsional   (l−1) j_l(η) − η j_{l+1}(η) = 0, l ≥ 1 (l = 1: j₂(η) = 0);   radial   tan ξ / ξ = 1 / (1 − η²/4)

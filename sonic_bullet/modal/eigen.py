@@ -1,12 +1,12 @@
-"""Modes of a free or clamped body: K u = λ M u by shift, invert and block Lanczos.
+"""Modes of a free or clamped body: K u = λ M u by shift-and-invert block Lanczos.
 
     A = (K − σM)⁻¹ M,  A u = θ u,  λ = σ + 1/θ,
         σ < 0, so that K − σM is positive definite and the rigid modes (λ = 0) do no
     harm                                                                          [Ericsson & Ruhe 1980, eq. 1.3-1.5]
     A V_j = V_{j-1} B_jᵀ + V_j A_j + V_{j+1} B_{j+1},  VᵀMV = 1                   [Grimes, Lewis, Simon 1994, eq. 3.1]
 
-The basis is kept orthogonal in full, so that degenerate modes of a symmetric body are found as such, and grows until
-the last mode asked for has converged: no restart. The start block is seeded: same body, same bits.
+The basis is kept fully orthogonal, so that degenerate modes of a symmetric body are found as such. It grows without
+restart until the last mode asked for has converged. The start block is seeded: same body, same bits.
 """
 
 from __future__ import annotations
@@ -29,8 +29,13 @@ RIGID_TOLERANCE = 1e-4  # of the first elastic λ: 1e-5 is round-off in a sheet 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
-    """lambda_per_s2 (m,) ascending, elastic only; vector (dof, m) with UᵀMU = 1; rigid_per_s2 (r,) the rigid modes'
-    own.
+    """Elastic modes of a body.
+
+    Attributes
+    ----------
+    lambda_per_s2 : (m,) elastic eigenvalues, ascending
+    vector : (dof, m) with UᵀMU = 1
+    rigid_per_s2 : (r,) eigenvalues of the rigid modes, zero but for round-off
     """
 
     lambda_per_s2: Array
@@ -39,7 +44,7 @@ class Modes:
 
 
 def _orthonormal(block: Array, mass: Any) -> tuple[Array, Array, Array]:
-    """Block (n, b) = Q R with QᵀMQ = 1, by Cholesky twice over; also MQ. Columns without weight come back as zero."""
+    """Factor block (n, b) = Q R with QᵀMQ = 1, by Cholesky twice, into Q, MQ, R. Columns without weight become zero."""
     total = np.eye(block.shape[1])
     for _ in range(2):
         image = mass @ block
@@ -63,10 +68,17 @@ def solve(
     most: int,
     say: Callable[[str], None] | None = None,
 ) -> Modes:
-    """Lowest elastic modes until ``enough(their eigenvalues)``, at most ``most`` of them; scipy sparse (n, n) both.
+    """Find the lowest elastic modes until ``enough(eigenvalues)``, at most ``most``; scipy sparse matrices (n, n).
 
-    shift < 0 in 1/s², about as large as the first elastic eigenvalue. rigid: how many rigid modes the body has.
-    Raises ModalError where it has another number, or where the iteration does not converge.
+    Parameters
+    ----------
+    shift : σ < 0 in 1/s², about as large as the first elastic eigenvalue
+    rigid : number of rigid modes that the body has
+
+    Raises
+    ------
+    ModalError
+        The body has another number of rigid modes, or the iteration does not converge.
     """
     size = stiffness.shape[0]
     factor = factorise(stiffness - shift * mass)

@@ -1,11 +1,11 @@
-"""Any body as a method (methods.py): filled with tetrahedra, clamped or free, of any material.
+"""Finite elements as a method (methods.py): tetrahedra for any body, clamped or free, of any material.
 
 Polynomials are of degree 3 (lagrange.py); of degree 2 where the user gives elements smaller than a bar is thick. The
-first size comes from the shortest wave asked for. Elements are too stiff: from one size to the next f falls, and what
-two sizes tell is taken off [Richardson 1911]:
+first size comes from the shortest wave asked for. Elements are too stiff: f falls as they get smaller, and two sizes
+give an estimate of what to subtract [Richardson 1911]:
 
-    f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is taken off f(h) with a middle p;  what the least and the highest p
-    would have taken off lies on both sides of it: half of what they disagree is the error told
+    f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is subtracted from f(h) with a middle p.  The least and the highest
+    p give corrections on both sides of it: half their difference is the error reported.
 """
 
 from __future__ import annotations
@@ -29,30 +29,43 @@ if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 ORDERS = {2: (2.0, 3.0, 4.0), 3: (2.0, 2.5, 3.5)}
-"""Of frequencies in h, by degree: least, middle and most. Smooth lumps have 4 [Strang & Fix 1973, ch. 6.3]; less is
-measured where walls are an element thick, and along creases, where stress is singular."""
+"""Orders of convergence of frequencies in h, by degree: least, middle and most.
+
+Smooth lumps have 4 [Strang & Fix 1973, ch. 6.3]. Lower orders are measured where walls are an element thick, and along
+creases, where stress is singular.
+"""
 FINER = 0.7  # from one edge to the next: half the elements of a wall
 ALIKE, LARGER = 1.2, 3
-"""Edges of a coarser body over a finer one's, below which both are too much alike to tell anything; how often a coarser
-one is tried: creases keep elements small."""
+"""Ratio of a coarser body's edge to a finer one's below which the two are too similar to compare; how often a coarser
+body is tried: creases keep elements small.
+"""
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
 LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
 TRIES = 2
-WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # what is tried where a surface has too much detail
-OVER = 1.4  # over those: a surface has more detail than its volume and area tell, and takes larger elements
+WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
+OVER = 1.4  # × MOST_UNKNOWNS: a surface with more detail than its volume and area predict takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
 TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elements:
-    """body: filled, in m, by elements of edge_m. clamp (k, 4): spheres that hold it. degree: of its field.
-    thin: elements are wider than the wall: one layer of them.
+    """A body filled with tetrahedra.
 
-    at_size: the body filled anew by an edge, and how; None where the user gave the edge. modes: about how many are
-    wanted, and spare: the work (cost.py) left for them. simple: its detail left out. coarser: the size before. known:
-    λ (m,) found, by tensor.
+    Attributes
+    ----------
+    body : filled body, in m
+    clamp : (k, 4) spheres that hold it
+    degree : of the polynomials of its field
+    thin : whether elements are wider than the wall: one layer of them
+    edge_m : edge of the elements
+    at_size : fills the body anew by an edge and a filler; None where the user gave the edge
+    modes : about how many modes are wanted
+    spare : work (cost.py) left for them
+    simple : whether surface detail is left out
+    coarser : the size before
+    known : λ (m,) found, by tensor
     """
 
     body: Filled
@@ -70,22 +83,22 @@ class Elements:
 
     @property
     def solid(self) -> Solid:
-        """The body over L."""
+        """The body, lengths over L."""
         return Solid(self.body.solid.node_m / self.length_m, self.body.solid.tet, self.body.solid.affine)
 
     @property
     def volume(self) -> float:
-        """In units of L³."""
+        """Volume in units of L³."""
         return fem.volume_m3(self.solid)
 
     @property
     def meshed(self) -> bool:
-        """Elements are too stiff."""
+        """Whether λ carries a discretisation error: always, elements are too stiff."""
         return True
 
     @property
     def nodes(self) -> lagrange.Field:
-        """Of the unknowns, over L, in elimination order."""
+        """Nodes of the unknowns, over L, in elimination order."""
         made = lagrange.field(self.solid, self.degree)
         if self.degree == 2:  # the solid is in that order
             return made
@@ -95,7 +108,15 @@ class Elements:
         return lagrange.Field(self.degree, made.node_m[order], place[made.tet])
 
     def held(self, nodes: lagrange.Field) -> Array:
-        """Which nodes (n,) are clamped. Raises ModalError where all are, MeshError where a clamp is elsewhere."""
+        """Return which nodes (n,) are clamped.
+
+        Raises
+        ------
+        ModalError
+            All nodes are clamped.
+        MeshError
+            A clamp does not touch the body.
+        """
         clamp = self.clamp / self.length_m
         held = fem.clamped(nodes, clamp)
         if held.all():
@@ -103,9 +124,9 @@ class Elements:
         return held
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
-        """The modes wanted of each tensor (6, 6), one sector; of all λ that is taken off which the first tensor's tell.
+        """Solve for the modes wanted of each tensor (6, 6), in one sector.
 
-        Raises ModalError, MeshError.
+        From all λ the discretisation error of the first tensor is subtracted. Raises ModalError, MeshError.
         """
         raw = self._solved(tensors, wanted, say)
         nodes, free, _ = raw.place
@@ -115,8 +136,9 @@ class Elements:
         return [raw._replace(found=found, place=(nodes, free, (less[0] - less[2]) / 2 if self._same_body else less[1]))]
 
     def _less(self, tensor: Array, fine: Array, say: Callable[[str], None]) -> Array:
-        """ln f of modes with λ ``fine`` (m,) less that of infinitely small elements, (3, m) by its `ORDERS`; NaN where
-        nothing coarser tells.
+        """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (3, m) by `ORDERS`.
+
+        NaN where there is no coarser body to compare with.
         """
         coarser, ratio = self._coarser()
         if coarser is None or not len(fine):
@@ -126,13 +148,13 @@ class Elements:
             coarser._solved([tensor], Wanted(np.inf, len(fine)), say)
         coarse = coarser.known[name][: len(fine)]
         lost = np.log(_as_long(coarse / fine[: len(coarse)], len(fine))) / 2
-        # modes nearer to one another than that may have changed places: they share it
+        # modes closer to one another than their correction may have changed places: they get its mean
         apart = np.flatnonzero(np.diff(np.log(fine)) / 2 > np.abs(lost[:-1])) + 1
         lost = np.concatenate([np.full(len(few), few.mean()) for few in np.split(lost, apart) if len(few)])
         return np.array([lost / (ratio**order - 1) for order in ORDERS[self.degree]])
 
     def _solved(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> Sector:
-        """The modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
+        """Solve for the modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
         solid, nodes = self.solid, self.nodes
         held = self.held(nodes)
         free = np.flatnonzero(np.repeat(~held, 3))
@@ -160,7 +182,7 @@ class Elements:
         return Sector(tuple(solved), tuple(stiff), mass, 1, (nodes, free, None))
 
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
-        """Vectors (n, b) on the surface."""
+        """Evaluate vectors (n, b) on the surface."""
         skin = self.body.skin
         ((vector,), (nodes, free, _)) = vectors, sectors[0].place
         whole = np.zeros((3 * len(nodes.node_m), vector.shape[1]))
@@ -170,15 +192,17 @@ class Elements:
         return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Of the frequency of mode top[1], relative, the mean over it and two below; NaN where the user gave the size,
-        or no coarser body can be made.
+        """Estimate the relative error of the frequency of mode top[1]: the mean over it and the two modes below.
+
+        NaN where the user gave the size, or no coarser body can be made.
         """
         left = sectors[0].place[2]
         return float(np.abs(left[max(0, top[1] + 1 - TOGETHER) : top[1] + 1]).mean())
 
     def within(self, most: float) -> Elements:
-        """The same with larger elements where there are by far more unknowns than ``MOST_UNKNOWNS``, or more than
-        ``most``, which is what its work allows.
+        """Return the body with larger elements where there are too many unknowns.
+
+        Too many are by far more than ``MOST_UNKNOWNS``, or more than ``most``, which is what its work allows.
         """
         made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
         for _ in range(TRIES):
@@ -191,8 +215,9 @@ class Elements:
         return made
 
     def bounded(self) -> Elements:
-        """The same with no more unknowns than its work allows: larger elements, less detail, a lattice, or degree 2.
-        Raises MeshError where none of it is enough.
+        """Return the body with no more unknowns than its work allows.
+
+        It takes larger elements, less detail, a lattice, or degree 2. Raises MeshError where none of these is enough.
         """
 
         def most(degree: int) -> float:
@@ -218,8 +243,9 @@ class Elements:
         return made
 
     def finer(self) -> Elements | None:
-        """The same with edges `FINER` as long, or as `MOST_UNKNOWNS` and the work left allow; None where that is too
-        much alike, or where a clamp would hold other nodes.
+        """Return the body with smaller elements, None where they would be too similar or a clamp holds other nodes.
+
+        Edges are `FINER` times as long, or what `MOST_UNKNOWNS` and the work left allow.
         """
         if self.at_size is None or len(self.clamp):
             return None
@@ -241,19 +267,20 @@ class Elements:
         return replace(self, degree=2, coarser=None, known={}, modes=modes, spare=spare).finer()
 
     def _smaller_than(self, other: Elements) -> float:
-        """How many times smaller its elements are."""
+        """Return how many times smaller its elements are than the other's."""
         return float((len(self.body.solid.node_m) / len(other.body.solid.node_m)) ** (1 / self._growth))
 
     def _coarser(self) -> tuple[Elements | None, float]:
-        """The same with larger elements, and how much larger they are; None where the user gave their size, or none can
-        be made.
+        """Return the body with larger elements, and how much larger they are.
+
+        None where the user gave their size, or no coarser body can be made.
         """
         times = 1 / FINER
         for _ in range(LARGER):
             if self.coarser is None and self.at_size is None:
                 break
             made = self.coarser or self._refilled(self.edge_m * times)
-            if made is None or made._lattice != self._lattice:  # kept from when any way would do
+            if made is None or made._lattice != self._lattice:  # cached by a fill with filler "any"
                 break
             larger = self._smaller_than(made)
             if larger > ALIKE:
@@ -263,14 +290,15 @@ class Elements:
 
     @property
     def _same_body(self) -> bool:
-        """Whether elements of all sizes fill the same body, held at the same places: what a lattice rounds and which
-        nodes a clamp reaches is another matter.
+        """Whether elements of all sizes fill the same body, held at the same places.
+
+        A lattice rounds the body differently at each size, and a clamp reaches other nodes.
         """
         return not self._lattice and not len(self.clamp)
 
     @property
     def _growth(self) -> int:
-        """Power of 1/edge that the unknowns grow with: a wall takes one layer, a lump is full."""
+        """Power of 1/edge with which the unknowns grow: 2 for a wall of one layer, 3 for a full lump."""
         return 2 if self.thin else 3
 
     @property
@@ -292,8 +320,9 @@ class Elements:
         return replace(self, body=self.at_size(edge_m, filler), edge_m=edge_m, coarser=None, known={})
 
     def _refilled(self, edge_m: float, filler: Filler | None = None) -> Elements | None:
-        """The same of another size, filled as it is or by ``filler``; None where that cannot be. Raises EndlessError:
-        what a clock ended is an error and decides nothing.
+        """Fill the body with another edge, by its own filler or by ``filler``; None where that fails.
+
+        Raises EndlessError: an end by the clock is an error and decides no result.
         """
         try:
             return self._of_size(edge_m, filler or self._filler("netgen"))
@@ -303,7 +332,7 @@ class Elements:
             return None
 
     def note(self, sectors: Sequence[Sector]) -> str:
-        """How it was done."""
+        """Describe how the modes were found."""
         nodes, free, _ = sectors[0].place
         held = len(nodes.node_m) - len(free) // 3
         clamped = f"; {held} nodes clamped" if held else ""
@@ -311,10 +340,10 @@ class Elements:
 
 
 def coarse(thin: bool) -> float:
-    """About what fraction of its unknowns a coarser body has."""
+    """Return about what fraction of its unknowns a coarser body has."""
     return float(FINER ** (2 if thin else 3))
 
 
 def _as_long(values: Array, count: int) -> Array:
-    """values (m,), cut or the last repeated."""
+    """Cut or extend values (m,) to count, the last repeated."""
     return np.asarray(values[np.minimum(np.arange(count), len(values) - 1)]) if len(values) else np.zeros(count)

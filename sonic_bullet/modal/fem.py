@@ -7,8 +7,8 @@ volume), C any symmetric positive (6, 6) tensor in Voigt order xx yy zz yz xz xy
 
     K_ij^ab = Σ_kl (Σ_de G_kd C_adbe G_le det J) ∂_k N_i ∂_l N_j
 
-the bracket one number an element where its edges are straight, so that all blocks are one dense product. They are
-gathered per pair of nodes.
+The bracket is one number per element where its edges are straight, so that all blocks are one dense product. They are
+summed per pair of nodes.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
 def _rule(order: int) -> tuple[Array, Array]:
-    """Points (q, 3) and weights (q,) of a rule exact to ``order`` on the reference tetrahedron."""
+    """Return points (q, 3) and weights (q,) of a rule exact to ``order`` on the reference tetrahedron."""
     from skfem import ElementTetP1
     from skfem.quadrature import get_quadrature
 
@@ -37,7 +37,7 @@ def _rule(order: int) -> tuple[Array, Array]:
 
 
 def _geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
-    """det J (t, q) and ∂ξ/∂x (t, q, 3, 3) at reference points (q, 3)."""
+    """Compute det J (t, q) and ∂ξ/∂x (t, q, 3, 3) at reference points (q, 3)."""
     jacobian = np.einsum("tid,ikq->tqdk", solid.node_m[tet], lagrange.gradients(2, point), optimize=True)
     determinant = np.linalg.det(jacobian)
     if not (determinant > 0).all():
@@ -46,7 +46,7 @@ def _geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
 
 
 def _bent(solid: Solid) -> Array:
-    """Which elements (t,) have a curved edge."""
+    """Return which elements (t,) have a curved edge."""
     chord = solid.node_m[solid.tet[:, TET_EDGE]].mean(axis=2)
     off = np.abs(solid.node_m[solid.tet[:, 4:]] - chord).max(axis=(1, 2))
     return np.asarray(off > STRAIGHT * np.abs(solid.node_m).max())
@@ -55,10 +55,9 @@ def _bent(solid: Solid) -> Array:
 def assemble(
     solid: Solid, stiffness_pa: Array, density_kg_m3: float, field: lagrange.Field | None = None
 ) -> tuple[Any, Any]:
-    """Stiffness and mass matrix of a field, by default the quadratic one, both (3n, 3n) scipy CSC with the unknowns of
-    a node side by side.
+    """Assemble stiffness and mass matrix of a field, by default the quadratic one.
 
-    Raises MeshError where an element is inverted.
+    Both are (3n, 3n) scipy CSC, the unknowns of a node side by side. Raises MeshError where an element is inverted.
     """
     from scipy.sparse import bsr_array, csc_array, csr_array
 
@@ -88,7 +87,7 @@ def assemble(
 
 
 def _blocks(solid: Solid, tet: Array, stiffness_pa: Array, degree: int, *, curved: bool) -> tuple[Array, Array]:
-    """K_ij^ab (t, 9, k²) and ∫ NᵢNⱼ (t, k²) of elements tet (t, 10)."""
+    """Compute K_ij^ab (t, 9, k²) and ∫ NᵢNⱼ (t, k²) of elements tet (t, 10)."""
     tensor = stiffness_pa[VOIGT[:, :, None, None], VOIGT[None, None]]
     point, weight = _rule(2 * degree if curved else 2 * degree - 2)
     gradient = lagrange.gradients(degree, point)
@@ -110,7 +109,7 @@ def _blocks(solid: Solid, tet: Array, stiffness_pa: Array, degree: int, *, curve
 
 
 def volume_m3(solid: Solid) -> float:
-    """Volume of a solid, curved elements integrated."""
+    """Compute the volume of a solid, curved elements integrated."""
     if solid.affine:
         return float(np.abs(corner_volume_m3(solid.node_m, solid.tet)).sum())
     point, weight = _rule(6)
@@ -123,7 +122,7 @@ def volume_m3(solid: Solid) -> float:
 
 
 def rigid_modes(node_m: Array) -> Array:
-    """The six motions of a rigid body (3n, 6), unnormalised: three shifts, three turns about the nodes' mean."""
+    """Return the six rigid motions (3n, 6), unnormalised: three translations, three rotations about the nodes' mean."""
     n = len(node_m)
     x = node_m - node_m.mean(axis=0)
     motion = np.zeros((n, 3, 6))
@@ -134,10 +133,16 @@ def rigid_modes(node_m: Array) -> Array:
 
 
 def clamped(solid: Solid | lagrange.Field, clamp: Array) -> Array:
-    """Which nodes (n,) the spheres clamp (k, 4) of (x, y, z, radius) in m hold, of a solid or a field; a sphere between
-    nodes holds the nearest.
+    """Return which nodes (n,) of a solid or a field are clamped; a sphere between nodes holds the nearest.
 
-    Raises MeshError where a sphere is farther from the body than an element.
+    Parameters
+    ----------
+    clamp : (k, 4) spheres (x, y, z, radius) in m
+
+    Raises
+    ------
+    MeshError
+        A sphere is farther from the body than an element.
     """
     fixed = np.zeros(len(solid.node_m), bool)
     for x, y, z, radius in clamp:

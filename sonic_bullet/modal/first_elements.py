@@ -1,4 +1,4 @@
-"""The elements that a body is solved with first: their size and degree, from what is wanted and what may be spent.
+"""Size and degree of the elements that a body is solved with first, from what is wanted and what may be spent.
 
 mesh, wall, shortest wave, count of modes -> edge -> filled -> larger, less detail or degree 2 where it is too much
 """
@@ -43,8 +43,18 @@ def filled(
     kept: tuple[store.Place, str],
     say: Callable[[str], None],
 ) -> Elements:
-    """The method of any body, clamped where clamp (k, 4) reaches, its first size from what is wanted of a material of
-    stiffness (6, 6). sizes: edge_m, None for that, and thickness_m. Raises MeshError, ModalError.
+    """Fill any body with elements of a first size, for a material of stiffness (6, 6).
+
+    Parameters
+    ----------
+    clamp : (k, 4) spheres that hold it
+    sizes : edge_m, None for the size that ``wanted`` needs, and thickness_m
+    kept : cache and name of the body filled with elements
+
+    Raises
+    ------
+    MeshError, ModalError
+        The body cannot be filled, or its clamps do not fit it.
     """
     given, thickness_m = sizes
 
@@ -77,10 +87,10 @@ def _first(
     wanted: Wanted,
     say: Callable[[str], None],
 ) -> tuple[float, float, int, bool]:
-    """The wall and the edge to begin with, in m, about how many modes there will be, and whether detail is left out.
+    """Estimate the wall and the first edge, in m, the number of modes, and whether detail is left out.
 
-    The edge is for the shortest wave of a plate as thick as the body is, at the highest λ wanted or the wave of as many
-    modes as are wanted, and no more unknowns than their work allows.
+    The edge follows the shortest wave of a plate as thick as the body, at the highest λ wanted or at the wave number of
+    as many modes as are wanted, with no more unknowns than their work allows.
     """
     skin = prepared(*soup(shapes), thickness_m)
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2

@@ -1,4 +1,4 @@
-"""A body's modes for every isotropic material, in one reduced basis (reduced.py makes it).
+"""Modes of a body for every isotropic material, in one reduced basis (made by reduced.py).
 
 K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))
     [Hughes 1987, ch. 2.7]
@@ -18,12 +18,17 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Family:
-    """A body's modes for every γ = E/ρ and ν. lame, shear (b, b): reduced stiffness. skin (v, 3, b) float32: the basis
-    on the surface at ρL³ = 1 kg.
+    """Modes of a body for every γ = E/ρ and ν.
 
-    vertex_m (v, 3), face (4t, 3): the surface, each element's face cut in four. count: how many of the lowest modes are
-    true. meshed: False where no element's error is in λ. error: estimated, relative, of the highest one's frequency,
-    NaN where it is not known.
+    Attributes
+    ----------
+    lame, shear : (b, b) reduced stiffness
+    skin : (v, 3, b) float32, the basis on the surface at ρL³ = 1 kg
+    vertex_m, face : (v, 3), (4t, 3) the surface, each element's face cut in four
+    length_m : diagonal L
+    count : how many of the lowest modes are true
+    meshed : False where λ carries no element's error
+    error : estimated relative error of the highest frequency, NaN where it is not known
     """
 
     lame: Array
@@ -39,22 +44,22 @@ class Family:
     error: float = float("nan")
 
     def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
-        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis: `points` turns them into shapes."""
+        """Compute λ (m,) in 1/s², ascending, and the modes (b, m) in the basis; `points` turns them into shapes."""
         value, vector = np.linalg.eigh(_stiffness(self, poisson))
         return value[: self.count] * gamma_m2_s2 / self.length_m**2, vector[:, : self.count]
 
     def slope(self, poisson: float, vector: Array) -> Array:
-        """∂ ln λ/∂ν (m,) of modes (b, m) at ν. Source: Hellmann-Feynman, λ' = qᵀK'q."""
+        """Compute ∂ ln λ/∂ν (m,) of modes (b, m) at ν, λ' = qᵀK'q [Hellmann-Feynman]."""
         lame = (1 + 2 * poisson**2) / ((1 + poisson) ** 2 * (1 - 2 * poisson) ** 2)
         shear = -1 / (2 * (1 + poisson) ** 2)
         bent = np.einsum("bm,bc,cm->m", vector, lame * self.lame + shear * self.shear, vector)
         return np.asarray(bent / np.einsum("bm,bc,cm->m", vector, _stiffness(self, poisson), vector))
 
     def points(self, position_m: Array, direction: Array) -> tuple[Array, Array]:
-        """Basis (k, b) at the surface points nearest to position_m (k, 3), along direction (k, 3), and how far off (k,)
-        in m they lie.
+        """Evaluate the basis (k, b) at surface points along directions, and how far off (k,) in m the points lie.
 
-        Divide by √(ρL³) for shapes per √kg. Quadratic over each element's face, as the elements themselves are.
+        The surface points are those nearest to position_m (k, 3), the directions (k, 3). Divide by √(ρL³) for shapes
+        per √kg. Quadratic over each element's face, as the elements themselves are.
         """
         face, weight, distance = closest_point(self.vertex_m, self.face, np.asarray(position_m, float))
         moved = np.empty((len(face), *self.skin.shape[1:]))
@@ -69,8 +74,9 @@ def _stiffness(family: Family, poisson: float) -> Array:
 
 
 def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array]:
-    """The six nodes of an element's face and their shape functions at barycentric ``weight`` of one of its quarters
-    (see solid.QUARTERS).
+    """Return the six nodes of an element's face and their shape functions.
+
+    They are taken at barycentric ``weight`` of one of its quarters (see solid.QUARTERS).
     """
     middle = quarters[3]
     node = np.array([quarters[0, 0], quarters[1, 1], quarters[2, 2], *middle])
@@ -82,5 +88,5 @@ def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array
 
 
 def mixed(poisson: float, lame: Any, shear: Any) -> Any:
-    """The stiffness at E = 1 of its two parts, dense or sparse."""
+    """Combine the stiffness at E = 1 from its two parts, dense or sparse."""
     return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))

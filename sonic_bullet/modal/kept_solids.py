@@ -1,4 +1,4 @@
-"""Bodies filled with elements, kept beside their modes: filling one takes as long as solving it."""
+"""Cache of bodies filled with elements: filling one takes as long as solving it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def kept_or_filled(
     *,
     filler: Filler,
 ) -> Filled:
-    """The body's inside and skin, from the cache where it is there. sizes: edge_m, thickness_m. Raises MeshError."""
+    """Load the body's inside and skin from the cache, or fill it. sizes: edge_m, thickness_m. Raises MeshError."""
     from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
     from sonic_bullet.modal.meshing.solid import SolidSurface
 

@@ -1,4 +1,4 @@
-"""Under which name a result is kept: sha256(numbers, options, source text that computes it)."""
+"""Names of cached results: sha256(numbers, options, source text that computes it)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SOLVERS = ("numpy", "scipy", "scikit-fem", "netgen-mesher", "manifold3d")
 
 @lru_cache(maxsize=4)
 def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
-    """Digest of what computes a result: source files and the versions of packages."""
+    """Digest what computes a result: source files and the versions of packages."""
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
@@ -28,16 +28,15 @@ def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
 
 
 def _code() -> bytes:
-    """Digest of all that turns a surface into modes: this room's source, the geometry below it, the solvers'
-    versions.
-    """
+    """Digest all that turns a surface into modes: this package, `geometry`, and the solvers' versions."""
     here = Path(__file__).resolve().parent
     return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), SOLVERS)
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:
-    """Name of a result: ``kind`` and a digest of the parts (arrays by dtype, shape and bytes) and of the code, by
-    default this room's.
+    """Name a result by ``kind`` and a digest of parts and code.
+
+    Arrays count by dtype, shape and bytes. The code is by default that of this package.
     """
     digest = hashlib.sha256(_code() if code is None else code)
     for part in parts:

@@ -23,7 +23,13 @@ FACES = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """degree; node_m (n, 3); tet (t, 10 or 20): indices into node_m, the solid's elements in its order."""
+    """Nodes of a field of a given degree.
+
+    Attributes
+    ----------
+    node_m : (n, 3)
+    tet : (t, 10 or 20) indices into node_m, the solid's elements in its order
+    """
 
     degree: int
     node_m: Array
@@ -31,7 +37,7 @@ class Field:
 
 
 def field(solid: Solid, degree: int) -> Field:
-    """The nodes of a field of degree 2 or 3 on a solid; those of a curved edge or face lie on it."""
+    """Build the nodes of a field of degree 2 or 3 on a solid; those of a curved edge or face lie on it."""
     if degree == 2:
         return Field(2, solid.node_m, solid.tet)
     used, corner = np.unique(solid.tet[:, :4], return_inverse=True)
@@ -50,7 +56,7 @@ def field(solid: Solid, degree: int) -> Field:
 
 @lru_cache(maxsize=4)
 def local_nodes(degree: int) -> Array:
-    """Reference coordinates (k, 3) of an element's nodes."""
+    """Return the reference coordinates (k, 3) of an element's nodes."""
     corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     part = np.arange(1, degree) / degree
     edges = [corner[i] + p * (corner[j] - corner[i]) for i, j in TET_EDGE for p in part]
@@ -73,12 +79,12 @@ def _monomials(degree: int, point: Array) -> Array:
 
 
 def values(degree: int, point: Array) -> Array:
-    """N_i (k, q) at reference points (q, 3)."""
+    """Compute N_i (k, q) at reference points (q, 3)."""
     return np.asarray((_monomials(degree, point) @ _coefficients(degree)).T)
 
 
 def gradients(degree: int, point: Array) -> Array:
-    """∂N_i/∂ξ_d (k, 3, q) at reference points (q, 3)."""
+    """Compute ∂N_i/∂ξ_d (k, 3, q) at reference points (q, 3)."""
     found = np.empty((len(_powers(degree)), 3, len(point)))
     for d in range(3):
         terms = []
@@ -91,7 +97,7 @@ def gradients(degree: int, point: Array) -> Array:
 
 
 def at_nodes(of: Field, solid: Solid, node: Array) -> Any:
-    """Sparse (v, n): a field's values at solid's nodes (v,) from its values at its own n."""
+    """Build the sparse map (v, n) from a field's values at its own n nodes to those at the solid's nodes (v,)."""
     from scipy.sparse import csr_array
 
     place = np.full(len(solid.node_m), -1)

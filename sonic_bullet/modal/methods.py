@@ -1,10 +1,10 @@
-"""One choice of method for scenes, `modes`, estimator and diagnosis, by what the body and its material are.
+"""Choice of the method for a body and its material, the same for scenes, `modes`, estimator and diagnosis.
 
 a free box, its material's axes its own  -> polynomials (polynomials.py)
 a free isotropic body of revolution      -> a Fourier series around its axis (revolution/)
 everything else                          -> tetrahedra (first_elements.py, elements.py)
 
-and one way from there to modes as accurate as asked (`converged`).
+`converged` refines any of them to the accuracy asked for.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def chosen(
     kept: tuple[store.Place, str],
     say: Callable[[str], None],
 ) -> ModalMethod:
-    """The method for shapes and a material of stiffness (6, 6), its modes to be true up to what is wanted.
+    """Choose the method for shapes and a material of stiffness (6, 6), its modes to be true up to what is wanted.
 
     kept: cache and name of the body filled with elements. Raises MeshError.
     """
@@ -51,8 +51,14 @@ def chosen(
 
 
 class Converged(NamedTuple):
-    """sectors of the method that came last; value (m,): λ of the first tensor's lowest modes wanted, ascending, mode
-    order[k] of all in turn; error: relative, of the highest's frequency, NaN where it is not known.
+    """Modes of a refined method.
+
+    Attributes
+    ----------
+    method, sectors : the last method and its sectors
+    value : (m,) λ of the first tensor's lowest modes wanted, ascending
+    order : (m,) index of each among the modes of all sectors in turn
+    error : relative, of the highest frequency, NaN where it is not known
     """
 
     method: ModalMethod
@@ -65,8 +71,9 @@ class Converged(NamedTuple):
 def converged(
     method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, accuracy: float, say: Callable[[str], None]
 ) -> Converged:
-    """The modes wanted of each tensor (6, 6), refined until the first's highest is as accurate as asked, or until that
-    may cost no more. Raises ModalError, MeshError.
+    """Solve for the modes wanted of each tensor (6, 6), refined until the first's highest is as accurate as asked.
+
+    It ends earlier where refining costs more than allowed. Raises ModalError, MeshError.
     """
     while True:
         sectors = method.sectors(tensors, wanted, say)
@@ -81,7 +88,7 @@ def converged(
 
 
 def _listed(sectors: Sequence[Sector]) -> tuple[Array, Array, Array]:
-    """λ (b,) of the sectors' modes in turn, each as often as it counts, its sector and its place there."""
+    """List λ (b,) of the sectors' modes in turn, each by its multiplicity, with its sector and its index there."""
     value = [np.tile(sector.found[0][0], sector.multiplicity) for sector in sectors]
     index = [np.tile(np.arange(len(sector.found[0][0])), sector.multiplicity) for sector in sectors]
     owner = np.repeat(np.arange(len(sectors)), [len(v) for v in value])

@@ -28,13 +28,14 @@ from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 
-LEAST_ERROR = 1e-4  # relative, of a frequency: what is under it is not told apart
+LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distinguished
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
-    """A solved body without units: value (m,), vector (v, 3, m) float32 on its skin, volume; vertex_m, face,
-    curvature with units.
+    """Solved body without units, its surface with units.
+
+    value (m,), vector (v, 3, m) float32 on its skin and volume have no units; vertex_m, face, curvature_per_m have.
     """
 
     value: Array
@@ -61,15 +62,27 @@ def analyse(
     cache: Path | Literal["default"] | None = "default",
     progress: Callable[[str], None] | None = None,
 ) -> ModalModel:
-    """Vibration modes of a body up to to_hz (at most `MOST_MODES`; the note says when that cut them), or its lowest
-    ``count``.
+    """Compute the vibration modes of a body up to to_hz, or its lowest ``count``.
 
-    shapes: together one solid, in the body frame. fixed: clamped where (x, y, z, radius) in m, body frame, reach; a
-    clamp between nodes takes the nearest. thickness_m: wall of open surfaces (see surfaces.py); it makes closed ones
-    hollow. accuracy: relative, of the highest frequency; the note tells what is reached. edge_m: element size, by
-    default from a budget of unknowns. cache: folder, "default" or None. progress: called with a line now and then. A
-    body all of whose modes lie above to_hz has none; so has a plane. Pieces that do not hang together: the largest is
-    kept and noted. Raises MeshError (broken, empty, flat, absurd or too slow mesh), ModalError (no usable modes).
+    At most `MOST_MODES` are kept; the note says when that cut them. A body all of whose modes lie above to_hz has none,
+    and a plane has none. Of pieces that do not hang together the largest is kept, and noted.
+
+    Parameters
+    ----------
+    shapes : together one solid, in the body frame
+    fixed : spheres (x, y, z, radius) in m, body frame, that clamp it; one between nodes takes the nearest
+    thickness_m : wall of open surfaces (see surfaces.py); it makes closed ones hollow
+    accuracy : relative, of the highest frequency; the note says what is reached
+    edge_m : element size, by default from a budget of unknowns
+    cache : folder, "default" or None
+    progress : called with a line of text now and then
+
+    Raises
+    ------
+    MeshError
+        The mesh is broken, empty, flat, absurd or too slow.
+    ModalError
+        There are no usable modes.
     """
     say = progress or (lambda _: None)
     asked = ModalOptions(to_hz, count, fixed, thickness_m, accuracy)
@@ -125,8 +138,10 @@ def analyse(
 def missing_name(
     shapes: tuple[Shape, ...], material: Material, options: ModalOptions, cache: store.Place = "default"
 ) -> str | None:
-    """Under which name `analyse` would keep the modes of these shapes, None where they are kept already, have no place
-    to be kept in, or are none, as a plane's. Raises MeshError.
+    """Return the name under which `analyse` would keep these modes, None where it would not keep any.
+
+    None where they are kept already, where no cache is given, or where there are no modes, as of a plane. Raises
+    MeshError.
     """
     if not shapes or any(shape.kind == "plane" for shape in shapes) or store.folder(cache) is None:
         return None
@@ -135,8 +150,14 @@ def missing_name(
 
 
 class _UnitOf(NamedTuple):
-    """What a body without units is found by. name: of its modes in the cache; solid: of its filling. length_m, per_s2:
-    what lengths and eigenvalues are divided by. limit: of the eigenvalues asked for; stiffness (6, 6), clamp (k, 4).
+    """Key of a body without units.
+
+    Attributes
+    ----------
+    name, solid : of its modes and of its filling, in the cache
+    length_m, per_s2 : what lengths and eigenvalues are divided by
+    limit : of the eigenvalues asked for
+    stiffness, clamp : (6, 6), (k, 4)
     """
 
     name: str
@@ -161,7 +182,7 @@ def _unit_of(shapes: tuple[Shape, ...], material: Material, asked: ModalOptions,
 
 
 def solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: float | None) -> str:
-    """Under which name shapes filled with elements are kept."""
+    """Name the body that shapes make when filled with elements."""
     sectors = [
         sector for s in shapes for sector in (s.kind, s.size_m, s.position_m, s.quaternion_xyzw, s.vertex_m, s.face)
     ]
@@ -169,7 +190,7 @@ def solid_key(shapes: tuple[Shape, ...], thickness_m: float | None, edge_m: floa
 
 
 def diagonal_m(shapes: tuple[Shape, ...]) -> float:
-    """A length that belongs to the shapes alone: what all is divided by. Raises MeshError where there is none."""
+    """Compute the length of the shapes that all lengths are divided by. Raises MeshError where it is none."""
     sizes = [
         np.linalg.norm(np.ptp(s.vertex_m[np.unique(s.face)], axis=0)) if s.kind == "mesh" else np.linalg.norm(s.size_m)
         for s in shapes
@@ -181,8 +202,9 @@ def diagonal_m(shapes: tuple[Shape, ...]) -> float:
 
 
 def damped(lambda_per_s2: Array, material: Material) -> tuple[Array, Array, Array]:
-    """Frequencies, ascending, and decays of the modes that oscillate, and their indices; decays NaN without alpha [Ren
-    et al. 2013, eq. 7].
+    """Compute frequencies, ascending, and decays of the modes that oscillate, and their indices.
+
+    Decays are NaN without alpha. [Ren et al. 2013, eq. 7]
     """
     if material.alpha_per_s is None or material.beta_s is None:
         return np.sqrt(lambda_per_s2) / (2 * np.pi), np.full(len(lambda_per_s2), np.nan), np.arange(len(lambda_per_s2))
@@ -201,7 +223,7 @@ def _solve(
     cache: store.Place,
     say: Callable[[str], None],
 ) -> _Unit:
-    """The body's modes without units, by the method that it takes, as accurate as asked or as that can be."""
+    """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
     wanted = Wanted(of.limit, MOST_MODES) if asked.count is None else Wanted(np.inf, asked.count)
     method = chosen(
         shapes,

@@ -1,4 +1,4 @@
-"""Modes of a free box by Rayleigh and Ritz in Legendre's polynomials: all but exact, and quicker than elements.
+"""Modes of a free box by Rayleigh-Ritz in Legendre polynomials: all but exact, and quicker than elements.
 
     u_i = Σ c_ilmn P_l(x/a) P_m(y/b) P_n(z/c),  ∫ P_l P_m = δ_lm,  K = Σ_pq C_pq E_pᵀ E_q,  M = 1
         [Demarest 1971, eq. 8-12; Visscher et al. 1991]
@@ -32,7 +32,7 @@ CELLS = 64  # along an axis of the skin, at most
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """size_m (3,); axes (3, 3) its directions as columns, centre_m (3,), both in the body frame."""
+    """Box in the body frame: size_m (3,), axes (3, 3) its directions as columns, centre_m (3,)."""
 
     size_m: Array
     axes: Array
@@ -41,10 +41,13 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parity:
-    """One of the eight problems: degree (3 components) of (k, 3) the polynomials of each, strain: for each of the six
-    strains its map (n, columns).
+    """One of the eight problems of a box.
 
-    rigid: how many rigid motions it holds, one shift or one turn or none.
+    Attributes
+    ----------
+    degree : for each of the three components, (k, 3) degrees of its polynomials
+    strain : for each of the six strains its map (n, columns)
+    rigid : number of rigid motions that it holds: one translation or one rotation or none
     """
 
     degree: tuple[Array, Array, Array]
@@ -52,7 +55,7 @@ class Parity:
     rigid: int
 
     def stiffness(self, stiffness_pa: Array) -> Array:
-        """K (columns, columns) of a tensor (6, 6) without coupling between parities."""
+        """Compute K (columns, columns) of a tensor (6, 6) without coupling between parities."""
         total: Any = 0
         for p, q in zip(*np.nonzero(stiffness_pa), strict=True):
             total = total + stiffness_pa[p, q] * (self.strain[p].T @ self.strain[q])
@@ -60,7 +63,7 @@ class Parity:
 
 
 def recognised(shape: Shape) -> Box | None:
-    """The box that a shape is, by name or by its mesh, else None."""
+    """Recognise the box that a shape is, by its kind or by its mesh, else return None."""
     if shape.kind == "box":
         return Box(
             np.asarray(shape.size_m, float), rotation(shape.quaternion_xyzw), np.asarray(shape.position_m, float)
@@ -80,7 +83,7 @@ def recognised(shape: Shape) -> Box | None:
 
 
 def mirrored(stiffness: Array) -> bool:
-    """Whether a tensor (6, 6) is the same seen in the box's three mirrors."""
+    """Return whether a tensor (6, 6) is invariant under the box's three mirrors."""
     rest = stiffness.copy()
     rest[:3, :3] = 0
     rest[range(3, 6), range(3, 6)] = 0
@@ -88,8 +91,9 @@ def mirrored(stiffness: Array) -> bool:
 
 
 def wave_number(omega2: Any, thickness: Any, stiffness: Array) -> Any:
-    """The largest wave number (1/length) of a plate at ω², density one: bending with shear and rotary inertia [Mindlin
-    1951, eq. 37], in the softest direction.
+    """Compute the largest wave number (1/length) of a plate at ω², density one, in the softest direction.
+
+    Bending with shear and rotary inertia [Mindlin 1951, eq. 37].
     """
     compliance = np.linalg.inv(stiffness)
     omega2 = np.minimum(omega2, 1e150)  # without a limit: more than any
@@ -99,22 +103,24 @@ def wave_number(omega2: Any, thickness: Any, stiffness: Array) -> Any:
 
 
 def omega2_of(wave: float, thickness: float, stiffness: Array) -> float:
-    """ω² at which a plate's largest wave number is ``wave``."""
+    """Return ω² at which a plate's largest wave number is ``wave``."""
     tries = np.geomspace(1e-12, 1e12, 400)
     return float(tries[int(np.argmax(wave_number(tries, thickness, stiffness) > wave))])
 
 
 def wave_number_of(count: int, size: Array) -> float:
-    """A wave number (1/length) below which a box has at least ``count`` modes: bending ones of its length, or of its
-    face [Courant & Hilbert 1924, ch. VI.4].
+    """Return a wave number (1/length) below which a box has at least ``count`` modes.
+
+    Bending modes of its length, or of its face [Courant & Hilbert 1924, ch. VI.4].
     """
     _, wide, long = np.sort(size)
     return float(min((count + 1.5) * np.pi / long, np.sqrt(4 * np.pi * (count + 8) / (wide * long))))
 
 
 def degrees(size: Array, wave: float) -> tuple[int, int, int]:
-    """How many polynomials along each axis a box of size (3,) takes for waves up to ``wave``: π a wave length and a
-    margin (λ then to 1e-5).
+    """Return how many polynomials a box of size (3,) takes along each axis for waves up to ``wave``.
+
+    π per wavelength and a margin (λ then to 1e-5).
     """
     reach = wave * np.asarray(size) / 2
     x, y, z = np.ceil(reach + 4 + 4 * np.minimum(1, reach / 4)).astype(int)
@@ -122,12 +128,12 @@ def degrees(size: Array, wave: float) -> tuple[int, int, int]:
 
 
 def unknowns(terms: tuple[int, int, int]) -> int:
-    """Of one parity, about."""
+    """Estimate the unknowns of one parity."""
     return int(3 * np.prod(terms) / 8)
 
 
 def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
-    """The eight problems of a box of size (3,) with ``terms`` polynomials along each axis."""
+    """Build the eight problems of a box of size (3,) with ``terms`` polynomials along each axis."""
     from scipy.sparse import csr_array, eye_array, kron
 
     steps = []
@@ -154,8 +160,9 @@ def parities(size: Array, terms: tuple[int, int, int]) -> Iterator[Parity]:
 
 
 def _slopes(n: int) -> Any:
-    """The table (n, n) of P_m' = Σ_l table[l, m] P_l on -1..1, orthonormal: P_m' = Σ (2l+1) P_l over l = m-1, m-3, …
-    [Abramowitz & Stegun 8.5.3, summed].
+    """Build the derivative table (n, n) of orthonormal P on -1..1: P_m' = Σ_l table[l, m] P_l.
+
+    P_m' = Σ (2l+1) P_l over l = m-1, m-3, … [Abramowitz & Stegun 8.5.3, summed].
     """
     from scipy.sparse import csr_array
 
@@ -164,10 +171,10 @@ def _slopes(n: int) -> Any:
 
 
 def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
-    """λ (m,) up to limit and vectors (n, m) of a dense K (n, n), M = 1, without the first ``rigid``.
+    """Find λ (m,) up to limit and vectors (n, m) of a dense K (n, n), M = 1, without the first ``rigid``.
 
     Their number is that of the negative pivots of K − limit [Sylvester's inertia; Parlett 1980, ch. 3.3], so none is
-    missed; then shift, invert, Lanczos.
+    missed. Then shift-and-invert Lanczos finds them.
     """
     from scipy.linalg import cho_factor, cho_solve, eigh, ldl
     from scipy.sparse.linalg import LinearOperator, eigsh
@@ -195,8 +202,13 @@ def lowest(stiffness: Array, limit: float, rigid: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ritz:
-    """A free box as a method (methods.py). terms: polynomials along each axis; wave: the largest wave number; high:
-    λ up to which it is solved where only a number of modes is wanted.
+    """A free box as a method (methods.py).
+
+    Attributes
+    ----------
+    terms : polynomials along each axis
+    wave : the largest wave number
+    high : λ up to which it is solved where only a number of modes is wanted
     """
 
     box: Box
@@ -212,16 +224,16 @@ class Ritz:
 
     @property
     def volume(self) -> float:
-        """In units of L³."""
+        """Volume in units of L³."""
         return float(np.prod(self.size))
 
     @property
     def meshed(self) -> bool:
-        """No elements' error is in λ."""
+        """Whether λ carries an element's error: never."""
         return False
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
-        """The modes wanted of each tensor (6, 6), a sector a parity."""
+        """Solve for the modes wanted of each tensor (6, 6), a sector a parity."""
         from scipy.sparse import eye_array
 
         say(f"solving {8 * unknowns(self.terms)} unknowns of a box")
@@ -241,7 +253,7 @@ class Ritz:
             high *= 2
 
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
-        """Vectors (n, b), a matrix a sector, on the surface."""
+        """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave))
         skin = surface(shell)
         point = shell.node_m[skin.node]
@@ -254,7 +266,7 @@ class Ritz:
         return Shown(vertex, skin.face, np.zeros(len(skin.face)), np.ascontiguousarray(shape))
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Of the frequency of mode top[1] of sector top[0], relative: what two more degrees take off."""
+        """Estimate the relative error of the frequency of mode top[1] of sector top[0] by two more degrees."""
         mine = sectors[top[0]]
         value = float(mine.found[0][0][top[1]])
         more = list(parities(self.size, tuple(n + 2 for n in self.terms)))[top[0]]  # type: ignore[arg-type]
@@ -262,18 +274,19 @@ class Ritz:
         return abs(value / float(other[top[1]]) - 1) / 2
 
     def finer(self) -> Ritz | None:
-        """The same with two more polynomials along each axis, None where that takes too many unknowns."""
+        """Return the box with two more polynomials along each axis, None where that takes too many unknowns."""
         x, y, z = (n + 2 for n in self.terms)
         return replace(self, terms=(x, y, z)) if unknowns((x, y, z)) <= MOST_UNKNOWNS else None
 
     def note(self, sectors: Sequence[Sector]) -> str:
-        """How it was done."""
+        """Describe how the modes were found."""
         return f"box of {' x '.join(str(n) for n in self.terms)} polynomials"
 
 
 def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Ritz | None:
-    """The method of a free box, with polynomials enough for what is wanted; None where the shape is none, where its
-    material's axes are not its own, or where it takes too many unknowns.
+    """Return the method of a free box with enough polynomials for what is wanted.
+
+    None where the shape is no box, where its material's axes are not its own, or where it takes too many unknowns.
     """
     box = recognised(shape)
     if box is None or not mirrored(tensor) or not (isotropic(tensor) or np.allclose(box.axes, np.eye(3), atol=1e-9)):
@@ -286,12 +299,12 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
 
 
 def isotropic(stiffness: Array) -> bool:
-    """Whether a tensor (6, 6) has no direction."""
+    """Return whether a tensor (6, 6) is isotropic."""
     return bool(np.allclose(stiffness, _isotropic(stiffness), atol=1e-9 * np.abs(stiffness).max()))
 
 
 def _isotropic(stiffness: Array) -> Array:
-    """The tensor (6, 6) with the same C_11 and C_44 that has no direction."""
+    """Build the isotropic tensor (6, 6) with the same C_11 and C_44."""
     made = np.zeros((6, 6))
     made[:3, :3] = stiffness[0, 0] - 2 * stiffness[3, 3]
     made[range(6), range(6)] = [stiffness[0, 0]] * 3 + [stiffness[3, 3]] * 3
@@ -299,8 +312,9 @@ def _isotropic(stiffness: Array) -> Array:
 
 
 def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array:
-    """Displacements (v, 3, b) at points (v, 3) of the box about its centre, of coefficients (columns, b), in the box's
-    frame; ∫|u|² over the box is one.
+    """Compute displacements (v, 3, b) at points (v, 3) of the box about its centre, from coefficients (columns, b).
+
+    In the box's frame; ∫|u|² over the box is one.
     """
     top = [max(int(d[:, axis].max(initial=0)) for d in parity.degree) for axis in range(3)]
     table = [
@@ -318,6 +332,6 @@ def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array
 
 
 def skin_cells(size: Array, wave: float) -> tuple[int, int, int]:
-    """Cells of the skin along each axis, so that a parabola in each follows the shortest wave."""
+    """Return the cells of the skin along each axis, so that a parabola in each follows the shortest wave."""
     x, y, z = np.clip(np.ceil(np.asarray(size) * wave * PER_WAVE / (2 * np.pi)), 1, CELLS).astype(int)
     return int(x), int(y), int(z)

@@ -1,12 +1,11 @@
-"""All isotropic materials of one body at once: its modes at two Poisson's ratios span those between, and a little
-beyond.
+"""Reduced basis of a body for all isotropic materials: its modes at two Poisson's ratios span those between.
 
     K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))
         [Hughes 1987, ch. 2.7]
     V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
 
-The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths by the body's diagonal L, as in model.py.
-The method for the modes at both is that of `analyse` (methods.py).
+They span those a little beyond as well. The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths
+by the body's diagonal L, as in model.py. The method for the modes at both is that of `analyse` (methods.py).
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from sonic_bullet.records.errors import ModalError
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
 ACCURACY = 0.01  # of the highest mode's frequency: as `analyse` has it by default
-BEYOND = 1.1  # of the limit on λ: modes that are none at one ν may be some at the other
+BEYOND = 1.1  # × the limit on λ: a mode above it at one ν may lie below it at the other
 
 
 @one_thread()
@@ -43,10 +42,9 @@ def family(
     cache: store.Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Family:
-    """The family of one body about a guess, its modes true up to to_hz at the guessed γ. fixed, edge_m, cache,
-    progress: as in `analyse`.
+    """Build the family of one body about a guess, its modes true up to to_hz at the guessed γ.
 
-    Raises MeshError, ModalError.
+    fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
     """
     say = progress or (lambda _: None)
     length = diagonal_m((shape,))
@@ -107,7 +105,7 @@ def _poissons(poisson: float) -> tuple[float, float]:
 
 
 def _together(first: Array, second: Array, mass: Callable[[Array], Array]) -> Array:
-    """Columns (n, b) with VᵀMV = 1 that span those of both, first's first."""
+    """Return columns (n, b) with VᵀMV = 1 that span those of both, the first's first."""
     rest = second - first @ (first.T @ mass(second))
     rest -= first @ (first.T @ mass(rest))
     value, turn = np.linalg.eigh(rest.T @ mass(rest))
@@ -124,7 +122,7 @@ def _lame_shear() -> tuple[Array, Array]:
 def _reduced(
     method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[float, float], say: Callable[[str], None]
 ) -> Family:
-    """The family that the modes at two Poisson's ratios span, sector by sector."""
+    """Build the family that the modes at two Poisson's ratios span, sector by sector."""
     from scipy.linalg import block_diag
 
     tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
@@ -141,7 +139,7 @@ def _reduced(
         basis = _together(first, second, lambda v, sector=sector: sector.mass @ v)  # type: ignore[misc]
         bases.append(basis)
         parts = np.array([basis.T @ (stiff @ basis) for stiff in sector.stiff])
-        # a method may take elements' known error off λ: so is it here, off the motions beside the modes as off all
+        # a method may correct λ for its elements' error: K is scaled alike, other motions by the modes' mean
         off = np.sqrt(value / np.diagonal(parts[0])[: len(value)])
         off = np.append(off, np.full(len(basis.T) - len(off), off.mean() if len(off) else 1.0))
         whole = np.tensordot(share, parts * np.outer(off, off), 1)

@@ -1,4 +1,4 @@
-"""What every method for the modes hands on: sectors that no symmetry couples, and their surface (see methods.py).
+"""Interface of the methods for modes: sectors that no symmetry couples, and their surface (see methods.py).
 
 Lengths by the body's diagonal L, density one: λ = λ' C/(ρL²) for stiffness in C, u = u'/√(ρL³).
 """
@@ -19,8 +19,13 @@ SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and 
 class Sector(NamedTuple):
     """Modes that no symmetry couples with those of another sector.
 
-    found: for each tensor λ (m,) ascending, elastic ones, and vectors (n, m) with VᵀMV = 1; stiff: for each tensor K.
-    multiplicity: of each mode, 2 for degenerate pairs. place: what the method knows it by.
+    Attributes
+    ----------
+    found : for each tensor λ (m,) of elastic modes, ascending, and vectors (n, m) with VᵀMV = 1
+    stiff : for each tensor K
+    mass : M
+    multiplicity : of each mode, 2 for degenerate pairs
+    place : what the method identifies the sector by
     """
 
     found: tuple[tuple[Array, Array], ...]
@@ -31,8 +36,9 @@ class Sector(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """Surface of a body in m, body frame, as `ModalModel` has it; shape (v, 3, b) float32: of the sectors' vectors in
-    turn, each sector's multiplicity one after the other.
+    """Surface of a body in m, body frame, as `ModalModel` has it.
+
+    shape (v, 3, b) float32 holds the sectors' vectors in turn, repeated by each sector's multiplicity.
     """
 
     vertex_m: Array
@@ -42,43 +48,48 @@ class Shown(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """The lowest ``most`` modes, those up to ``limit``, and a margin beyond both: factor on λ."""
+    """Modes wanted: the lowest ``most``, those up to ``limit``, and a margin ``beyond`` both, as a factor on λ."""
 
     limit: float
     most: int
     beyond: float = 1.0
 
     def bound(self, found: Sequence[tuple[Array, int]]) -> float:
-        """The λ above which nothing is wanted, given what was found: λ (m,) and how many multiplicity of each."""
+        """Return the λ above which nothing is wanted, given λ (m,) found and the multiplicity of each array."""
         value = np.concatenate([np.zeros(0), *(np.repeat(v, multiplicity) for v, multiplicity in found)])
         highest = np.partition(value, self.most - 1)[self.most - 1] if len(value) >= self.most else np.inf
         return self.beyond * min(self.limit, float(highest))
 
 
 class ModalMethod(Protocol):
-    """How the modes of one body are found. volume: in units of L³. meshed: whether elements' errors are in its λ."""
+    """Method that finds the modes of one body."""
 
     @property
-    def volume(self) -> float: ...
+    def volume(self) -> float:
+        """Volume in units of L³."""
+        ...
+
     @property
-    def meshed(self) -> bool: ...
+    def meshed(self) -> bool:
+        """Whether λ carries elements' errors."""
+        ...
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
-        """The modes wanted of each tensor (6, 6). Raises ModalError, MeshError."""
+        """Solve for the modes wanted of each tensor (6, 6). Raises ModalError, MeshError."""
         ...
 
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
-        """Vectors (n, b), a matrix a sector, on the surface."""
+        """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         ...
 
     def note(self, sectors: Sequence[Sector]) -> str:
-        """How it was done."""
+        """Describe how the modes were found."""
         ...
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Estimated relative error in frequency of mode top[1] of sector top[0]; NaN where it is not known."""
+        """Estimate the relative error in frequency of mode top[1] of sector top[0]; NaN where it is not known."""
         ...
 
     def finer(self) -> ModalMethod | None:
-        """The same with a smaller error, None where it may cost no more."""
+        """Return the same method with a smaller error, None where it may cost no more."""
         ...

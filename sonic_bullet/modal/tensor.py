@@ -1,5 +1,4 @@
-"""All orthotropic materials of one body at once, axes along the mesh's: its modes at several anchors span those
-between.
+"""Reduced basis of a body for all orthotropic materials, axes along the mesh's: modes at several anchors span the rest.
 
     K(C) = Σ_k C_k K_k over the nine constants of `ORTHOTROPIC`;  V: modes at the anchors together, VᵀMV = 1
     (Σ_k (C_k/ρ) VᵀK_kV) q = λL² q,   ∂ ln λ/∂C_k = qᵀK_kq / qᵀKq,  qᵀq = 1
@@ -44,7 +43,7 @@ ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ..
     ((1, 1, 1), (1, 1, 0.3)),
 )
 """E along x, y, z over the largest; G_yz, G_xz, G_xy over those that go with it, √(E_i E_j)/2(1+ν)."""
-FEWER = (0, 4, 5, 6, 11, 12, 13)  # of them where each costs a solution by elements
+FEWER = (0, 4, 5, 6, 11, 12, 13)  # anchors used where each costs a solution by elements
 SPARE = 1.3  # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
 SPANNED = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
 SHORTER = 1.0  # waves than an isotropic body's of as many modes
@@ -52,12 +51,13 @@ SHORTER = 1.0  # waves than an isotropic body's of as many modes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TensorFamily:
-    """A body's modes for every orthotropic tensor.
+    """Modes of a body for every orthotropic tensor.
 
-    body: its surface and basis, as of `Family`, the isotropic family in this basis.
-
-    part (9, b, b): reduced stiffness of each constant of `ORTHOTROPIC`. ends (p + 1,): the basis falls into p pieces
-    that no such tensor couples.
+    Attributes
+    ----------
+    body : surface and basis as of `Family`, the isotropic family in this basis
+    part : (9, b, b) reduced stiffness of each constant of `ORTHOTROPIC`
+    ends : (p + 1,) bounds of the p blocks of the basis that no such tensor couples
     """
 
     body: Family
@@ -65,8 +65,9 @@ class TensorFamily:
     ends: Array
 
     def modes(self, stiffness_m2_s2: Array) -> tuple[Array, Array]:
-        """λ (m,) in 1/s² ascending, and the modes (b, m) in the basis, of C/ρ (6, 6), of which only the constants of
-        `ORTHOTROPIC` count.
+        """Compute λ (m,) in 1/s², ascending, and the modes (b, m) in the basis, of C/ρ (6, 6).
+
+        Only the constants of `ORTHOTROPIC` count.
         """
         constant = constants_of(stiffness_m2_s2)
         values, vectors = [], []
@@ -81,7 +82,7 @@ class TensorFamily:
         return value[order] / self.body.length_m**2, np.concatenate(vectors, axis=1)[:, order]
 
     def slopes(self, vector: Array, value: Array) -> Array:
-        """∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), all or some of those that `modes` gives."""
+        """Compute ∂ ln λ/∂(C_k/ρ) (9, m) in s²/m² of modes (b, m) with λ (m,), all or some of what `modes` gives."""
         found = np.zeros((len(ORTHOTROPIC), len(value)))
         for a, b in pairwise(self.ends):
             mine = np.flatnonzero(vector[a:b].any(axis=0))
@@ -91,12 +92,12 @@ class TensorFamily:
 
 
 def constants_of(stiffness: Array) -> Array:
-    """The nine constants (9,) of a tensor (6, 6)."""
+    """Return the nine constants (9,) of a tensor (6, 6)."""
     return np.array([stiffness[i, j] for i, j in ORTHOTROPIC])
 
 
 def unit_tensors() -> Array:
-    """The tensor (9, 6, 6) that each constant multiplies."""
+    """Return the tensors (9, 6, 6) that the constants multiply."""
     found = np.zeros((len(ORTHOTROPIC), 6, 6))
     for k, (i, j) in enumerate(ORTHOTROPIC):
         found[k, i, j] = found[k, j, i] = 1
@@ -104,8 +105,9 @@ def unit_tensors() -> Array:
 
 
 def anchored(youngs: tuple[float, float, float], shear: tuple[float, float, float], poisson: float) -> Array:
-    """The tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs. Source: compliance of orthotropic bodies
-    [Bodig & Jayne 1982, eq. 3.8].
+    """Build the tensor (6, 6) of an anchor; ν_ij √(E_j/E_i) = ν for all pairs.
+
+    Compliance of orthotropic bodies [Bodig & Jayne 1982, eq. 3.8].
     """
     root = np.sqrt(np.array(youngs, float))
     compliance = np.zeros((6, 6))
@@ -126,10 +128,9 @@ def tensor_family(
     cache: store.Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> TensorFamily:
-    """The orthotropic family of one body: its lowest ``count`` modes. poisson: about that of the anchors. fixed,
-    edge_m, cache, progress: as in `analyse`.
+    """Build the orthotropic family of one body: its lowest ``count`` modes.
 
-    Raises MeshError, ModalError.
+    poisson: about that of the anchors. fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
     """
     say = progress or (lambda _: None)
     length = diagonal_m((shape,))
@@ -192,15 +193,16 @@ def _joined(
 
 
 def _spanning(vector: Array, gram: Array) -> Array:
-    """Combinations (k, b) of k unit vectors with Gram matrix (k, k) that are orthonormal and span all that weighs."""
+    """Combine k unit vectors with Gram matrix (k, k) into (k, b) orthonormal ones that span all that has weight."""
     value, turn = np.linalg.eigh((gram + gram.T) / 2)
     good = value > SPANNED
     return np.asarray(vector @ (turn[:, good] / np.sqrt(value[good])))
 
 
 def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
-    """Of a free box along the axes, without elements; None where the shape is no such box, or one of too many
-    unknowns.
+    """Build the family of a free box along the axes, without elements.
+
+    None where the shape is no such box, or takes too many unknowns.
     """
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.meshing import structured
@@ -256,7 +258,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
 
 
 def _lowest(stiffness: Array, count: int) -> tuple[Array, Array]:
-    """The lowest elastic λ (m,) and vectors (n, m), M = 1, of the first ``count`` modes of a dense K (n, n)."""
+    """Find the lowest elastic λ (m,) and vectors (n, m), M = 1, of the first ``count`` modes of a dense K (n, n)."""
     from scipy.linalg import cho_factor, cho_solve
     from scipy.sparse.linalg import LinearOperator, eigsh
 

@@ -1,9 +1,9 @@
-"""The child process that runs Netgen [Schöberl 1997]: it can hang, grow or abort, and must not take the parent with it.
+"""Child process that runs Netgen [Schöberl 1997]: it can hang, grow or abort, and must not take the parent with it.
 
     python _netgen.py IN.npz OUT.npz     IN: vertex, face, edge, point, size, memory (bytes), seconds
 
-One thread, so that the same surface has the same tetrahedra, whatever else the machine does. Stands alone (numpy only)
-so that starting it is cheap.
+One thread, so that the same surface has the same tetrahedra, whatever else the machine does. It imports numpy only, so
+that starting it is cheap.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ GRADING = 0.3  # how fast sizes may grow, Netgen's own
 
 
 def limited(memory: int, seconds: int) -> None:
-    """Hold this process to bytes of memory and seconds of processor time, where the system knows such limits."""
+    """Limit this process to bytes of memory and seconds of processor time, where the system has such limits."""
     try:
         import resource
 
@@ -32,6 +32,7 @@ def limited(memory: int, seconds: int) -> None:
 
 
 def main() -> None:
+    """Mesh the surface of the first argument's file and write nodes and tetrahedra to the second's."""
     source, target = sys.argv[1:]
     with np.load(source, allow_pickle=False) as found:
         given = {name: found[name] for name in found.files}

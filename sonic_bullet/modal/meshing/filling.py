@@ -25,26 +25,27 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 Filler = Literal["any", "netgen", "simple", "lattice"]
-"""How what no rule fits is filled: by Netgen or what stands for it, by Netgen or not at all, its detail left out, by
-a lattice of this edge or not at all."""
+"""How a surface that no rule fits is filled: by Netgen or a substitute, by Netgen or not at all, with its detail left
+out, by a lattice of this edge or not at all."""
 LATTICE = "lattice"  # how the note of a solid filled by one begins
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
 FILLED = (0.6, 1.7)
-"""Of the enclosed volume: what a fill may hold.
+"""Volume of a fill over the enclosed one, least and most.
 
 Wide, for a surface that passes through itself encloses some of it twice.
 """
 FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
 SIMPLER, SLIVER = 0.05, 0.01
-"""Of an edge: what is left out where Netgen refuses the surface as it is, and a triangle's height that it would refuse:
-slivers of unions, on which it takes ten times as long."""
+"""Of an edge: the detail left out where Netgen refuses the surface as it is, and the height of triangles that it would
+refuse: slivers of unions, on which it takes ten times as long.
+"""
 WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
 LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
 LATTICE_TETS, LATTICE_MORE = 8000, 1.25
-"""What a lattice may have, or as many as are asked for; how many more there are than its volume tells."""
+"""Tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts."""
 WALL_TETS = 20.0  # a wall as wide as an edge and a bit: elements in a square of its width
 
 
@@ -53,7 +54,7 @@ class TooThinError(MeshError):
 
 
 def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
-    """Solid of a surface that is a box or an extruded outline, else None."""
+    """Fill a surface that is a box or an extruded outline, else return None."""
     vertex, face = skin.vertex_m, skin.face
     if not geometry.is_closed(face):
         return None
@@ -67,7 +68,10 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
 
 
 def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, filler: Filler = "any") -> Solid:
-    """Solid of any prepared surface. edge_m: by default from a budget of unknowns. Raises MeshError."""
+    """Fill any prepared surface.
+
+    edge_m: by default from a budget of unknowns. Raises MeshError.
+    """
     made = by_rule(skin, edge_m)
     if made is not None:
         return made
@@ -102,7 +106,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
 
 
 def simplified(skin: Skin, tolerance_m: float) -> Skin:
-    """A closed surface without what is smaller than tolerance_m; as it was where it passes through itself."""
+    """Remove detail smaller than tolerance_m from a closed surface; one that passes through itself is left as it is."""
     import manifold3d
 
     vertex, face = np.ascontiguousarray(skin.vertex_m), np.ascontiguousarray(skin.face, np.uint64)
@@ -115,17 +119,17 @@ def simplified(skin: Skin, tolerance_m: float) -> Skin:
 
 
 def has_detail(skin: Skin) -> bool:
-    """Whether a surface is simplified before anything else is tried."""
+    """Return whether a surface is simplified before anything else is tried."""
     return len(skin.face) > WHOLE_FACES and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
 
 
 def thick_enough_m(skin: Skin) -> float:
-    """The wall of an open surface that a lattice can fill."""
+    """Compute the wall of an open surface that a lattice can fill."""
     return float(np.sqrt(WALL_TETS * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
 
 
 def _slivers(skin: Skin, edge_m: float) -> bool:
-    """Whether the surface has triangles too flat for a mesh of edge_m: what a union of pieces leaves."""
+    """Return whether the surface has triangles too flat for a mesh of edge_m, as a union of pieces leaves them."""
     corner = skin.vertex_m[skin.face]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     height = 2 * geometry.face_areas_m2(skin.vertex_m, skin.face) / longest
@@ -142,7 +146,7 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None
 
 
 def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str], None], why: str) -> Solid:
-    """Solid by a lattice, its edge from edge_m on until it holds the walls, finest_m or `LATTICE_TETS` at the end."""
+    """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE_TETS`."""
     filled_m3 = LATTICE_MORE * LATTICE_VOLUME * abs(geometry.volume_m3(skin.vertex_m, skin.face))
     edge, least = max(edge_m, (filled_m3 / MOST_TETS) ** (1 / 3)), max(finest_m, (filled_m3 / LATTICE_TETS) ** (1 / 3))
     while True:
@@ -165,7 +169,7 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str],
 
 
 def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
-    """Tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
+    """Return the tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
     tet, pieces = largest_component(corner_m, tet)
     if len(tet) > MOST_TETS:
         raise MeshError(f"mesh needs {len(tet)} tetrahedra, more than {MOST_TETS}", "give a simpler mesh")

@@ -1,6 +1,4 @@
-"""Mesh files -> Shape: OBJ, STL, PLY, GLB and what else `files.meshes` reads, with nothing repaired or merged on the
-way in.
-"""
+"""Mesh files -> Shape: OBJ, STL, PLY, GLB and what else `files.meshes` reads; nothing is repaired."""
 
 from __future__ import annotations
 
@@ -15,11 +13,21 @@ from sonic_bullet.records.errors import MeshError
 
 
 def read_mesh(path: Path | str, scale: float = 1.0) -> Shape:
-    """All triangles of a mesh file as one Shape of kind "mesh", times ``scale`` (0.001 for a file in millimetres).
+    """Read all triangles of a mesh file as one Shape of kind "mesh".
 
     Objects of a scene are placed and put together, polygons cut into triangles, identical vertices made one;
-    orientation stays as it is. Raises FileError where the file cannot be read, MeshError where it holds no triangle, a
-    NaN or a face of no vertex.
+    orientation stays as it is.
+
+    Parameters
+    ----------
+    scale : factor on all lengths, 0.001 for a file in millimetres
+
+    Raises
+    ------
+    FileError
+        The file cannot be read.
+    MeshError
+        It holds no triangle, a NaN or a face of no vertex.
     """
     path = Path(path)
     if not (np.isfinite(scale) and scale > 0):

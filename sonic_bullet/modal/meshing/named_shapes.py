@@ -1,4 +1,4 @@
-"""Boxes, balls, cylinders and capsules: laid out by rule, or as surfaces beside others in the body frame."""
+"""Boxes, balls, cylinders and capsules: meshed by rule, or as surfaces beside others in the body frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sonic_bullet.records.errors import MeshError
 
 
 def rotation(quaternion_xyzw: Array) -> Array:
-    """Matrix (3, 3) of a quaternion [Shoemake 1985, eq. 10]."""
+    """Compute the matrix (3, 3) of a quaternion [Shoemake 1985, eq. 10]."""
     length = float(np.linalg.norm(quaternion_xyzw))
     if not length > 0:
         raise MeshError("a shape's quaternion is zero", "give a rotation, (0, 0, 0, 1) for none")
@@ -28,12 +28,12 @@ def rotation(quaternion_xyzw: Array) -> Array:
 
 
 def placed(shape: Shape, point: Array) -> Array:
-    """Points (k, 3) of a shape's own frame in the body frame."""
+    """Transform points (k, 3) of a shape's own frame to the body frame."""
     return np.asarray(point @ rotation(shape.quaternion_xyzw).T + shape.position_m)
 
 
 def box_cells(size_m: Array, edge_m: float | None) -> tuple[int, int, int]:
-    """Cells along x, y, z: of edge_m, or the finest even grid within the budget of unknowns."""
+    """Count the cells along x, y, z: of edge_m, or of the finest even grid within the budget of unknowns."""
     if edge_m is None:
         budget = dof_budget(1 / float((1 / size_m).sum()), float(np.linalg.norm(size_m)))
         tries = size_m.max() / np.arange(4, 400)
@@ -52,14 +52,14 @@ def box_cells(size_m: Array, edge_m: float | None) -> tuple[int, int, int]:
 
 
 def box(size_m: Array, edge_m: float | None) -> Solid:
-    """Solid of a box about the origin. Raises MeshError where it has no volume."""
+    """Mesh a box about the origin. Raises MeshError where it has no volume."""
     if not (size_m > 0).all():
         raise MeshError(f"box of size {size_m} m has no volume", "give edge lengths above zero")
     return structured.box(size_m, box_cells(size_m, edge_m))
 
 
 def named(shape: Shape, edge_m: float | None) -> Solid:
-    """Structured solid of a named shape about its own origin."""
+    """Mesh a named shape about its own origin."""
     if shape.kind == "box":
         return box(shape.size_m, edge_m)
     radius, length = float(shape.size_m[0]), float(shape.size_m[1])
@@ -83,7 +83,7 @@ def named(shape: Shape, edge_m: float | None) -> Solid:
 
 
 def alone(shapes: tuple[Shape, ...], thickness_m: float | None) -> Shape | None:
-    """The one solid box, ball, cylinder or capsule that the shapes are, else None.
+    """Return the one solid box, ball, cylinder or capsule that the shapes are, else None.
 
     Raises MeshError where its size is absurd.
     """
@@ -98,7 +98,7 @@ def alone(shapes: tuple[Shape, ...], thickness_m: float | None) -> Shape | None:
 
 
 def soup(shapes: tuple[Shape, ...]) -> tuple[Array, Array]:
-    """All surfaces together in the body frame: vertices (v, 3), faces (f, 3)."""
+    """Collect all surfaces in the body frame: vertices (v, 3), faces (f, 3)."""
     vertices, faces, offset = [], [], 0
     for shape in shapes:
         if shape.kind == "mesh":

@@ -1,4 +1,4 @@
-"""Nodes in the middle of edges, put where the body's surface is: chords of a curved wall cost it per cents.
+"""Mid-edge nodes moved onto the body's surface: straight chords of a curved wall cost per cents of its volume.
 
 edge on a smooth part       -> nearest point that looks the same way
 edge along a crease         -> nearest point of the surface's own creases
@@ -17,13 +17,11 @@ from sonic_bullet.records import Array
 FARTHEST = 0.25  # of an edge's length: a chord of a right angle strays 0.21
 LEAST_DET = 0.3  # of the straight element's: below it counts as folded
 LATTICE = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
-"""Where an element's Jacobian is looked at: corners and middles of its edges."""
+"""Where an element's Jacobian is checked: corners and middles of its edges."""
 
 
 def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
-    """A straight solid with the middles of its surface's edges on the surface vertex_m (v, 3), face (f, 3) that it
-    fills.
-    """
+    """Move the mid-edge nodes of a straight solid onto the surface vertex_m (v, 3), face (f, 3) that it fills."""
     edge, middle, normal, crease = _surface_edges(solid)
     ends = solid.node_m[edge]
     length, chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), ends.mean(axis=1)
@@ -42,9 +40,7 @@ def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
 
 
 def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
-    """Edges (e, 2) of a solid's surface, their middle nodes (e,), mean outward normals (e, 3), and which are
-    creases.
-    """
+    """Return a solid's surface edges (e, 2), their middle nodes (e,), mean outward normals (e, 3), and the creases."""
     faces = solid.tet[:, TET_FACE].reshape(-1, 6)
     _, first, count = np.unique(np.sort(faces[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
     outer = faces[np.sort(first[count == 1])]
@@ -61,7 +57,7 @@ def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
 
 
 def creases(vertex_m: Array, face: Array) -> Array:
-    """Edges (e, 2) of a surface across which it turns by more than `CREASE_RAD`."""
+    """Return the edges (e, 2) of a surface across which it turns by more than `CREASE_RAD`."""
     normal = geometry.outward_normals(vertex_m, face)
     edge = np.sort(np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     line, at, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
@@ -71,7 +67,7 @@ def creases(vertex_m: Array, face: Array) -> Array:
 
 
 def nearest_on_lines(line_m: Array, point_m: Array) -> Array:
-    """Nearest points (k, 3) to point_m (k, 3) of straight lines line_m (e, 2 ends, 3)."""
+    """Find the points (k, 3) nearest to point_m (k, 3) on straight lines line_m (e, 2 ends, 3)."""
     start, along = line_m[:, 0], line_m[:, 1] - line_m[:, 0]
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     found = np.empty_like(point_m)
@@ -83,7 +79,7 @@ def nearest_on_lines(line_m: Array, point_m: Array) -> Array:
 
 
 def unfolded(solid: Solid) -> Solid:
-    """The solid with straight edges where an element would fold."""
+    """Return the solid with straight edges where an element would fold."""
     from skfem import ElementTetP2
 
     element = ElementTetP2()

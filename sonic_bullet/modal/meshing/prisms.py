@@ -22,7 +22,7 @@ SAME = 1e-5  # relative difference of volumes taken as rounding
 
 
 def _directions(vertex_m: Array, face: Array) -> Array:
-    """Distinct unit normals (k, 3) up to sign, the largest area first, at most eight."""
+    """Return distinct unit normals (k, 3) up to sign, the largest area first, at most eight."""
     normal, area = geometry.outward_normals(vertex_m, face), geometry.face_areas_m2(vertex_m, face)
     found: list[Array] = []
     left = area.copy()
@@ -39,7 +39,10 @@ def _directions(vertex_m: Array, face: Array) -> Array:
 
 
 def as_box(vertex_m: Array, face: Array) -> tuple[Array, Array, Array] | None:
-    """(size (3,), rotation (3, 3) with the axes as columns, centre (3,)) where a closed surface is a box, else None."""
+    """Recognise a closed surface that is a box, else return None.
+
+    Returns size (3,), rotation (3, 3) with the axes as columns, centre (3,).
+    """
     direction = _directions(vertex_m, face)
     x = direction[0]
     across = [n for n in direction[1:] if abs(float(n @ x)) < RIGHT]
@@ -70,7 +73,7 @@ def as_box(vertex_m: Array, face: Array) -> tuple[Array, Array, Array] | None:
 
 
 def _loops(edge: Array) -> Iterator[Array]:
-    """Closed walks along directed edges (e, 2); nothing where one branches or breaks."""
+    """Yield closed walks along directed edges (e, 2); nothing where one branches or breaks."""
     follow = {int(a): int(b) for a, b in edge}
     if len(follow) != len(edge):
         return
@@ -87,7 +90,7 @@ def _loops(edge: Array) -> Iterator[Array]:
 
 
 def _resampled(loop: Array, edge_m: float) -> Array:
-    """Polygon (k, 2) without vertices on straight runs, its sides cut to at most edge_m."""
+    """Remove the vertices of a polygon (k, 2) on straight runs, and cut its sides to at most edge_m."""
     before, after = loop - np.roll(loop, 1, axis=0), np.roll(loop, -1, axis=0) - loop
     turn = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     bent = loop[turn > 1e-6 * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)]
@@ -97,7 +100,7 @@ def _resampled(loop: Array, edge_m: float) -> Array:
 
 
 def _inside(point: Array, sides: Array) -> Array:
-    """Which points (k, 2) lie inside, sides (s, 2 ends, 2), by the parity of crossings."""
+    """Return which points (k, 2) lie inside sides (s, 2 ends, 2), by the parity of crossings."""
     a, b = sides[:, 0], sides[:, 1]
     px, py = point[:, :1], point[:, 1:]
     spans = (a[:, 1] > py) != (b[:, 1] > py)
@@ -107,7 +110,7 @@ def _inside(point: Array, sides: Array) -> Array:
 
 
 def _gap(point: Array, sides: Array) -> Array:
-    """Distance (k,) of points (k, 2) from the nearest side."""
+    """Compute the distance (k,) of points (k, 2) from the nearest side."""
     along = sides[:, 1] - sides[:, 0]
     length2 = (along**2).sum(axis=1)
     t = np.clip(np.einsum("ksx,sx->ks", point[:, None] - sides[:, 0], along) / length2, 0, 1)
@@ -115,8 +118,9 @@ def _gap(point: Array, sides: Array) -> Array:
 
 
 def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Array, Array] | None:
-    """Points (p, 2) and triangles (t, 3) of about edge_m filling polygons (holes too) of area_m2; None where an edge
-    is missed.
+    """Fill polygons (holes too) of area_m2 with triangles (t, 3) of about edge_m over points (p, 2).
+
+    None where an edge is missed.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -150,8 +154,9 @@ def triangulated(loops: list[Array], area_m2: float, edge_m: float) -> tuple[Arr
 
 
 def as_prism(vertex_m: Array, face: Array, edge_m: float | None, dof_budget: int) -> Solid | None:
-    """Solid of prisms where a closed surface is an extruded outline, else None. edge_m None: the finest within
-    dof_budget unknowns.
+    """Fill a closed surface that is an extruded outline with prisms, else return None.
+
+    edge_m None: the finest within dof_budget unknowns.
     """
     normal, area = geometry.outward_normals(vertex_m, face), geometry.face_areas_m2(vertex_m, face)
     volume = geometry.volume_m3(vertex_m, face)

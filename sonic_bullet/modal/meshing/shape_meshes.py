@@ -1,6 +1,6 @@
 """Shapes -> one solid of quadratic tetrahedra in the body frame, with its surface and that surface's curvature.
 
-one box, sphere, cylinder or capsule           -> laid out by rule (named_shapes.py, structured.py)
+one box, sphere, cylinder or capsule   -> meshed by rule (named_shapes.py, structured.py)
 a mesh, or several shapes as one solid -> their surfaces together (surfaces.py) -> filled (filling.py)
 """
 
@@ -33,7 +33,7 @@ class Filled:
 
 
 def _united(skin: Skin) -> Skin:
-    """The skin with its closed pieces made one, where there are several."""
+    """Return the skin with its closed pieces made one, where there are several."""
     piece = pieces_of_faces(skin.face)
     if piece.max() == 0 or not geometry.is_closed(skin.face):
         return skin
@@ -54,9 +54,9 @@ def fill(
     *,
     filler: Filler = "any",
 ) -> Filled:
-    """One solid, the union of ``shapes``, in the body frame, its nodes in elimination order. filler: as `filled`.
+    """Fill the union of ``shapes`` to one solid in the body frame, its nodes in elimination order.
 
-    Raises MeshError.
+    filler: as `filled`. Raises MeshError.
     """
     if edge_m is not None and not (np.isfinite(edge_m) and edge_m > 0):
         raise MeshError(f"edge_m is {edge_m}", "give an element size above zero")
@@ -86,10 +86,10 @@ def fill(
 
 
 def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
-    """Raise MeshError where `fill` would for what can be seen at once: no extent, no volume, a sheet without a wall;
-    the triangles to be filled.
+    """Check what can be seen without filling, and count the triangles to be filled.
 
-    Whether a surface that passes through itself can be filled is known only when it is.
+    Raises MeshError for no extent, no volume, a sheet without a wall. Whether a surface that passes through itself can
+    be filled is known only when it is.
     """
     if not shapes:
         raise MeshError("body has no shape", "give it a collision or visual shape, or pass mesh=")
@@ -103,8 +103,9 @@ def check_fillable(shapes: tuple[Shape, ...], thickness_m: float | None) -> int:
 
 
 def _curvature(one: Shape | None, vertex_m: Array, face: Array, skin_m: Array, skin_face: Array) -> Array:
-    """Curvature of the skin's faces: known of a ball and a box, estimated of other named shapes, else the given mesh's
-    own nearby.
+    """Compute the curvature of the skin's faces.
+
+    Known of a ball and a box, estimated of other named shapes, else the given mesh's own nearby.
     """
     if one is not None and one.kind == "sphere":
         return np.full(len(skin_face), 1 / float(one.size_m[0]))

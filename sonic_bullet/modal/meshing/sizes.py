@@ -1,4 +1,4 @@
-"""How large elements are: from a budget of unknowns, and smaller where a thin wall is curved."""
+"""Sizes of elements: from a budget of unknowns, and smaller where a thin wall is curved."""
 
 from __future__ import annotations
 
@@ -10,38 +10,36 @@ from sonic_bullet.records import Array
 THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on meshes of bars, slabs and bowls
 CURVED = 1.5
-"""Edge on a wall of thickness t and radius r, over √(r t): chords of both sides stray by a quarter of the wall, and at
-twice this they touch."""
+"""Edge on a wall of thickness t and radius r, over √(r t): chords of both sides deviate by a quarter of the wall, and
+at twice this they touch."""
 LEAST_EDGE = 0.25  # of the wanted edge: where the surface is bent as sharply as a crease
 MOST_ALONG = 40  # points at which a size is given, along a face's longest side
 
 
 def dof_budget(thickness_m: float, diagonal_m: float) -> int:
-    """Unknowns spent by default on a body of thickness 2V/A: fewer the chunkier, more for very thin plates.
+    """Return the unknowns spent by default on a body of thickness 2V/A: fewer the chunkier, more for very thin plates.
 
-    A quadratic element of edge e bends true while e² « thickness x wavelength, so the number of elements in a plate
-    grows as 1/thickness.
+    A quadratic element of edge e bends correctly while e² « thickness x wavelength, so the number of elements in a
+    plate grows as 1/thickness.
     """
     more = np.clip(0.007 * diagonal_m / thickness_m, 1, 3)
     return int((THIN_DOF + (CHUNKY_DOF - THIN_DOF) * chunkiness(thickness_m, diagonal_m)) * more)
 
 
 def chunkiness(thickness_m: float, diagonal_m: float) -> float:
-    """0 for slabs and bars (thickness 2V/A under 4 % of the diagonal) to 1 for lumps (over 7 %; a ball has 19 %)."""
+    """Rate slabs and bars (thickness 2V/A < 4 % of the diagonal) 0, lumps (> 7 %; a ball has 19 %) 1."""
     return float(np.clip((thickness_m / diagonal_m - 0.04) / 0.03, 0, 1))
 
 
 def edge_within_m(volume_m3: float, thickness_m: float, tets: float) -> float:
-    """Edge that keeps a body within a number of tetrahedra: they are ≈ 9 V/e³ + 2 A/e², A = 2V/thickness."""
+    """Return the edge that keeps a body within a number of tetrahedra: they are ≈ 9 V/e³ + 2 A/e², A = 2V/thickness."""
     edges = thickness_m * np.geomspace(0.4, 20, 200)
     made = 9 * volume_m3 / edges**3 + 4 * volume_m3 / thickness_m / edges**2
     return float(edges[min(199, int((made > tets).sum()))])
 
 
 def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
-    """Points (k, 3) of a closed surface at which elements of edge_m are too large for its bent walls, and the size (k,)
-    there.
-    """
+    """Find points (k, 3) of a closed surface whose bent walls need elements below edge_m, and their size (k,)."""
     curvature = np.abs(geometry.face_curvature(vertex_m, face))
     wall = wall_m(vertex_m, face)
     size = np.maximum(CURVED * np.sqrt(wall / np.maximum(curvature, 1e-300)), LEAST_EDGE * edge_m)
@@ -59,7 +57,7 @@ def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Ar
 
 
 def wall_m(vertex_m: Array, face: Array) -> Array:
-    """How far behind each face (f,) of a closed surface its other side is; infinite where that is no thin wall."""
+    """Compute how far behind each face (f,) of a closed surface its other side is; infinite for no thin wall."""
     centre, normal = vertex_m[face].mean(axis=1), geometry.outward_normals(vertex_m, face)
     found, _, distance = geometry.closest_point(vertex_m, face, centre, -normal)
     opposite = np.einsum("fx,fx->f", geometry.outward_normals(vertex_m, face)[found], normal) < 0

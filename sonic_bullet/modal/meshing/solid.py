@@ -1,4 +1,4 @@
-"""A body filled with quadratic tetrahedra, and the surface it shows.
+"""A body filled with quadratic tetrahedra, and its surface.
 
     corners and tetrahedra -> Solid (corner nodes, then one node in the middle of each edge) -> Surface (its boundary,
         each
@@ -26,9 +26,14 @@ QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """node_m (n, 3): corners first.
+    """Quadratic tetrahedra.
 
-    tet (t, 10): indices into node_m. affine: all middles lie halfway. note: how it was made.
+    Attributes
+    ----------
+    node_m : (n, 3) corners first
+    tet : (t, 10) indices into node_m
+    affine : whether all middles lie halfway
+    note : how it was made
     """
 
     node_m: Array
@@ -39,24 +44,24 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolidSurface:
-    """node (v,): which of the solid's nodes lie on the surface. face (f, 3): indices into ``node``, outward."""
+    """Surface of a solid: node (v,) indices of the solid's nodes on it, face (f, 3) indices into ``node``, outward."""
 
     node: Array
     face: Array
 
 
 def corner_volume_m3(corner_m: Array, tet: Array) -> Array:
-    """Signed volumes (t,) of straight tetrahedra tet (t, >=4) over corner_m (n, 3)."""
+    """Compute the signed volumes (t,) of straight tetrahedra tet (t, >=4) over corner_m (n, 3)."""
     a, b, c, d = (corner_m[tet[:, k]] for k in range(4))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6)
 
 
 def quadratic(corner_m: Array, tet: Array, place: Callable[[Array], Array] | None = None, note: str = "") -> Solid:
-    """Solid over tetrahedra tet (t, 4): orients them, drops unused corners and flat elements, adds the nodes in the
-    middle of the edges.
+    """Make a solid of tetrahedra tet (t, 4).
 
-    ``place`` maps all nodes (n, 3) to where they really are (curved bodies are meshed straight and then placed).
-    Raises MeshError where no element has a volume.
+    Orients them, drops unused corners and flat elements, adds the nodes in the middle of the edges. ``place`` maps all
+    nodes (n, 3) to where they really are (curved bodies are meshed straight and then placed). Raises MeshError where no
+    element has a volume.
     """
     volume = corner_volume_m3(corner_m, tet)
     tet = np.where((volume < 0)[:, None], tet[:, [0, 2, 1, 3]], tet)
@@ -78,7 +83,7 @@ def quadratic(corner_m: Array, tet: Array, place: Callable[[Array], Array] | Non
 
 
 def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
-    """Tetrahedra (t', 4) of the largest piece joined through shared faces, and how many pieces there were."""
+    """Return the tetrahedra (t', 4) of the largest piece joined through shared faces, and the number of pieces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -96,7 +101,7 @@ def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
 
 
 def surface(solid: Solid) -> SolidSurface:
-    """Boundary of a solid: every face that belongs to one tetrahedron only, cut into four triangles."""
+    """Extract the boundary of a solid: every face that belongs to one tetrahedron only, cut into four triangles."""
     faces = solid.tet[:, TET_FACE].reshape(-1, 6)
     key = np.sort(faces[:, :3], axis=1)
     order = np.lexsort(key.T)

@@ -1,8 +1,8 @@
-"""Tetrahedra laid out by rule for the shapes that have a name: the same numbers give the same mesh, bit for bit.
+"""Tetrahedra by rule for the named shapes: the same numbers give the same mesh, bit for bit.
 
     box: a grid of cells, each cut into Kuhn's six tetrahedra, neighbours mirrored
-    sphere: the icosahedron's twenty cones, cut n³-fold [Freudenthal 1942], pushed radially onto shells
-    cylinder: a hexagonal disc pushed onto circles, times layers;
+    sphere: the icosahedron's twenty cones, cut n³-fold [Freudenthal 1942], projected radially onto shells
+    cylinder: a hexagonal disc projected onto circles, times layers;
         capsule: that cylinder between two hexagonal half balls
 
 Curved bodies are meshed straight and placed with all their quadratic nodes, so that the surface is a piecewise
@@ -20,7 +20,7 @@ from sonic_bullet.records import Array
 
 
 def box(size_m: Array, cells: tuple[int, int, int]) -> Solid:
-    """Box of full edge lengths size_m (3,) about the origin, ``cells`` along x, y, z, six tetrahedra a cell."""
+    """Mesh a box of edges size_m (3,) about the origin, ``cells`` along x, y, z, six tetrahedra a cell."""
     nx, ny, nz = cells
     axes = [np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size_m, cells, strict=True)]
     corner = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -40,14 +40,15 @@ def box(size_m: Array, cells: tuple[int, int, int]) -> Solid:
 
 
 def _lattice(n: int, dimension: int) -> Array:
-    """Integer points (k, d) of the simplex n ≥ i₁ ≥ … ≥ i_d ≥ 0."""
+    """Return the integer points (k, d) of the simplex n ≥ i₁ ≥ … ≥ i_d ≥ 0."""
     grid = np.stack(np.meshgrid(*[np.arange(n + 1)] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
     return grid[(np.diff(grid, axis=1) <= 0).all(axis=1)]
 
 
 def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
-    """Simplices (s, d+1) over corner (c, 3), each edge cut into n: Freudenthal's subdivision, matching across shared
-    faces.
+    """Cut each edge of simplices (s, d+1) over corner (c, 3) into n: Freudenthal's subdivision.
+
+    Neighbours match across shared faces.
     """
     d = simplex.shape[1] - 1
     simplex = np.sort(simplex, axis=1)  # one order for all: neighbours then cut their shared face alike
@@ -72,23 +73,23 @@ def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
 
 
 def _gauge(point: Array, normal: Array) -> Array:
-    """How far out a point (k, 3) lies in the polytope {x: normal·x ≤ 1}: 1 on its surface."""
+    """Compute how far out a point (k, 3) lies in the polytope {x: normal·x ≤ 1}: 1 on its surface."""
     return np.asarray(np.max(point @ normal.T, axis=1))
 
 
 def _onto_ball(point: Array, normal: Array) -> Array:
-    """Push the polytope's shells onto spheres along the radius."""
+    """Project the polytope's shells onto spheres along the radius."""
     length = np.linalg.norm(point, axis=1)
     return point * (_gauge(point, normal) / np.where(length > 0, length, 1))[:, None]
 
 
 def _face_normals(corner: Array, face: Array) -> Array:
-    """Normals (f, 3) scaled so that normal·x = 1 on the face: corner (c, 3), face (f, 3), none through the origin."""
+    """Compute normals (f, 3) with normal·x = 1 on the face: corner (c, 3), face (f, 3), none through the origin."""
     return np.linalg.solve(corner[face], np.ones((len(face), 3, 1)))[..., 0]
 
 
 def sphere(radius_m: float, n: int) -> Solid:
-    """Ball about the origin: 20·n³ curved tetrahedra."""
+    """Mesh a ball about the origin: 20·n³ curved tetrahedra."""
     golden = (1 + 5**0.5) / 2
     base = np.array([[0, s, t * golden] for s in (-1, 1) for t in (-1, 1)])
     corner = np.concatenate([np.roll(base, k, axis=1) for k in range(3)])
@@ -109,7 +110,7 @@ _HEXAGON = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(6) * np.pi /
 
 
 def _onto_disc(point: Array) -> Array:
-    """Push hexagons about the z axis onto circles; z stays."""
+    """Project hexagons about the z axis onto circles; z stays."""
     angle = (np.arange(6) + 0.5) * np.pi / 3
     normal = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) / np.cos(np.pi / 6)
     flat = point * [1, 1, 0]
@@ -117,9 +118,7 @@ def _onto_disc(point: Array) -> Array:
 
 
 def _prisms(triangle: Array, offset: int, layers: int) -> Array:
-    """Tetrahedra of triangle (k, 3) stacked ``layers`` high, vertex i of layer l being i + l·offset; cut by index
-    order.
-    """
+    """Stack triangle (k, 3) ``layers`` high as tetrahedra, vertex i of layer l at i + l·offset, cut by index order."""
     a, b, c = np.sort(triangle, axis=1).T
     tets = []
     for layer in range(layers):
@@ -133,7 +132,7 @@ def _prisms(triangle: Array, offset: int, layers: int) -> Array:
 
 
 def stacked(flat: Array, triangle: Array, height: Array) -> tuple[Array, Array]:
-    """Corners (p·l, 3) and tetrahedra of triangles (t, 3) over points flat (p, 2) repeated at each of height (l,)."""
+    """Stack triangles (t, 3) over points flat (p, 2) at each of height (l,): corners (p·l, 3) and tetrahedra."""
     points = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in height])
     return points, _prisms(triangle, len(flat), len(height) - 1)
 
@@ -144,7 +143,7 @@ def _disc(n: int) -> tuple[Array, Array]:
 
 
 def cylinder(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
-    """Cylinder along z about the origin: a disc of 6·n² triangles in ``layers`` layers, three tetrahedra a prism."""
+    """Mesh a cylinder along z about the origin: 6·n² triangles in each of ``layers`` layers, 3 tetrahedra a prism."""
     disc, triangle = _disc(n)
     points, tet = stacked(disc[:, :2], triangle, np.linspace(-0.5, 0.5, layers + 1))
     scale = np.array([radius_m, radius_m, length_m])
@@ -152,7 +151,7 @@ def cylinder(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
 
 
 def capsule(radius_m: float, length_m: float, n: int, layers: int) -> Solid:
-    """Capsule along z about the origin, length_m between the centres of its half balls."""
+    """Mesh a capsule along z about the origin, length_m between the centres of its half balls."""
     half = 0.5 * length_m / radius_m
     disc, triangle = _disc(n)
     apex = np.array([0, 0, 1.0])

@@ -4,7 +4,7 @@
         [Jacobson, Kavan, Sorkine-Hornung 2013, eq. 5; far groups of faces as dipoles: Barill et al. 2018, eq. 12]
     -> lattice nodes near the surface put on it -> tetrahedra cut where φ = 0       [Labelle & Shewchuk 2007, ch. 3]
 
-Elements are all of one size and well shaped. Creases of the surface are rounded within an element: that is the price.
+Elements are all of one size and well shaped. The price: creases of the surface are rounded within an element.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -33,8 +33,9 @@ TURNED = np.array(
 
 
 def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
-    """Corners (n, 3) and tetrahedra (t, 4), edges edge_m and √3/2 of it, of what vertex_m (v, 3), face (f, 3) enclose
-    by winding number. Raises MeshError where the lattice would be too large, or nothing is inside.
+    """Fill what vertex_m (v, 3), face (f, 3) enclose by winding number: corners (n, 3) and tetrahedra (t, 4).
+
+    Edges are edge_m and √3/2 of it. Raises MeshError where the lattice would be too large, or nothing is inside.
     """
     point = vertex_m[face].reshape(-1, 3)
     node_m, corners, tet = _lattice(point.min(axis=0), point.max(axis=0), edge_m)
@@ -60,8 +61,10 @@ def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
 
 
 def _lattice(low: Array, high: Array, edge_m: float) -> tuple[Array, int, Array]:
-    """Nodes (n, 3) of a body-centred cubic lattice about a box, how many of them are corners of cubes (first), and its
-    tetrahedra (t, 4): two neighbouring centres and an edge of the square between them.
+    """Build a body-centred cubic lattice about a box.
+
+    Returns nodes (n, 3), how many of them are corners of cubes (first), and tetrahedra (t, 4): two neighbouring centres
+    and an edge of the square between them.
     """
     cells = np.ceil((high - low) / edge_m).astype(int) + 2
     if np.prod(cells.astype(float)) > MOST_CELLS:
@@ -88,8 +91,10 @@ def _lattice(low: Array, high: Array, edge_m: float) -> tuple[Array, int, Array]
 
 
 def winding_number(corner_m: Array, point_m: Array) -> Array:
-    """How often (k,) a surface goes round each point (k, 3): 1 inside and 0 outside a closed one, between both at a
-    hole. corner_m (f, 3, 3): faces, neighbours one after the other.
+    """Compute how often (k,) a surface winds round each point (k, 3).
+
+    1 inside and 0 outside a closed one, between both at a hole. corner_m (f, 3, 3): faces, neighbours one after the
+    other.
     """
     corner_m = np.ascontiguousarray(corner_m, float)
     vector = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0]) / 2
@@ -111,8 +116,10 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
 
 @njit(nogil=True)
 def _winding(corner, group, first, point):
-    """`winding_number` of point (k, 3): group (g, 7) are middle, dipole and where it may stand for its faces, level by
-    level from first (l + 1,) on.
+    """Compute `winding_number` of point (k, 3).
+
+    group (g, 7): middle, dipole and the distance from which it may replace its faces, level by level from first (l +
+    1,).
     """
     total = np.empty(len(point))
     waits = np.empty((len(first) * GROUPS, 2), np.int64)
@@ -145,7 +152,10 @@ def _winding(corner, group, first, point):
 
 @njit(nogil=True)
 def _solid_angle(corner, x, y, z):
-    """Of a triangle (3, 3) seen from a point, positive from behind [Van Oosterom & Strackee 1983, eq. 8]."""
+    """Compute the angle of a triangle (3, 3) seen from a point, positive from behind.
+
+    [Van Oosterom & Strackee 1983, eq. 8]
+    """
     a0, a1, a2 = corner[0, 0] - x, corner[0, 1] - y, corner[0, 2] - z
     b0, b1, b2 = corner[1, 0] - x, corner[1, 1] - y, corner[1, 2] - z
     c0, c1, c2 = corner[2, 0] - x, corner[2, 1] - y, corner[2, 2] - z
@@ -158,7 +168,7 @@ def _solid_angle(corner, x, y, z):
 
 
 def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:
-    """Nodes and tetrahedra of the part where φ > 0; edges are cut where φ, linear along them, is 0."""
+    """Return nodes and tetrahedra of the part where φ > 0; edges are cut where φ, linear along them, is 0."""
     sign = np.sign(phi[tet]).astype(np.int64)
     order = np.argsort(-sign, axis=1, kind="stable")
     tet, sign = np.take_along_axis(tet, order, axis=1), np.take_along_axis(sign, order, axis=1)
@@ -176,7 +186,7 @@ def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:
     plus, minus = (sign > 0).sum(axis=1), (sign < 0).sum(axis=1)
 
     def end(k: int) -> Array:
-        """What stands for vertex k beside a single inner vertex 0: itself where it is on the surface, else the cut."""
+        """Return the substitute of vertex k beside a single inner vertex 0: itself on the surface, else the cut."""
         return np.where(sign[:, k] < 0, edge[0, k], tet[:, k])
 
     whole = tet[minus == 0]
@@ -191,7 +201,7 @@ def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:
 
 
 def _of_pyramids(p: Array) -> list[Array]:
-    """Tetrahedra of pyramids (k, 5), base 0123: cut through the base's least vertex, as the neighbour's face is."""
+    """Cut pyramids (k, 5), base 0123, into tetrahedra through the base's least vertex, as the neighbour's face is."""
     even = (np.argmin(p[:, :4], axis=1) % 2 == 0)[:, None]
     return [
         np.where(even, p[:, [0, 1, 2, 4]], p[:, [0, 1, 3, 4]]),
@@ -200,8 +210,9 @@ def _of_pyramids(p: Array) -> list[Array]:
 
 
 def _of_wedges(w: Array) -> list[Array]:
-    """Tetrahedra of wedges (k, 6), triangles 012 and 345: each side cut through its least vertex [Dompierre et al.
-    1999, table 2].
+    """Cut wedges (k, 6), triangles 012 and 345, into tetrahedra, each side through its least vertex.
+
+    [Dompierre et al. 1999, table 2]
     """
     w = np.take_along_axis(w, TURNED[np.argmin(w, axis=1)], axis=1)
     first = (np.minimum(w[:, 1], w[:, 5]) < np.minimum(w[:, 2], w[:, 4]))[:, None]

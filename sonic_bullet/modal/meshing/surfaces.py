@@ -1,6 +1,6 @@
-"""What a triangle mesh means as a solid: outside found, sheets given a wall, boxes and plates recognised.
+"""Interpretation of a triangle mesh as a solid: outside found, sheets given a wall, boxes and plates recognised.
 
-Choices, each told in the model's note:
+Choices, each given in the model's note:
     closed surface: the solid inside; turned inside out where it looks inward; with thickness_m a hollow body, its wall
         inward
     small holes, seams that do not meet (from outside, `OPEN_PART` of a turn around a point): filled
@@ -25,7 +25,7 @@ from sonic_bullet.records.errors import MeshError
 CAP_PART = 0.05
 """Of a piece's area: flat caps on its holes, below which it encloses a volume."""
 OPEN_PART = 0.025
-"""Winding number just outside, on the mean: a ball with a hole of 5 % of its area has it."""
+"""Mean winding number just outside: a ball with a hole of 5 % of its area has it."""
 SAMPLES = 2000  # faces outside which it is asked for
 SHEET_PART = 0.02
 FLAT_PART = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
@@ -34,8 +34,14 @@ SIZE_M = (1e-5, 1e4)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
-    """A surface that means a solid: vertex_m (v, 3), face (f, 3) outward, thickness_m = 2V/A or the wall's. note: the
-    choices. guessed: nobody told how thick its wall is.
+    """A surface that bounds a solid.
+
+    Attributes
+    ----------
+    vertex_m, face : (v, 3), (f, 3) outward
+    thickness_m : 2V/A, or that of the wall
+    note : the choices
+    guessed : whether the thickness of its wall is a default
     """
 
     vertex_m: Array
@@ -46,7 +52,7 @@ class Skin:
 
 
 def _flips(face: Array) -> Array:
-    """Which faces (f,) to turn so that neighbours agree, each connected piece taken by its first face."""
+    """Return which faces (f,) to turn so that neighbours agree, each connected piece taken by its first face."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -74,7 +80,7 @@ def _flips(face: Array) -> Array:
 
 
 def pieces_of_faces(face: Array) -> Array:
-    """Label (f,) of the piece each face belongs to: faces that share a vertex hang together."""
+    """Label (f,) the piece that each face belongs to: faces that share a vertex are connected."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -86,14 +92,14 @@ def pieces_of_faces(face: Array) -> Array:
 
 
 def _boundary(face: Array) -> Array:
-    """Directed edges (e, 2) that no face runs through the other way."""
+    """Return the directed edges (e, 2) that no face runs through the other way."""
     edge = np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
     n = int(face.max()) + 1
     return edge[~np.isin(edge[:, 0] * n + edge[:, 1], edge[:, 1] * n + edge[:, 0])]
 
 
 def _cap_area_m2(vertex_m: Array, boundary: Array) -> float:
-    """Area of the flat-as-can-be caps over the holes: half the sum of |∮ x × dx| over the loops."""
+    """Compute the area of the flattest caps over the holes: half the sum of |∮ x × dx| over the loops."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -118,7 +124,7 @@ def _vertex_normals(vertex_m: Array, face: Array) -> Array:
 
 
 def _walled(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Array, Array]:
-    """Closed surface about an open one: moved out_m along the normals, a copy moved in_m against them, rims between."""
+    """Close an open surface: moved out_m along the normals, a copy moved in_m against them, rims between."""
     normal = _vertex_normals(vertex_m, face)
     n = len(vertex_m)
     rim = _boundary(face)
@@ -130,7 +136,7 @@ def _walled(vertex_m: Array, face: Array, out_m: float, in_m: float) -> tuple[Ar
 
 
 def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
-    """Faces (f, 3) turned so that neighbours agree and the solid is inside, and what was done."""
+    """Turn faces (f, 3) so that neighbours agree and the solid is inside, and describe what was done."""
     note = ""
     if not geometry.is_closed(face):
         flip = _flips(face)
@@ -149,7 +155,7 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
 
 
 def _solid_pieces(vertex_m: Array, face: Array) -> Array:
-    """Which faces (f,) are of pieces that enclose a volume but for small holes."""
+    """Return which faces (f,) are of pieces that enclose a volume but for small holes."""
     label = pieces_of_faces(face)
     solid = np.zeros(len(face), bool)
     for piece in np.unique(label):
@@ -160,8 +166,9 @@ def _solid_pieces(vertex_m: Array, face: Array) -> Array:
 
 
 def _openness(vertex_m: Array, face: Array) -> float:
-    """Mean over the area of how much of a turn the surface makes around points just outside: 0 of a closed one, whether
-    its pieces share their edges or not.
+    """Average the winding number around points just outside over the area: 0 of a closed surface.
+
+    Its pieces may share their edges or not.
     """
     shown = face[:: -(-len(face) // SAMPLES)]
     area, normal = geometry.face_areas_m2(vertex_m, shown), geometry.outward_normals(vertex_m, shown)
@@ -171,9 +178,9 @@ def _openness(vertex_m: Array, face: Array) -> float:
 
 
 def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
-    """The surface that is to be filled.
+    """Prepare the surface that is to be filled.
 
-    Raises MeshError for no triangle, NaN, an absurd size, or a sheet it cannot thicken.
+    Raises MeshError for no triangle, NaN, an absurd size, or a sheet that it cannot thicken.
     """
     if not np.isfinite(vertex_m[face]).all():
         raise MeshError("mesh holds NaN or infinite vertices", "repair the mesh file")

@@ -1,6 +1,6 @@
 """Closed surface -> tetrahedra by Netgen [Schöberl 1997], in a child process with a memory limit and a guard.
 
-Sizes alone decide the mesh, never a clock: what runs into the guard is an error.
+Sizes alone decide the mesh, never a clock: a child that runs into the guard is an error.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 GUARD_S, GUARD_S_PER_TET = 20, 0.002
-"""Of processor time, after which a child counts as hung: ten times what meshes take. That is an error, and nothing else
-is tried: a clock decides no result."""
+"""Processor time after which a child counts as hung: ten times what meshes take. That is an error, and nothing else is
+tried: a clock decides no result.
+"""
 BUSY = 20.0
 """Wall time per processor time that a child may take on a busy machine before it counts as hung."""
 MEMORY_LIMIT_BYTES = 2 * 1024**3
@@ -43,10 +44,17 @@ def tetrahedra(
     *,
     guard_s: int | None = None,
 ) -> tuple[Array, Array]:
-    """Corners (n, 3) and tetrahedra (t, 4) filling a closed surface vertex_m (v, 3), face (f, 3).
+    """Fill a closed surface vertex_m (v, 3), face (f, 3) with tetrahedra (t, 4) over corners (n, 3).
 
-    edge_m: the longest edge; size_m (k,): that at point_m (k, 3). Raises MeshError where Netgen fails, fills nothing,
-    needs more than 2 GiB, or hangs.
+    Parameters
+    ----------
+    edge_m : the longest edge
+    point_m, size_m : (k, 3), (k,) the longest edge at points
+
+    Raises
+    ------
+    MeshError
+        Netgen fails, fills nothing, needs more than 2 GiB, or hangs.
     """
     low, high = vertex_m[face].reshape(-1, 3).min(axis=0), vertex_m[face].reshape(-1, 3).max(axis=0)
     unit_m = float(np.linalg.norm(high - low)) / ACROSS
@@ -68,8 +76,9 @@ def tetrahedra(
 
 
 def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Array]:
-    """What a script beside this file makes of given arrays, in a process of its own. Raises MeshError where it ends
-    otherwise.
+    """Run a script beside this file on given arrays in its own process, and return its arrays.
+
+    Raises MeshError where it fails.
     """
     name = script.strip("_").removesuffix(".py").capitalize()
     with temporary_folder() as folder:

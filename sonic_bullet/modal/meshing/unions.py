@@ -1,6 +1,6 @@
-"""Several closed pieces that mean one body: joined into one surface, walls between them gone.
+"""Union of closed pieces that mean one body, the walls between them gone.
 
-Simulators' meshes are often convex pieces laid side by side (V-HACD). They overlap, touch, or leave gaps far below what
+Simulators' meshes are often convex pieces side by side (V-HACD). They overlap, touch, or leave gaps far below what
 matters for sound, and a solid of separate pieces would ring as its largest one alone.
 
     pieces, each closed and positive -> exact union (Manifold)  -> one piece?
@@ -19,14 +19,12 @@ from sonic_bullet import geometry
 from sonic_bullet.records import Array
 
 GROWTH = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
-"""Of the diagonal: how far each piece's surface moves outward, the least that joins them counts."""
+"""Of the diagonal: how far each piece's surface moves outward; the least that joins them is taken."""
 ONE = 0.99  # of the volume in the largest piece: the rest is crumbs
 
 
 def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
-    """Vertices, faces of the union of a closed surface's pieces, piece (f,) their labels, and what was done ("" :
-    nothing).
-    """
+    """Unite a closed surface's pieces, piece (f,) their labels: vertices, faces, and what was done ("": nothing)."""
     import manifold3d
 
     count = int(piece.max()) + 1
@@ -57,11 +55,10 @@ def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, st
 
 
 def _outward(vertex_m: Array, face: Array) -> Array:
-    """How the vertices (v, 3) move when every face moves outward by one: the u with n·u = 1 on the faces around, by
-    least squares.
+    """Compute how the vertices (v, 3) move when every face moves outward by one.
 
-    Directions that the normals hardly span (a flat or gently bent neighbourhood) are left alone, a spike moves by three
-    at most.
+    The u with n·u = 1 on the faces around, by least squares. Directions that the normals hardly span (a flat or gently
+    bent neighbourhood) are left alone, a spike moves by three at most.
     """
     corner = vertex_m[face]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])

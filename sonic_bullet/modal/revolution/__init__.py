@@ -1,3 +1,1 @@
-"""Bodies of revolution: recognised (rings.py), cut (section.py), solved by a Fourier series (series.py), shown
-(skin.py).
-"""
+"""Bodies of revolution: found by rings.py, cut by section.py, solved by series.py (Fourier series), shown in skin."""

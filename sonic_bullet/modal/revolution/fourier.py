@@ -19,7 +19,7 @@ from sonic_bullet.records.errors import ModalError
 
 MOST_AROUND = 400  # waves around
 CURVED = 1.3  # wave number of a curved wall over that of a flat one of as many modes: membranes take the low ones away
-FINER = 1.5  # of a section whose sides are that much shorter an error is left of FINER^-q, q from 1.1 at notches to 6
+FINER = 1.5  # sides shorter by this leave FINER^-q of the error, q from 1.1 at notches to 6
 HIGHER = 4.0  # λ over that of the last try, where that held too few modes
 FEWEST_NODES = 120  # so few cost nothing
 LEFT = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
@@ -27,9 +27,14 @@ LEFT = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fourier:
-    """body: in units of length_m. wave: largest wave number in walls of thickness (k,). section: cut accordingly,
-    its sides finer_by times shorter than usual. high: λ up to which it is solved at first where only a number of modes
-    is wanted.
+    """A free isotropic body of revolution.
+
+    Attributes
+    ----------
+    body : in units of length_m
+    wave : largest wave number in walls of thickness (k,)
+    section : cut accordingly, its sides finer_by times shorter than usual
+    high : λ up to which it is solved at first where only a number of modes is wanted
     """
 
     body: Revolved
@@ -41,23 +46,23 @@ class Fourier:
 
     @property
     def volume(self) -> float:
-        """In units of L³."""
+        """Volume in units of L³."""
         return self.body.volume_m3
 
     @property
     def meshed(self) -> bool:
-        """No elements' error is in λ that matters."""
+        """Whether λ carries an element's error that matters: never."""
         return False
 
     @property
     def thickness(self) -> float:
-        """2V/A, over L."""
+        """Thickness 2V/A, over L."""
         outline, after = self.body.outline_m, np.roll(self.body.outline_m, -1, axis=0)
         area = np.pi * (outline + after)[:, 0] * np.linalg.norm(after - outline, axis=1)
         return float(2 * self.volume / area.sum())
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
-        """The modes wanted of each tensor (6, 6), a sector a wave number. Raises ModalError."""
+        """Solve for the modes wanted of each tensor (6, 6), a sector a wave number. Raises ModalError."""
         say(f"solving {3 * self.section.nodes} unknowns of a section for each wave around")
         problems = series(self.section, list(tensors))
         high = self.high
@@ -72,7 +77,7 @@ class Fourier:
             high *= HIGHER
 
     def _up_to(self, problems: Series, tensors: int, wanted: Wanted) -> list[Sector]:
-        """Parts of one wave around after another, until none holds a mode that is wanted."""
+        """Solve for one wave number around after another, until none holds a mode that is wanted."""
         found: list[Sector] = []
         before = np.full(tensors, np.inf)
         for m in count():
@@ -90,7 +95,7 @@ class Fourier:
         return found
 
     def _around(self, problems: Series, m: int, most: int, bounds: Sequence[float]) -> tuple[Sector, Array]:
-        """The modes of m waves around, those of each tensor up to its bound, and the lowest λ of each."""
+        """Solve for the modes of m waves around, up to each tensor's bound, and return the lowest λ of each too."""
         multiplicity = 1 if m == 0 else 2
         stiff, mass = problems.problem(m)
         solved, lowest = [], []
@@ -109,7 +114,7 @@ class Fourier:
         return Sector(tuple(solved), stiff, mass, multiplicity, (m, problems)), np.array(lowest)
 
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
-        """Vectors (n, b), a matrix a sector, on the surface."""
+        """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         around = max((sector.place[0] for sector in sectors), default=0)
         cells = int(np.clip(skin.AROUND * around, *skin.CELLS))
         wave = float(self.wave(np.array([self.thickness]))[0])
@@ -124,7 +129,7 @@ class Fourier:
         return Shown(vertex, face, curvature / self.length_m, np.ascontiguousarray(shape))
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Of the frequency of mode top[1] of sector top[0], relative: what it loses on a finer section."""
+        """Estimate the relative error of the frequency of mode top[1] of sector top[0] by a finer section."""
         finer = self.finer()
         if finer is None:
             return float("nan")
@@ -134,20 +139,21 @@ class Fourier:
         return LEFT * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
 
     def finer(self) -> Fourier | None:
-        """The same on a section whose sides are `FINER` times shorter, None where that takes too many nodes."""
+        """Return the body on a section with sides `FINER` times shorter, None where that takes too many nodes."""
         by = self.finer_by * FINER
         section = sectioned(self.body, self.wave, by)
         return None if section is None else replace(self, section=section, finer_by=by)
 
     def note(self, sectors: Sequence[Sector]) -> str:
-        """How it was done."""
+        """Describe how the modes were found."""
         around = max((sector.place[0] for sector in sectors), default=0)
         return f"body of revolution, section of {self.section.nodes} nodes, up to {around} waves around"
 
 
 def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> Fourier | None:
-    """The method of a free body of revolution, its section fine enough for what is wanted; None where the shape is
-    none, its material not isotropic, or its walls so thin that it takes too many nodes.
+    """Return the method of a free body of revolution, its section fine enough for what is wanted.
+
+    None where the shape is no such body, its material not isotropic, or its walls so thin that it takes too many nodes.
     """
     body = rings.of_shape(shape) if polynomials.isotropic(tensor) else None
     if body is None:
@@ -168,8 +174,10 @@ def method_for(shape: Shape, length_m: float, tensor: Array, wanted: Wanted) -> 
 
 
 def _wave_number_of(count: int, body: Revolved, thickness: float) -> float:
-    """A wave number below which a body has at least ``count`` modes: bending ones of its wall [Courant & Hilbert 1924,
-    ch. VI.4], shear waves in its volume [Weyl 1912], or bending ones of its length, in pairs.
+    """Return a wave number below which a body has at least ``count`` modes.
+
+    Bending modes of its wall [Courant & Hilbert 1924, ch. VI.4], shear waves in its volume [Weyl 1912], or bending
+    modes of its length, in pairs.
     """
     wall = CURVED * np.sqrt(4 * np.pi * (count + 8) * thickness / body.volume_m3)
     bulk = (3 * np.pi**2 * (count + 8) / body.volume_m3) ** (1 / 3)

@@ -1,10 +1,10 @@
-"""Parts of a surface of revolution triangulated anyhow: their vertices are no rings, but lie on one curve of (r, z).
+"""Parts of a surface of revolution triangulated without rings: their vertices lie on one curve of (r, z).
 
     faces with a vertex in no ring, joined by such vertices -> a patch
     between two rings, between a ring and the axis -> sorted by r, or by z where the patch is steep
         -> one curve: it never turns back, and the faces lie along it
 
-A bottom with a square of quadrangles in its middle is one, or a wall that a mesher made.
+Examples: a bottom with a square of quadrangles in its middle, a wall that a mesher made.
 """
 
 from __future__ import annotations
@@ -21,8 +21,12 @@ APART = 0.4  # of the median edge: how far points of the curve lie apart
 
 
 class Patch(NamedTuple):
-    """ends: the rings, or a ring and the axis (-1), that it joins; curve (c, 2): (r, z) of points between, from the
-    first end on, on the axis the last.
+    """Part of a surface of revolution between two rings, or a ring and the axis.
+
+    Attributes
+    ----------
+    ends : the rings, -1 for the axis
+    curve : (c, 2) points (r, z) between, from the first end on; on the axis the last
     """
 
     ends: tuple[int, int]
@@ -30,8 +34,13 @@ class Patch(NamedTuple):
 
 
 def patches(point: Array, face: Array, ring: Array, middle: Array) -> list[Patch] | None:
-    """The patches of a surface about the z axis: point (v, 3), face (f, 3), ring (v,) of each vertex, -1 for none,
-    middle (k, 2) of the rings. None where one is no surface of revolution.
+    """Find the patches of a surface about the z axis, None where one is no surface of revolution.
+
+    Parameters
+    ----------
+    point, face : (v, 3), (f, 3)
+    ring : (v,) ring of each vertex, -1 for none
+    middle : (k, 2) of the rings
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

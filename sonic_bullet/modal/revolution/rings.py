@@ -1,4 +1,4 @@
-"""Which shapes are bodies of revolution: balls, cylinders and capsules by name, closed meshes by their rings.
+"""Recognition of bodies of revolution: balls, cylinders and capsules by name, closed meshes by their rings.
 
     vertices of one radius and height that go round without a wide gap -> a ring; one on the axis -> a pole
     vertices of no ring that lie on one curve (patches.py) -> that curve
@@ -35,8 +35,13 @@ ARC = 256  # sides of a half circle: its area to 5e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revolved:
-    """outline_m (p, 2) the section's polygon of (r, z), counter-clockwise, on the axis where r = 0; axes (3, 3) as
-    columns, the last the axis; centre_m (3,).
+    """A body of revolution.
+
+    Attributes
+    ----------
+    outline_m : (p, 2) polygon of (r, z), counter-clockwise, on the axis where r = 0
+    axes : (3, 3) as columns, the last the axis
+    centre_m : (3,)
     """
 
     outline_m: Array
@@ -45,25 +50,26 @@ class Revolved:
 
     @property
     def area_m2(self) -> float:
+        """Area of the section."""
         r, z = self.outline_m.T
         return float((r * np.roll(z, -1) - np.roll(r, -1) * z).sum() / 2)
 
     @property
     def volume_m3(self) -> float:
-        """Pappus."""
+        """Volume, by Pappus."""
         return float(_swept(self.outline_m).sum())
 
     @property
     def on_axis(self) -> Array:
-        """Which sides (p,) of the outline lie on the axis: the body goes on behind them."""
+        """Which sides (p,) of the outline lie on the axis: the body continues behind them."""
         r = self.outline_m[:, 0]
         return np.asarray((r == 0) & (np.roll(r, -1) == 0))
 
     def curvature_per_m(self, side: Array, at: Array) -> Array:
-        """Of the smooth outline (k,), positive where it bulges, at the part ``at`` (k,) of a side (k,).
+        """Compute the smooth outline's curvature (k,), positive where it bulges, at the part ``at`` (k,) of sides (k,).
 
-        A bend is an arc that begins half the shorter side before it and ends as far behind; a corner is none, and a
-        side that ends in one goes on as it is. On the axis the outline meets its mirror image.
+        A bend is an arc that begins half the shorter side before it and ends as far behind. A corner has none, and a
+        side that ends in one continues as it is. On the axis the outline meets its mirror image.
         """
         along = np.roll(self.outline_m, -1, axis=0) - self.outline_m
         length, heading = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
@@ -80,12 +86,12 @@ class Revolved:
         return np.asarray(np.where(smooth[mine], np.where(away < (0.5 + ROUND) * short[mine], arc[mine], 0), going_on))
 
     def scaled(self, factor: float) -> Revolved:
-        """The same outline, ``factor`` times as large; where the body lies is left as it is."""
+        """Return the outline scaled by ``factor``; axes and centre stay."""
         return Revolved(self.outline_m * factor, self.axes, self.centre_m)
 
 
 def turns(polygon: Array) -> Array:
-    """By how much (p,) in rad a closed polygon (p, 2) turns left at each corner."""
+    """Compute by how much (p,) in rad a closed polygon (p, 2) turns left at each corner."""
     along = np.roll(polygon, -1, axis=0) - polygon
     heading = np.arctan2(along[:, 1], along[:, 0])
     return _wrapped(heading - np.roll(heading, 1))
@@ -96,14 +102,14 @@ def _wrapped(angle: Array) -> Array:
 
 
 def _swept(polygon: Array) -> Array:
-    """What each side (p,) of a polygon adds to the volume it sweeps about the z axis."""
+    """Compute what each side (p,) of a polygon adds to the volume swept about the z axis."""
     r, z = polygon.T
     s, t = np.roll(r, -1), np.roll(z, -1)
     return np.asarray(np.pi / 3 * (r + s) * (r * t - s * z))
 
 
 def of_shape(shape: Shape) -> Revolved | None:
-    """The body of revolution that a named shape or a closed surface is, in the body's frame, else None."""
+    """Return the body of revolution that a named shape or a closed surface is, in the body's frame, else None."""
     turn = rotation(shape.quaternion_xyzw)
     if shape.kind == "mesh":
         found = recognised(shape.vertex_m, shape.face)
@@ -130,7 +136,7 @@ def _named(shape: Shape) -> Array | None:
 
 
 def recognised(vertex_m: Array, face: Array) -> Revolved | None:
-    """The body of revolution that a closed surface, outward, is, else None."""
+    """Recognise the body of revolution that a closed surface, outward, is, else return None."""
     used, face = np.unique(face, return_inverse=True)
     vertex_m, face = geometry.welded(vertex_m[used], face.reshape(-1, 3))
     if len(face) == 0 or not geometry.is_closed(face) or not geometry.volume_m3(vertex_m, face) > 0:
@@ -147,8 +153,9 @@ def recognised(vertex_m: Array, face: Array) -> Revolved | None:
 
 
 def _outline(point: Array, face: Array) -> Array | None:
-    """Polygon (p, 2), counter-clockwise, of the rings of a surface about the z axis; None where they are no rings or no
-    ring of rings.
+    """Return the polygon (p, 2), counter-clockwise, of the rings of a surface about the z axis.
+
+    None where there are no rings, or they make no closed outline.
     """
     diagonal = float(np.linalg.norm(np.ptp(point, axis=0)))
     ring, middle, filled = _rings(point, diagonal)
@@ -168,8 +175,10 @@ def _outline(point: Array, face: Array) -> Array | None:
 
 
 def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
-    """The ring (v,) of each vertex, -1 where it belongs to none, radius and height (k, 2) of each ring, 0 on the axis,
-    and how much (k,) of its disc the ring's polygon fills.
+    """Find the rings of a surface about the z axis.
+
+    Returns the ring (v,) of each vertex, -1 for none; radius and height (k, 2) of each ring, radius 0 on the axis; and
+    the fraction (k,) of its disc that the ring's polygon fills.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -203,9 +212,10 @@ def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
 def _sides(
     triple: Array, middle: Array, filled: Array, between: list[Patch]
 ) -> tuple[list[list[int]], Array, Array] | None:
-    """Neighbours of each ring along the outline, and the rings with all that is added to them: the points of patches
-    between, a pole for each flat end that has none; from the rings triple (f, 3) of the faces. None where poles do not
-    pair.
+    """Join the rings along the outline, from the rings triple (f, 3) of the faces; None where poles do not pair.
+
+    Returns the neighbours of each ring, and the rings with what is added to them: the points of patches between, and a
+    pole for each flat end that has none.
     """
     edge = np.unique(np.sort(np.concatenate([triple[:, [0, 1]], triple[:, [1, 2]], triple[:, [2, 0]]]), axis=1), axis=0)
     edge = edge[edge[:, 0] != edge[:, 1]]
@@ -246,7 +256,7 @@ def _sides(
 
 
 def _walked(side: list[list[int]]) -> list[int] | None:
-    """All rings in the order in which they are joined, None where that is no one closed walk."""
+    """Return all rings in the order in which they are joined, None where that is no single closed walk."""
     if len(side) < 3 or any(len(s) != 2 for s in side):
         return None
     walk, here = [0], side[0][0]

@@ -1,4 +1,4 @@
-"""The section of a body of revolution cut into curved cubic triangles, small where its wall is thin.
+"""Section of a body of revolution cut into curved cubic triangles, small where its wall is thin.
 
     size at the outline: of the wall's thickness t there, more away from corners, or of the shortest bending wave of t
     size inside: the least of size + slope x distance over the outline
@@ -27,18 +27,24 @@ CORNER = 0.15  # radians: a turn that is kept as a corner
 GROWTH = 0.5  # of size over distance
 MOST_NODES = 15_000  # three unknowns each: a second or two for each wave around
 
-MOST_DISTANCES = 10_000_000  # between points of a lattice and sides: where it takes more, walls are thin, and need none
+MOST_DISTANCES = (
+    10_000_000  # between points of a lattice and sides: where it takes more, walls are thin and need no lattice
+)
 
 WaveNumber = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """basis: scikit-fem's, cubic on curved triangles. rim_m (s, 3, 2): ends and middle of each side of the outline,
-    walked with the body on the left.
+    """Section meshed with cubic triangles.
 
-    dof (s, 4): unknowns of each side at its start, at thirds, at its end. on_axis (s,).
-    curvature (s,): of the smooth outline.
+    Attributes
+    ----------
+    basis : scikit-fem's, cubic on curved triangles
+    rim_m : (s, 3, 2) start, middle and end of each side of the outline, walked with the body on the left
+    dof : (s, 4) unknowns of each side at its start, at thirds, at its end
+    on_axis : (s,)
+    curvature : (s,) of the smooth outline
     """
 
     basis: Any
@@ -49,12 +55,14 @@ class Section:
 
     @property
     def nodes(self) -> int:
+        """Number of nodes."""
         return int(self.basis.N)
 
 
 def thickness(outline: Array) -> Array:
-    """Of the wall at the middle of each side (p,) of a closed polygon (p, 2), counter-clockwise: the way straight in to
-    the other side.
+    """Compute the wall at the middle of each side (p,) of a closed polygon (p, 2), counter-clockwise.
+
+    It is the distance straight in to the other side.
     """
     after = np.roll(outline, -1, axis=0)
     along = after - outline
@@ -71,8 +79,9 @@ def thickness(outline: Array) -> Array:
 
 
 def spread(start: float, length: Array, density: Array) -> Array:
-    """Places along a walk from ``start`` over pieces of length (k,), each with length x density of the intervals
-    between them; both ends are places.
+    """Return places along a walk from ``start`` over pieces of length (k,); both ends are places.
+
+    Each piece has length x density of the intervals between them.
     """
     filled = np.concatenate([[0], np.cumsum(length * density)])
     count = max(1, int(np.ceil(filled[-1] - 1e-9)))
@@ -82,8 +91,15 @@ def spread(start: float, length: Array, density: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outline:
-    """An outline in short pieces. point (k, 2); corner (k,): points that stay; size (k,): wanted at each piece; owner
-    (k,): the body's side that each piece is of; curvature (k,): of the smooth outline.
+    """An outline in short pieces.
+
+    Attributes
+    ----------
+    point : (k, 2)
+    corner : (k,) points that stay
+    size : (k,) wanted at each piece
+    owner : (k,) the body's side that each piece is of
+    curvature : (k,) of the smooth outline
     """
 
     point: Array
@@ -114,9 +130,7 @@ def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
 
 
 def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
-    """Ends (s, 2) and middles (s, 2) of sides of the wanted size along an outline, and its piece (s,) on which each
-    middle lies.
-    """
+    """Cut an outline into sides of the wanted size: ends (s, 2), middles (s, 2), and the piece (s,) of each middle."""
     outline, p = of.point, len(of.point)
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)
@@ -141,10 +155,16 @@ def _cut(of: _Outline, finer: float) -> tuple[Array, Array, Array]:
 
 
 def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Section | None:
-    """Section cut into triangles that follow walls and waves; wave_number: of walls of thickness (k,). finer: by how
-    much all are smaller.
+    """Cut the section into triangles that follow walls and waves.
 
-    None where the outline crosses itself, or where it takes more than `MOST_NODES`.
+    Parameters
+    ----------
+    wave_number : of walls of thickness (k,)
+    finer : factor by which all are smaller
+
+    Returns
+    -------
+    The section, None where the outline crosses itself or takes more than `MOST_NODES`.
     """
     outline = _measured(body, wave_number)
     for _ in range(4):
@@ -159,7 +179,7 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
 def _section(
     point: Array, triangle: Array, rim: Array, middle: Array, on_axis: Array, curvature: Array
 ) -> Section | None:
-    """Of triangles (t, 3) over point (n, 2), the rim's (s, 2) first, their sides there bent to its middles (s, 2)."""
+    """Make the section of triangles (t, 3) over point (n, 2), the rim's (s, 2) first, bent to its middles (s, 2)."""
     from skfem import Basis, ElementTriP3, MeshTri, MeshTri2
 
     plain = MeshTri(np.ascontiguousarray(point.T), np.ascontiguousarray(triangle.T))
@@ -182,8 +202,9 @@ def _section(
 
 
 def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
-    """Points (n, 2), the rim's first, and triangles (t, 3) inside a closed polygon rim (s, 2) with sides of about size
-    (s,); None where a side is missed.
+    """Fill a closed polygon rim (s, 2) with triangles (t, 3) of sides of about size (s,).
+
+    Returns points (n, 2), the rim's first, and triangles; None where a side is missed.
     """
     from scipy.spatial import Delaunay, QhullError
 

@@ -22,10 +22,13 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """The problems of all m on one section, as sparse matrices of the unknowns U, V, W of each node (3n) in the order
-    of their elimination. power: for each tensor K₀, K₁, K₂. axis (a,): nodes on the axis, by their place in the order.
+    """Problems of all m on one section: sparse matrices of U, V, W of each node (3n) in elimination order.
 
-    place (n,): where each of the basis' nodes stands in the order.
+    Attributes
+    ----------
+    power : for each tensor K₀, K₁, K₂
+    axis : (a,) nodes on the axis, by their place in the order
+    place : (n,) place of each of the basis' nodes in the order
     """
 
     power: tuple[tuple[Any, Any, Any], ...]
@@ -34,17 +37,17 @@ class Series:
     place: Array
 
     def problem(self, m: int) -> tuple[tuple[Any, ...], Any]:
-        """K of each tensor and M for wave number m, without the unknowns that the axis takes away."""
+        """Build K of each tensor and M for wave number m, without the unknowns that the axis removes."""
         free = self.free(m)
         stiff = tuple((free.T @ (k0 + m * k1 + m * m * k2) @ free).tocsr() for k0, k1, k2 in self.power)
         return stiff, (free.T @ self.mass @ free).tocsr()
 
     def whole(self, m: int, vector: Array) -> Array:
-        """Displacements (n, 3, b) U, V, W at the basis' nodes of vectors (f, b)."""
+        """Expand vectors (f, b) to displacements (n, 3, b) U, V, W at the basis' nodes."""
         return np.asarray((self.free(m) @ vector).reshape(len(self.place), 3, -1)[self.place])
 
     def free(self, m: int) -> Any:
-        """The map (3n, f) of all unknowns from the free ones."""
+        """Build the map (3n, f) of all unknowns from the free ones."""
         from scipy.sparse import csr_array, eye_array
 
         n = 3 * len(self.place)
@@ -57,7 +60,7 @@ class Series:
 
 
 def series(section: Section, tensors: list[Array]) -> Series:
-    """The problems on a section for isotropic tensors (6, 6) in order rr zz θθ zθ rθ rz, at density one."""
+    """Assemble the problems on a section for isotropic tensors (6, 6) in order rr zz θθ zθ rθ rz, at density one."""
     from scipy.sparse import csr_array
 
     from sonic_bullet.modal.sparse.ordering import dissection

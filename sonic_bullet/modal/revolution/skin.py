@@ -1,4 +1,4 @@
-"""The surface of a body of revolution and its displacements there: rows along the outline, times angles.
+"""Surface of a body of revolution and its displacements there: rows along the outline, times angles.
 
 Rows are the ends and the middles of parabolas, `PER_WAVE` to the shortest wave along the outline, `AROUND` to a wave
 around; each turns `BENT` at most. So a model holds about (2 · PER_WAVE · outline/λ) x (2 · AROUND · m) points of 12
@@ -25,9 +25,15 @@ CELLS = (24, 96)  # parabolas around, least and most
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """Circles of the surface. side, at (k,): place on a side of the outline. start (k,): first of the rows between two
-    poles that each is among. flat_m (k, 2): r and z. curvature (k,): mean of the principal ones. closed: none lies on
-    the axis.
+    """Circles of the surface.
+
+    Attributes
+    ----------
+    side, at : (k,) place on a side of the outline
+    start : (k,) first of the rows between two poles that each is among
+    flat_m : (k, 2) r and z
+    curvature : (k,) mean of the principal ones
+    closed : whether none lies on the axis
     """
 
     side: Array
@@ -39,7 +45,7 @@ class Rows:
 
 
 def rows(section: Section, wave: float) -> Rows:
-    """Circles that follow waves of length ``wave`` along the outline."""
+    """Place circles that follow waves of length ``wave`` along the outline."""
     s = len(section.dof)
     turn, on = np.abs(turns(section.rim_m[:, 0])), section.on_axis
     poles = np.flatnonzero(~on & np.roll(on, 1))
@@ -79,8 +85,10 @@ def rows(section: Section, wave: float) -> Rows:
 
 
 def surface(circles: Rows, cells: int) -> tuple[Array, Array, Array, Array]:
-    """Points (v, 3), triangles (f, 3), quarters of quadratic ones, outward, and their curvature (f,), of the surface
-    with ``cells`` parabolas round it; grid (v,): which of the circles' points, times angles, those are.
+    """Triangulate the surface with ``cells`` parabolas round it.
+
+    Returns points (v, 3); triangles (f, 3), quarters of quadratic ones, outward; their curvature (f,); and grid (v,),
+    the index of each point among the circles' points times angles.
     """
     k, a = len(circles.flat_m), 2 * cells
     pole = circles.flat_m[:, 0] == 0
@@ -106,13 +114,14 @@ def surface(circles: Rows, cells: int) -> tuple[Array, Array, Array, Array]:
 
 
 def angles(cells: int) -> Array:
-    """Angles (2·cells,) in rad about the axis at which the surface has its points."""
+    """Return the angles (2·cells,) in rad about the axis at which the surface has its points."""
     return np.arange(2 * cells) * np.pi / cells
 
 
 def displacements(section: Section, circles: Rows, vector: Array, m: int, cells: int) -> Array:
-    """Displacements (1 or 2, k·2·cells, 3, b) of vectors (n, 3, b), and of their partners where m > 0, on the circles
-    at all angles; ∫|u|² over the body is one where vᵀMv is.
+    """Compute displacements (1 or 2, k·2·cells, 3, b) of vectors (n, 3, b), and of their partners where m > 0.
+
+    They are on the circles at all angles; ∫|u|² over the body is one where vᵀMv is.
     """
     x = circles.at
     cubic = np.stack([(1 - x) * (1 - 3 * x) * (2 - 3 * x), 9 * x * (1 - x) * (2 - 3 * x)]) / 2

@@ -1,14 +1,14 @@
-"""Cholesky's factor of a sparse matrix in dense pieces, and what it is for: solutions of many right sides.
+"""Cholesky factor of a sparse matrix in dense blocks, for solutions of many right sides.
 
     A = L Lᵀ,  x = L⁻ᵀ L⁻¹ b
 
-Neighbouring columns of L that are alike below the diagonal are a supernode. Each gathers its columns of A and what its
-children in the elimination tree left, and leaves its own rest to its parent       [Duff & Reid 1983; Liu 1992, ch. 2-4]
+Neighbouring columns of L that are alike below the diagonal are a supernode. Each gathers its columns of A and the rest
+of its children in the elimination tree, and leaves its own rest to its parent   [Duff & Reid 1983; Liu 1992, ch. 2-4]
 
     [A₁₁ ·  ]    L₁₁ = chol(A₁₁),  L₂₁ = A₂₁ L₁₁⁻ᵀ,  left: A₂₂ − L₂₁ L₂₁ᵀ
     [A₂₁ A₂₂]
 
-SuperLU, which scipy has, stores and works off L and U entry by entry: four times the processor, twice the memory.
+SuperLU, which scipy has, stores and processes L and U entry by entry: four times the processor, twice the memory.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -24,7 +24,7 @@ from sonic_bullet.records.errors import ModalError
 
 
 class Supernode(NamedTuple):
-    """Columns of L from ``start`` on. root (w, w): L₁₁; below (r, w): L₂₁, whose rows are ``row`` (r,)."""
+    """Columns of L from ``start`` on: root (w, w) is L₁₁, below (r, w) is L₂₁, whose rows are ``row`` (r,)."""
 
     start: int
     row: Array
@@ -38,7 +38,7 @@ class Factor(NamedTuple):
     supernodes: list[Supernode]
 
     def solve(self, right: Array) -> Array:
-        """x (n, b) of A x = right."""
+        """Solve A x = right for x (n, b)."""
         from scipy.linalg.blas import dtrsm
 
         x = np.array(right, order="C")
@@ -54,8 +54,9 @@ class Factor(NamedTuple):
 
 
 def factorise(matrix: Any) -> Factor:
-    """The factor of a symmetric positive definite matrix, scipy sparse (n, n), in the order it comes in (ordering.py).
-    Raises ModalError where there is none.
+    """Factor a symmetric positive definite matrix, scipy sparse (n, n), in the order it comes in (ordering.py).
+
+    Raises ModalError where there is no factor.
     """
     from scipy.linalg import LinAlgError, cholesky
     from scipy.linalg.blas import dsyrk, dtrsm
@@ -93,8 +94,9 @@ def factorise(matrix: Any) -> Factor:
 
 
 def _supernodes(lower: Any) -> list[tuple[int, int, Array, int]]:
-    """Start and end of each supernode's columns, its rows below them, and its parent's number, -1: none; of the
-    triangle ``lower`` (csc).
+    """List each supernode's first and end column, its rows below them, and its parent's number, -1 for none.
+
+    lower: the triangle (csc).
     """
     start, row = lower.indptr, lower.indices
     size = len(start) - 1
@@ -133,7 +135,7 @@ def _supernodes(lower: Any) -> list[tuple[int, int, Array, int]]:
 
 @njit(nogil=True)
 def _packed(rest):
-    """Columns of a lower triangle (c, c), one after the other: half the memory."""
+    """Pack the columns of a lower triangle (c, c) one after the other: half the memory."""
     size = len(rest)
     made = np.empty(size * (size + 1) // 2)
     at = 0

@@ -1,6 +1,6 @@
-"""The order in which unknowns are eliminated: nested dissection by geometry.
+"""Order in which unknowns are eliminated: nested dissection by geometry.
 
-    cut the nodes in two by a plane, number both halves first and the nodes that part them last, and so on in each half
+    cut the nodes in two by a plane, number both halves first and the separating nodes last, and so on in each half
         [George 1973; Davis 2006, ch. 7.6]
 
 Against minimum degree it halves the time of the factor on chunky bodies and costs a few tenths of a second.
@@ -18,7 +18,7 @@ QUANTILES = (0.4, 0.45, 0.5, 0.55, 0.6)
 
 
 def _neighbours(tet: Array, n: int) -> tuple[Array, Array]:
-    """Graph of the nodes as CSR (start (n+1,), neighbour): nodes of one tetrahedron are neighbours."""
+    """Build the graph of the nodes as CSR (start (n+1,), neighbour): nodes of one tetrahedron are neighbours."""
     from scipy.sparse import csr_array
 
     width = tet.shape[1]
@@ -29,7 +29,7 @@ def _neighbours(tet: Array, n: int) -> tuple[Array, Array]:
 
 
 def _touching(nodes: Array, mask: Array, start: Array, neighbour: Array) -> Array:
-    """Which of ``nodes`` (k,) have a neighbour in ``mask`` (n,) bool."""
+    """Return which of ``nodes`` (k,) have a neighbour in ``mask`` (n,) bool."""
     first, length = start[nodes], start[nodes + 1] - start[nodes]
     ends = np.cumsum(length)
     flat = np.repeat(first - ends + length, length) + np.arange(ends[-1])
@@ -37,7 +37,7 @@ def _touching(nodes: Array, mask: Array, start: Array, neighbour: Array) -> Arra
 
 
 def dissection(node_m: Array, tet: Array) -> Array:
-    """Elimination order (n,) of the nodes node_m (n, 3) of a solid tet (t, k)."""
+    """Order the nodes node_m (n, 3) of a solid tet (t, k) for elimination: (n,)."""
     n = len(node_m)
     start, neighbour = _neighbours(tet, n)
     mask = np.zeros(n, bool)
