@@ -1,5 +1,5 @@
-"""How a body's modes radiate: what each is heard as at 1 m, and what that costs it.
+"""Radiation of a body's modes: the pressure of each at 1 m, and its radiation damping.
 
 ModalModel + Air -> entrained_mass (near field) -> far_field -> pressure weight, radiation damping
-    -> radiated: the same, kept
+    -> radiated: the same, cached
 """

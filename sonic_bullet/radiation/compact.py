@@ -1,4 +1,4 @@
-"""Which faces of a body sound, and the simpler law by which it radiates where its near field cannot be found."""
+"""Faces of a body that radiate, and the compact law, used where its near field cannot be computed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COMPACT = "radiates by the law of compact bodies: its surface is too involved fo
 
 
 def sound_faces(model: ModalModel) -> tuple[Array, Array]:
-    """Corners (f, 3, 3) and faces (f, 3), outward, that have an area and air beyond them: a cavity's sound stays in."""
+    """Return corners (f, 3, 3) and faces (f, 3), outward, with an area and air beyond: a cavity's sound stays in."""
     face = _outer(model.vertex_m, model.face) if len(model.face) else model.face
     corner = model.vertex_m[face]
     twice = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=-1)
@@ -20,7 +20,7 @@ def sound_faces(model: ModalModel) -> tuple[Array, Array]:
 
 
 def _outer(vertex_m: Array, face: Array) -> Array:
-    """Faces but for those of cavities, pieces that enclose a negative volume; turned where all look inward."""
+    """Remove the faces of cavities, pieces that enclose a negative volume; turn all faces where they look inward."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -37,13 +37,14 @@ def _outer(vertex_m: Array, face: Array) -> Array:
 
 
 def compact_weight(model: ModalModel, face: Array, area: Array, normal: Array, k: Array, air: Air) -> Array:
-    """Pressure weight (m,) of a body taken as a sphere of its area: the mean flow through faces (f, 3) as its monopole,
-    all else as its dipole.
+    """Compute the pressure weight (m,) of a body taken as a sphere of its area.
+
+    The mean flow through faces (f, 3) is its monopole, the rest its dipole.
 
         |p|² = (ρ₀c)²/4π [A₀ x²/(1 + x²) + (A - A₀) x⁴/(4 + x⁴)],  x = ka, a = √(S/4π), A = ∮v²dS, A₀ = (∮v dS)²/S
         [Pierce 1989, sec. 4-1, 4-2]
 
-    What it leaves out: modes of short waves, which cancel, are up to 20 dB too loud below coincidence.
+    Limit: modes of short waves, whose flow cancels, are up to 20 dB too loud below coincidence.
     """
     m, weight = model.mode_count, np.zeros(model.mode_count, complex)
     x2 = k**2 * area.sum() / (4 * np.pi)

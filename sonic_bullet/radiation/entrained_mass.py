@@ -1,5 +1,4 @@
-"""How far the air beside a vibrating surface goes along with it: the exterior Laplace problem, once a body, for all its
-modes.
+"""Air that moves with a vibrating surface: the exterior Laplace problem, once a body, for all its modes.
 
     Δφ = 0 outside, ∂φ/∂n = -v on the surface, φ → 0 far away;
         near field p = iωρ₀φ: φ is the length of air moved, times v
@@ -7,9 +6,9 @@ modes.
     (½ - K) φ = S v          S v = ∮ v/4πr dS,  K φ = ∮ φ ∂(1/4πr)/∂n_y dS            [Kress 1989, eq. 6.23]
     -D φ = (½ + K') v        their derivatives along n_x                              [Burton & Miller 1971, eq. 3.5]
 
-First plus β times second, β = √(S/4π): the first fixes the constant, the second what two sides of a thin wall do to
-each other, which the first alone loses. Triangles of constant φ and v, collocated at their centroids; all integrals in
-closed form: potential of a triangle [Wilton et al. 1984, eq. 5], solid angle [van Oosterom & Strackee 1983, eq. 8],
+First plus β times second, β = √(S/4π): the first fixes the constant. The second adds how two sides of a thin wall act
+on each other, which the first alone loses. Triangles of constant φ and v, collocated at their centroids; all integrals
+in closed form: potential of a triangle [Wilton et al. 1984, eq. 5], solid angle [van Oosterom & Strackee 1983, eq. 8],
 loop [Katz & Plotkin 2001, eq. 10.115]. f triangles, m modes.
 """
 
@@ -26,10 +25,13 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moved:
-    """The map v → φ of one surface, symmetric in √area: φ = Σ_j vector_j length_j (vector_j·v).
+    """Map v → φ of one surface, symmetric in √area: φ = Σ_j vector_j length_j (vector_j·v).
 
-    area_m2 (f,) of its triangles; length_m (f,) > 0: eigenvalues, ascending; vector (f, f): columns are eigenvectors,
-    of √area·v.
+    Attributes
+    ----------
+    area_m2 : (f,) of its triangles
+    length_m : (f,) > 0, eigenvalues, ascending
+    vector : (f, f) columns are eigenvectors, of √area·v
     """
 
     area_m2: Array
@@ -38,15 +40,16 @@ class Moved:
 
 
 MOST_UNEVEN, MOST_NEGATIVE = 0.4, 0.01
-"""Of what is found: its antisymmetric part over the whole, and its least eigenvalue over its greatest. Good panels
-have 0.03 to 0.33, thin discs most, and -0.005 at least; those that cross, touch or lie twice 0.4 and more, or -0.04."""
+"""Limits on the solution: its antisymmetric part over the whole, and its least eigenvalue over its greatest. Good
+panels have 0.03 to 0.33, thin discs most, and -0.005 at least; those that cross, touch or lie twice 0.4 and more, or
+-0.04."""
 
 
 def moved_air(corner_m: Array) -> Moved | None:
-    """Solve for triangles corner_m (f, 3, 3) of a closed surface, outward. Source: the module's equations.
+    """Solve the module's equations for triangles corner_m (f, 3, 3) of a closed surface, outward.
 
-    Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity and positive, as the energy of
-    the air is; discretised, nearly so. Where it is not, triangles cross, touch or lie twice, and there is none.
+    Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity and positive, as the energy of the
+    air is; discretised, nearly so. Where it is not, triangles cross, touch or lie twice, and None is returned.
     """
     twice = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     length = np.linalg.norm(twice, axis=1)
@@ -71,7 +74,7 @@ def moved_air(corner_m: Array) -> Moved | None:
 
 @njit(nogil=True)
 def _matrices(corner, normal, beta):
-    """½ - K - βD and S + β(½ + K'), both (f, f)."""
+    """Build ½ - K - βD and S + β(½ + K'), both (f, f)."""
     count = len(corner)
     left = np.empty((count, count))
     right = np.empty((count, count))

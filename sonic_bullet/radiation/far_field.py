@@ -1,9 +1,9 @@
-"""From modal velocity to pressure: a far-field map of each mode, and what radiating costs it.
+"""Far-field pressure of each mode from its modal velocity, and its radiation damping.
 
     p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS             at 1 m, v = φ·n for unit modal velocity
         [Pierce 1989, eq. 4-6.4, e^{iωt}]
     near field p_s = iωρ₀ ψ:  ψ = Σ_j e_j (e_j·v)/q_j
-        e_j, t_j: eigenvectors and -values of the air moved at k = 0, `added_mass`
+        e_j, t_j: eigenvectors and -values of the air moved at k = 0, `entrained_mass`
     q_j(k) = 1/L + √(κ_j² + (1/L + ik)²),  q_j(0) = 1/t_j
         its change with k; L the body's middle principal extent
     |p| = √<|p(r̂)|²>,  Δd = 2π <|p|²>/ρ₀c
@@ -14,11 +14,11 @@ at k → 0, where it is (l+1)/a, and to second order for k → ∞ (1/a + ik). O
 √(κ² - k²) [Cremer et al. 2005, eq. 6.26].
 
 The mean is a product Gauss rule in the body's principal frame, exact for bodies small by the wavelength; for large ones
-512 directions spread evenly. The weight is complex: size the mean over directions, phase that of the loud ones, each
-counted from the instant sound leaves the surface on that side: of <p² |p|¹⁶>, which sides of opposite signs share, with
-the sign of <p |p|¹⁶ e^{a·r̂}>, which tells them apart. Nothing here picks one direction, or one side of a body that is
-even: shapes that differ in their last bits radiate alike. A shape and its negative sound the same. v vertices, f faces,
-m modes, s patches, n directions in pairs ±r̂.
+512 directions spread evenly. The weight is complex. Its size is the mean over directions. Its phase is that of the loud
+directions, each counted from the instant sound leaves the surface on that side: of <p² |p|¹⁶>, which sides of opposite
+signs share, with the sign of <p |p|¹⁶ e^{a·r̂}>, which distinguishes them. No single direction decides, nor one side of
+a symmetric body: shapes that differ in their last bits radiate alike. A shape and its negative sound the same.
+v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -33,8 +33,8 @@ from sonic_bullet.records import Air, Array, ModalModel
 
 MOST_PATCHES = 1800
 MOST_TRIANGLES = (700, 850, 1000, 1200, 1400)
-"""Of the near field's mesh, one after the other until one has a near field: both sides of a wall thinner than its
-triangles' chords stray would cross. The last takes 2 s of processor."""
+"""Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
+its triangles' chords would cross. The last takes 2 s of processor."""
 LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
 EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
 LOUDER = 16  # power of |p| by which directions count: half of a plate's modes are within 2° of the loudest one's phase
@@ -43,16 +43,16 @@ SPREAD = 256  # directions, and their negatives, where even the most rings are t
 
 
 def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
-    """Pressure weight (m,) complex, in Pa·m per modal velocity (m/s·√kg), and radiation damping (m,) in 1/s.
+    """Compute pressure weight (m,) complex, in Pa·m per modal velocity (m/s·√kg), and radiation damping (m,) in 1/s.
 
-    Pressure at distance r is Re(weight·z)/r, z the modal state of `bank`. Zero for a model without a surface. Source:
-    the module's equations.
+    Pressure at distance r is Re(weight·z)/r, z the modal state of `bank`. Zero for a model without a surface.
+    Equations: the module's.
     """
     return radiation_and_note(model, air)[:2]
 
 
 def radiation_and_note(model: ModalModel, air: Air) -> tuple[Array, Array, str]:
-    """As `radiation`, and `COMPACT` where no near field could be found and the compact law stands for it, else ""."""
+    """Compute `radiation`, and a note: `COMPACT` where the compact law replaces the near field, else ""."""
     m = model.mode_count
     corner, face = sound_faces(model)
     if m == 0 or len(face) == 0:
@@ -103,14 +103,15 @@ def _damping(weight: Array, air: Air) -> Array:
 
 
 def _unit(number: Array) -> Array:
-    """Complex numbers over their sizes; 1 for zeros."""
+    """Divide complex numbers by their sizes; 1 for zeros."""
     size = np.abs(number)
     return np.where(size > 0, number / np.where(size > 0, size, 1), 1)
 
 
 def directions(rings: int) -> tuple[Array, Array]:
-    """Unit vectors (n, 3) of the upper half sphere and shares (n,), ½ in all: with their negatives exact to degree
-    2·rings - 1 [Stroud 1971, sec. 2.7].
+    """Return unit vectors (n, 3) of the upper half sphere and weights (n,), ½ in all.
+
+    With their negatives exact to degree 2·rings - 1 [Stroud 1971, sec. 2.7].
     """
     height, share = np.polynomial.legendre.leggauss(rings + rings % 2)
     height, share = height[height > 0], share[height > 0]
@@ -125,8 +126,9 @@ def directions(rings: int) -> tuple[Array, Array]:
 
 
 def spread_directions(count: int) -> tuple[Array, Array]:
-    """As `directions`, spread evenly along a spiral [Swinbank & Purser 2006, eq. 1-3]: no symmetry of a body
-    makes any of them superfluous.
+    """Return `directions` spread evenly along a spiral [Swinbank & Purser 2006, eq. 1-3].
+
+    No symmetry of a body makes any of them superfluous.
     """
     height = (np.arange(count) + 0.5) / count
     angle = np.pi * (np.sqrt(5) - 1) * np.arange(count)
@@ -135,9 +137,9 @@ def spread_directions(count: int) -> tuple[Array, Array]:
 
 
 def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
-    """Corners about the surface's centroid along its principal axes, longest first, and the rows of that frame (3, 3).
+    """Rotate corners about the surface's centroid to its principal axes, longest first; also return the frame (3, 3).
 
-    Axes point to where there is more motion (f,), summed over modes; where there is as much on both sides, within
+    Axes point to where there is more motion (f,), summed over modes. Where there is as much on both sides, within
     `EVEN`, their sense does not matter, and is that of the surface's moments alone.
     """
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
@@ -154,7 +156,7 @@ def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
 
 
 def _cells(point: Array, normal: Array, edge_m: float) -> Array:
-    """Number (p,) of the cell of edge edge_m and the side it faces (of six) in which each point lies."""
+    """Assign each point (p,) the number of its cell of edge edge_m and of the side it faces (of six)."""
     cell = np.floor((point - (point.min(axis=0) + point.max(axis=0)) / 2) / edge_m + 0.5).astype(np.int64)
     bias = normal * [1.0, 0.93, 0.87]  # no ties between sides
     axis = np.argmax(np.abs(bias), axis=1)
@@ -163,9 +165,9 @@ def _cells(point: Array, normal: Array, edge_m: float) -> Array:
 
 
 def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
-    """Patch (f,) of each face and place (s, 3) of each patch: its centroid.
+    """Return the patch (f,) of each face and the place (s, 3) of each patch: its centroid.
 
-    Neighbours that face the same side go together where there are too many.
+    Neighbours that face the same side are merged where there are too many.
     """
     centre = corner.mean(axis=1)
     patch = np.arange(len(area))
@@ -178,7 +180,7 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
 
 
 def _near(corner: Array, area: Array, normal: Array) -> tuple[Moved, Array] | None:
-    """Air moved by the body, and of each face (f,) the triangle of it that stands for it; None where none is found."""
+    """Compute the air moved by the body, and the triangle (f,) of it that represents each face; else None."""
     tried = 0
     for most in MOST_TRIANGLES:
         coarse, nearest = _near_mesh(corner, area, normal, most)
@@ -190,7 +192,7 @@ def _near(corner: Array, area: Array, normal: Array) -> tuple[Moved, Array] | No
 
 
 def _near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
-    """Triangles (c, 3, 3) for the near field, at most ``most``, and of each face (f,) the one that stands for it."""
+    """Build triangles (c, 3, 3) for the near field, at most ``most``, and the one (f,) that represents each face."""
     if len(corner) <= most:
         return corner, np.arange(len(corner))
     from scipy.spatial import cKDTree
@@ -232,8 +234,9 @@ def _near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Ar
 
 
 def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, nearest: Array) -> Array:
-    """ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m), each served by triangle nearest (f,) of
-    `moved`.
+    """Compute ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m).
+
+    nearest (f,): the triangle of `moved` that represents each face.
     """
     speed = (
         np.stack([np.bincount(nearest, one, len(moved.area_m2)) for one in flow.T], axis=1)
@@ -249,8 +252,9 @@ def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, neares
 def _moments(
     speed: Array, level: Array, corner: Array, area: Array, normal: Array, patch: Array, place: Array, out: Array
 ) -> None:
-    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ; speed (f, 3, m) at corners, level
-    ψ (f, m).
+    """Fill out (m, 7, s) with each patch's ∫ of v, v (x - place) + n Re ψ, n Im ψ.
+
+    speed (f, 3, m) at corners, level ψ (f, m).
     """
     arm = corner - place[patch][:, None]
     # ∫ v y over a triangle of linear v, y = area/12 (Σv Σy + Σvy)
@@ -269,8 +273,9 @@ def _moments(
 
 @njit(nogil=True, fastmath=True)
 def _map(k, moment, place, direction):
-    """Σ over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n), place (3, s), for directions (n, 3) and for their
-    negatives. Sums run in vectors: no order to keep.
+    """Sum over patches [v + ik r̂·(v y + n ψ)] e^{ik r̂·x} (m, n) for directions (n, 3) and for their negatives.
+
+    place (3, s). The order of the sums is free, so that they vectorise.
     """
     m, n = len(k), len(direction)
     ahead = np.empty((m, n), np.complex128)
@@ -318,10 +323,10 @@ def _map(k, moment, place, direction):
 
 
 def jerk_coefficient(volume_m3: float, air: Air) -> float:
-    """K = 3ρ₀V/(8πc) in Pa·m per m/s³: a rigid compact body's far pressure is K cosθ · jerk(t - r/c)/r [Chadwick,
-    Zheng, James 2012, eq. 9].
+    """Compute K = 3ρ₀V/(8πc) in Pa·m per m/s³.
 
-    θ from the jerk to the listener. The sphere's own law at small ka: displaced air and half as much again as added
-    mass [Pierce 1989, sec. 4-2].
+    A rigid compact body's far pressure is K cosθ · jerk(t - r/c)/r [Chadwick, Zheng, James 2012, eq. 9], θ from the
+    jerk to the listener. It is the sphere's law at small ka: displaced air and half as much again as added mass [Pierce
+    1989, sec. 4-2].
     """
     return 3 * air.density_kg_m3 * volume_m3 / (8 * np.pi * air.sound_speed_m_s)

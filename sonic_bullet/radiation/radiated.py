@@ -1,5 +1,4 @@
-"""How a body's modes radiate, computed once: the first scene with a model waits a second or two for it, the next ones
-do not.
+"""Cache of the radiation of a body's modes: the first scene with a model takes a second or two, the next none.
 
 sha256(frequencies, shapes, surface, air, source text of radiation.far_field) -> weight, Δd in the cache that keeps the
 models themselves
@@ -24,21 +23,21 @@ PACKAGES = ("numpy", "scipy", "numba")
 
 
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:
-    """`radiation.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
+    """Compute `radiation.far_field.radiation` of a model: pressure weight (m,) complex and radiation damping (m,).
 
-    Bodies that share a model share it (models are compared by identity). cache: folder, "default" or None.
+    Bodies that share a model share the result (models are compared by identity). cache: folder, "default" or None.
     """
     return radiation_and_note(model, air, cache)[:2]
 
 
 def radiation_note(model: ModalModel, air: Air, cache: store.Place = "default") -> str:
-    """By which simpler law a model radiates, where it does, else ""."""
+    """Name the simpler law by which a model radiates, where it does, else return ""."""
     return radiation_and_note(model, air, cache)[2]
 
 
 @WhileAlive
 def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array, str]:
-    """`radiation.far_field.radiation_and_note` of a model, kept; as `radiation_of`."""
+    """Compute `radiation.far_field.radiation_and_note` of a model, cached as by `radiation_of`."""
     m = model.mode_count
     if m == 0 or len(model.face) == 0:
         return radiation.radiation_and_note(model, air)
@@ -61,7 +60,7 @@ def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "defaul
 
 
 def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array, str] | None:
-    """What was kept, where it is of as many modes and all of it is a number."""
+    """Return the cached result where it has as many modes and is finite."""
     if found is None or len(found[0]["real"]) != m or not all(np.isfinite(value).all() for value in found[0].values()):
         return None
     a = found[0]
