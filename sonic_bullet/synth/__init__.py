@@ -1,6 +1,4 @@
-"""Arrays in, arrays out, state explicit: loads become strikes and rubbing, forces become modal motion, motion becomes
-pressure.
+"""Compiled synthesis with explicit state: loads become strikes and friction, forces modal motion, motion pressure.
 
-strikes, pulse: what an impact is | surface_kernel, profile: rolling and sliding | bank: the modes | path: to the
-microphone
+strikes, pulse: impacts | surface_kernel, profile: rolling and sliding | bank: the modes | path: to the microphone
 """

@@ -16,18 +16,19 @@ class Clock(NamedTuple):
 
     @property
     def time_s(self) -> float:
+        """Time in seconds."""
         return self.ticks / self.per_second
 
     def sample(self, sr: int) -> int:
-        """First sample of the step."""
+        """Return the first sample of the step."""
         return self.ticks * sr // self.per_second
 
     def offset(self, sr: int) -> float:
-        """Where the first sample lies beside the step's start, in samples: 0 or before it."""
+        """Return the first sample's position relative to the step's start, in samples: 0 or before it."""
         return -(self.ticks * sr % self.per_second) / self.per_second
 
     def after(self, dt_s: float) -> Clock:
-        """The clock one step later."""
+        """Return the clock one step later."""
         step = exact_step(dt_s)
         ticks, per_second = step.numerator, step.denominator
         if per_second == self.per_second:
@@ -38,6 +39,6 @@ class Clock(NamedTuple):
 
 @lru_cache(maxsize=64)
 def exact_step(dt_s: float) -> Fraction:
-    """The ratio that a step was meant to be (1/240), where the double is its nearest; else the double itself."""
+    """Return the ratio that a step was meant to be (1/240), where the double is its nearest; else the double itself."""
     near = Fraction(dt_s).limit_denominator(1_000_000)
     return near if float(near) == dt_s else Fraction(dt_s)

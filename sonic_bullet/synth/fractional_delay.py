@@ -1,4 +1,4 @@
-"""What a moving point emits and what is read off its history between the samples, eight samples at a time.
+"""Emission of a moving point and its fractionally delayed arrival, eight samples at a time.
 
     emitted at sample m:   a[m] = (s[m] + n̂·j[m])/r[m],  arriving at m + D[m], D = r sr/c
     heard at sample n:     a(u), where u + D(u) = n, D linear between samples: m + D[m] ≤ n < m + 1 + D[m + 1],
@@ -6,9 +6,9 @@
     a(u) = Σ_k a[k] h(u - k),  h: 16 taps of a Kaiser-windowed sinc
         [Laakso et al. 1996, IEEE SPM 13(1), sec. 3.2]
 
-Taps as polynomials in the fraction [Farrow 1988]. Each lane is one sample, and what it gives hangs on that sample
+Taps are polynomials in the fraction [Farrow 1988]. Each lane is one sample, and its result depends on that sample
 alone: groups may begin anywhere. Samples of equal fraction share their taps (a body that stands still), with the same
-bits as if each had made its own.
+bits as if each had computed its own.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -39,15 +39,15 @@ overtaken by its own sound.
 INFINITE = 0x7FF << 52
 """Bits of the double that is infinite; those of a NaN are above."""
 KEPT = (TAPS + 1) * LANES
-"""Doubles that `read` is lent: the taps it made last, a vector each, and the fraction they belong to."""
+"""Doubles of scratch that `read` uses: the taps it made last, a vector each, and the fraction they belong to."""
 
 
 @lru_cache(maxsize=1)
 def tap_polynomials() -> Array:
-    """(HALF_DEGREE + 1, 2, 8): of taps 0 … 7 the even and the odd part in t = fraction - ½, as polynomials in t²,
-    lowest power first.
+    """Fit polynomials in t², t = fraction - ½, lowest power first, to the even and odd parts of taps 0 … 7.
 
-    Tap k weighs sample floor(u) - 7 + k; tap 15 - k at t is tap k at -t: h = even ± t·odd serves both. Fitted to 1e-8.
+    Shape (HALF_DEGREE + 1, 2, 8). Tap k weighs sample floor(u) - 7 + k; tap 15 - k at t is tap k at -t: h = even ±
+    t·odd serves both. Fitted to 1e-8.
     """
     t = 0.5 * np.cos(np.pi * (np.arange(64) + 0.5) / 64)
     distance = np.arange(TAPS) - (AHEAD - 1) - (t[:, None] + 0.5)
@@ -64,7 +64,7 @@ def tap_polynomials() -> Array:
 
 
 def _called(e: Emit, name: str, kind: Any, *values: Value) -> Value:
-    """A function of LLVM's own."""
+    """Call an LLVM intrinsic."""
     declared = ir.FunctionType(kind, [value.type for value in values])
     return e.builder.call(cgutils.get_or_insert_function(e.builder.module, declared, name), values)
 
@@ -74,14 +74,14 @@ def _greater(e: Emit, a: Value, b: Value) -> Value:
 
 
 def _all(e: Emit, lanes: Value) -> Value:
-    """Whether the condition holds in all lanes."""
+    """Test whether the condition holds in all lanes."""
     bits = e.builder.bitcast(lanes, ir.IntType(LANES))
     return e.builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(LANES), 2**LANES - 1))
 
 
 @intrinsic
 def move(typingctx, values, start, memory, at, count):
-    """memory[at:][:count] = values[start:][:count], without a look at wrapped indices."""
+    """Copy memory[at:][:count] = values[start:][:count] without a check for wrapped indices."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -94,7 +94,7 @@ def move(typingctx, values, start, memory, at, count):
 
 @intrinsic
 def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
-    """Greatest magnitude of ``count`` values of a source and its push's three axes, as the bits of a double:
+    """Find the greatest magnitude of ``count`` values of a source and its three rigid axes, as the bits of a double.
 
     0 where all are zero, from INFINITE on where one is not finite. Arrays as in `emit`.
     """
@@ -135,7 +135,7 @@ def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
 
 @intrinsic
 def clear(typingctx, out, at, count):
-    """out[at:][:count] = 0."""
+    """Set out[at:][:count] = 0."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -147,7 +147,7 @@ def clear(typingctx, out, at, count):
 
 
 def _each(e: Emit, count: Value, body: Any) -> None:
-    """body(k, load, store, one) for whole groups of 8 and then for the others; ``one``: a number in all lanes."""
+    """Run body(k, load, store, one) for whole groups of 8 and then for the rest; ``one`` puts a number in all lanes."""
     b = e.builder
     whole = b.and_(count, e.index(-LANES))
 
@@ -170,7 +170,7 @@ def _each(e: Emit, count: Value, body: Any) -> None:
 
 @intrinsic
 def add(typingctx, values, out, at, count):
-    """out[at:][:count] += values[:count]."""
+    """Add out[at:][:count] += values[:count]."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -188,7 +188,7 @@ def add(typingctx, values, out, at, count):
 
 @intrinsic
 def flush(typingctx, out, at, count):
-    """0 for each of out[at:][:count] below FLUSH: they have no meaning in pascal, and their float32 is subnormal."""
+    """Set values of out[at:][:count] below FLUSH to 0: they mean nothing in pascal, and are subnormal as float32."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -211,12 +211,15 @@ def flush(typingctx, out, at, count):
 def emit(
     typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before
 ):
-    """a and D of ``count`` samples into emitted and delay, whole groups of 8. 0 where no delay falls by more than
-    MOST_FALL from one to the next, ``before``: the delay before them.
+    """Compute a and D of ``count`` samples into emitted and delay, whole groups of 8.
 
-    source, pushed, x: arrays of any shape from element source_at … on, the push's axes ``stride`` elements apart.
-    tail: (5, 8) flat, source, push and x after the last whole group. geometry (8,): microphone - start, end - start
-    (m), samples per metre, 1/radius.
+    Returns 0 where no delay falls by more than MOST_FALL from one to the next; ``before`` is the delay before them.
+
+    Parameters
+    ----------
+    source, pushed, x : arrays of any shape from element source_at … on, the axes of pushed ``stride`` elements apart
+    tail : (5, 8) flat, source, pushed and x after the last whole group
+    geometry : (8,) microphone - start, end - start (m), samples per metre, 1/radius
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -263,7 +266,7 @@ def emit(
 
 @intrinsic
 def leading(typingctx, memory, late_at, gone):
-    """How many of eight samples n, n + 1, … hear m, m + 1, …, one sample of the history each.
+    """Count how many of eight samples n, n + 1, … read m, m + 1, …, one sample of the history each.
 
     memory[late_at + k]: D[m + k], gone: m - n.
     """
@@ -285,9 +288,9 @@ def leading(typingctx, memory, late_at, gone):
 
 @intrinsic
 def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed, at):
-    """Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into observed[at …], memory[ring_at + k]: a[m - 7 + k].
+    """Write Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into observed[at …].
 
-    kept (KEPT,): taps of the samples before, NaN at first.
+    memory[ring_at + k]: a[m - 7 + k]. kept (KEPT,): taps of the samples before, NaN at first.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -300,7 +303,7 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed, at):
         first, last = range(AHEAD), [TAPS - 1 - k for k in range(AHEAD)]
 
         def summed(weights: Any) -> Value:
-            """Both halves from the outer taps to the inner; each weight is asked for once, in this order."""
+            """Sum both halves from the outer taps to the inner; each weight is asked for once, in this order."""
             total: list[Value | None] = [None, None]
             for low, high in zip(first, last, strict=True):
                 for half, tap in enumerate((low, high)):

@@ -1,4 +1,4 @@
-"""From bodies to microphones through free air: travel time, 1/r, and the direction of a rigid body's push.
+"""Sound path from bodies to microphones in free air: travel time, 1/r, and the direction of rigid-body pressure.
 
     p[c](t) = Σ_b (s_b + n̂·j_b)(t_e) / r,   t_e + r(t_e)/c = t
         [Pierce 1989, sec. 4-3 (monopole), Chadwick, Zheng, James 2012, eq. 9]
@@ -6,11 +6,11 @@
 s_b: pressure at 1 m (Pa·m) of the body's modes, j_b: that of the rigid body along each axis (Pa·m; K times its jerk),
 n̂ and r from the body to the microphone when the sound left (t_e), so a moving body's Doppler shift is exact: 1/(1 +
 v/c). r is never below the body's radius, and the travel time never below 8 samples (5.7 cm at 48 kHz), half the
-interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample depends on absolute time alone: any way
-of cutting the calls gives the same bits. A body moved by hand emits from its old place and its new one, fading over
-the step: no click and no chirp.
+interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample depends on absolute time alone: any split
+into calls gives the same bits. A teleported body emits from its old place and its new one, crossfaded over the step: no
+click and no chirp.
 
-The work is done by `path_kernel.hear` on the state's tables; here they are made and lengthened.
+`path_kernel.hear` does the work on the state's tables; this module makes and lengthens them.
 b bodies, c microphones, n samples, t places.
 """
 
@@ -39,7 +39,7 @@ _SHORTEST = 1024
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """What does not change: microphone_m (c, 3)."""
+    """Constants of the sound path; microphone_m (c, 3)."""
 
     sr: int
     air: Air
@@ -53,8 +53,13 @@ class Path:
 
 @dataclass(slots=True, eq=False)
 class PathState:
-    """Sound under way. at: the next sample. sources (b,) SOURCE, places (t,) PLACE, lines (t·c,) LINE and their memory:
-    see path_places; `hear` changes them in place. Those that `grow` has lengthened are new arrays.
+    """Sound under way.
+
+    Attributes
+    ----------
+    at : the next sample
+    sources, places, lines : (b,) SOURCE, (t,) PLACE, (t·c,) LINE, see path_places; `hear` changes them in place
+    memory : histories of the lines; arrays that `grow` has lengthened are new ones
     """
 
     at: int
@@ -64,7 +69,7 @@ class PathState:
     memory: Array
 
     def copy(self) -> PathState:
-        """A state of its own: propagating one leaves the other."""
+        """Return an independent copy: propagating one leaves the other."""
         arrays: dict[str, Any] = {
             field.name: getattr(self, field.name).copy() for field in fields(self) if field.name != "at"
         }
@@ -72,7 +77,7 @@ class PathState:
 
 
 def empty_path(sr: int, air: Air, microphone_m: Array, at: int = 0) -> tuple[Path, PathState]:
-    """A path without bodies to microphones (c, 3), and its state at absolute sample ``at``.
+    """Build a path without bodies to microphones (c, 3), and its state at absolute sample ``at``.
 
     Raises AudioError on a bad rate or place.
     """
@@ -86,8 +91,9 @@ def empty_path(sr: int, air: Air, microphone_m: Array, at: int = 0) -> tuple[Pat
 
 
 def append_bodies(path: Path, state: PathState, radius_m: Array) -> tuple[Path, PathState]:
-    """Path and state with further bodies (k,), a place each; what is under way goes on unchanged. The old pair stays
-    usable.
+    """Return path and state with further bodies (k,), a place each; sound under way continues unchanged.
+
+    The old pair stays usable.
     """
     radius = np.array(radius_m, float).ravel()
     if not np.isfinite(radius).all():
@@ -104,8 +110,9 @@ def append_bodies(path: Path, state: PathState, radius_m: Array) -> tuple[Path, 
 
 
 def subset(path: Path, state: PathState, keep: Array) -> PathState:
-    """The state with the bodies (k,) of ascending numbers alone, whose sound goes on unchanged, bit by bit. The others
-    must be `silent`. The old state stays usable.
+    """Return the state with only the bodies ``keep`` (k,), ascending; their sound continues unchanged, bit by bit.
+
+    The others must be `silent`. The old state stays usable.
     """
     number, place = np.full(len(state.sources) + 1, -1), np.full(len(state.places) + 1, -1)  # and of -1, at the end
     number[keep] = np.arange(len(keep))
@@ -124,7 +131,7 @@ def subset(path: Path, state: PathState, keep: Array) -> PathState:
 
 
 def silent(path: Path, state: PathState) -> Array:
-    """(b,) whether no sound of a body is under way."""
+    """Return (b,) whether no sound of a body is under way."""
     awake = (state.lines["awake"].reshape(len(state.places), len(path.microphone_m)) != 0).any(axis=1)
     quiet = np.ones(len(state.sources), bool)
     quiet[state.places["body"][awake]] = False
@@ -132,7 +139,7 @@ def silent(path: Path, state: PathState) -> Array:
 
 
 def grow(path: Path, state: PathState, status: int) -> None:
-    """Lengthen the tables after `hear` has said PLACES_SHORT or MEMORY_SHORT. Raises AudioError for what cannot be."""
+    """Lengthen the tables after `hear` has returned PLACES_SHORT or MEMORY_SHORT. Raises AudioError otherwise."""
     if status == PLACES_SHORT:
         _add_places(path, state, len(state.sources))
     elif status == MEMORY_SHORT:
@@ -155,12 +162,12 @@ def grow(path: Path, state: PathState, status: int) -> None:
 
 
 def _stride(size: Array) -> Array:
-    """Numbers that a line remembers."""
+    """Return the numbers that a line stores."""
     return np.asarray(2 * (size + MIRRORED))
 
 
 def _add_places(path: Path, state: PathState, count: int) -> None:
-    """Further places, free and asleep."""
+    """Add places, free and asleep."""
     channels = len(path.microphone_m)
     new = np.zeros(count, PLACE)
     new["body"], new["next"], new["size"] = -1, -1, _SHORTEST
@@ -172,7 +179,7 @@ def _add_places(path: Path, state: PathState, count: int) -> None:
 
 
 def _resize(path: Path, state: PathState, size: Array) -> None:
-    """Give each place as many samples; what is remembered stays where absolute time has it."""
+    """Give each place as many samples; histories stay where absolute time has them."""
     channels, places, former = len(path.microphone_m), state.places, state.memory
     each = channels * _stride(size)
     begins = np.cumsum(each) - each

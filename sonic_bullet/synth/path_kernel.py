@@ -1,12 +1,12 @@
-"""The sound path of one step, or a part of it, as one compiled call: `hear`.
+"""Sound path of one step, or a part of it, as one compiled call: `hear`.
 
-    source, push, poses -> is each number finite, does every history reach far enough?  (`path_places.survey`: nothing
+    source, pushed, poses -> is each number finite, does every history reach far enough?  (`path_places.survey`: nothing
         has changed so far)
-      -> a body moved by hand gets a new place, its old one fades out over the step
+      -> a teleported body gets a new place, its old one fades out over the step
       -> each body's places, by when it came there, and microphones: emitted (`fractional_delay.emit`) -> histories
       -> what arrives (`fractional_delay.read`), summed in this order -> out
 
-A line sleeps until something is emitted and again when the last of it has arrived; that is decided sample by sample, so
+A line sleeps until something is emitted and again when the last of it has arrived. That is decided sample by sample, so
 frames do not matter.
 """
 
@@ -36,12 +36,12 @@ from sonic_bullet.synth.vector import LANES
 _HISTORY = 3 * AHEAD
 _SPAN = BLOCK + LANES
 WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
-"""Doubles that `hear` is lent."""
+"""Doubles of scratch that `hear` uses."""
 
 
 @njit(nogil=True, error_model="numpy")
 def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
-    """The last of emitted[start:stop] that is not zero; ``none`` where all are."""
+    """Find the last of emitted[start:stop] that is not zero; ``none`` where all are."""
     i = stop - 1
     while i >= start and emitted[i] == 0.0:
         i -= 1
@@ -50,7 +50,7 @@ def _newest(emitted, start, stop, none):  # pragma: no cover - compiled
 
 @njit(nogil=True, error_model="numpy")
 def _last(emitted, i, stop, newest, behind):  # pragma: no cover - compiled
-    """The first sample from i on at which the newest that is not zero has arrived, ``stop`` for none of them.
+    """Find the first sample from i on at which the newest that is not zero has arrived, ``stop`` for none.
 
     behind: from a sample to the first that it is read from.
     """
@@ -66,7 +66,7 @@ def _last(emitted, i, stop, newest, behind):  # pragma: no cover - compiled
 def _remember(
     memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep
 ):  # pragma: no cover - compiled
-    """Samples at + start … at + n - 1, which lie in one piece, into a line's history.
+    """Write samples at + start … at + n - 1, which lie in one piece, into a line's history.
 
     before: the delay before them; steep: delays fall faster than MOST_FALL.
     """
@@ -86,7 +86,7 @@ def _remember(
 
 @njit(nogil=True, error_model="numpy")
 def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compiled
-    """Nothing was emitted before sample n, with that delay."""
+    """Fill the history before sample n with silence at that delay."""
     for k in range(n - _HISTORY, n):
         place = k & mask
         memory[ring_at + place], memory[late_at + place] = 0.0, late
@@ -98,7 +98,7 @@ def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compil
 def _listen(
     line, at, n, emitted, delay, observed, memory, ring_at, mask, taps, kept, steep
 ):  # pragma: no cover - compiled
-    """Run one line over emitted (n,); what arrives into observed (n,). False where nothing does.
+    """Run one line over emitted (n,) and write its arrivals into observed (n,). False where nothing arrives.
 
     Samples count from ``at`` in here: i, m, newest.
     """
@@ -155,10 +155,10 @@ def _listen(
 
 @njit(nogil=True, error_model="numpy")
 def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):  # pragma: no cover - compiled
-    """a and D of body b as `fractional_delay.emit` has them, and its fade: 0 none, 1 in, -1 out, 2 nothing any more.
-    Whether delays fall fast.
+    """Compute a and D of body b as `fractional_delay.emit`, faded; return whether delays fall fast.
 
-    tail (5·LANES,): lent, for the samples after the last whole group.
+    fade: 0 none, 1 in, -1 out, 2 silent from now on. tail (5·LANES,): scratch for the samples after the last whole
+    group.
     """
     whole, long = n & -LANES, source.shape[1]
     for k in range(n - whole):
@@ -179,13 +179,20 @@ def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):
 @njit(nogil=True, error_model="numpy")
 def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, samples_per_m,
          sources, places, lines, memory, taps, work, out, out_at, apart=0):  # fmt: skip  # pragma: no cover - compiled
-    """Pressure (Pa) at samples at … at + n - 1 of the step into out (c, ≥ out_at + n) from column out_at on.
+    """Compute the pressure (Pa) at samples at … at + n - 1 of the step into out (c, ·) from column out_at on.
 
-    source (≥ b, ·) in Pa·m, pushed (≥ b, 3, ·) in Pa·m along each axis, x (·): where between the step's ends each
-    sample lies, 0 … 1; all three from column ``first`` on. begin_m, end_m (≥ b, 3), teleported (≥ b,): moved by hand.
-    step ≥ 0: number of the step these samples are (part of). sources (b,) SOURCE, places (t,) PLACE, lines (t·c,) LINE,
-    memory: what is under way, changed in place. taps: `tap_polynomials`. work (WORK,): lent. Bodies are summed in
-    order; below 1e-30 Pa: 0. apart 1: they are not summed, and out is (b·c, …), body by body.
+    Bodies are summed in order; below 1e-30 Pa: 0. Returns DONE, or what is in the way (`path_places`).
+
+    Parameters
+    ----------
+    source, pushed : (≥ b, ·) in Pa·m, (≥ b, 3, ·) in Pa·m along each axis, from column ``first`` on
+    x : (·) position of each sample between the step's ends, 0 … 1, from column ``first`` on
+    begin_m, end_m, teleported : (≥ b, 3), (≥ b, 3), (≥ b,)
+    step : ≥ 0, number of the step that these samples are (part of)
+    sources, places, lines, memory : (b,) SOURCE, (t,) PLACE, (t·c,) LINE and histories, changed in place
+    taps : `tap_polynomials`
+    work : (WORK,) scratch
+    apart : 1: bodies are not summed, and out is (b·c, …), body by body
     """
     source, pushed, begin_m, end_m = borrowed(source), borrowed(pushed), borrowed(begin_m), borrowed(end_m)
     sources, places, lines, memory = borrowed(sources), borrowed(places), borrowed(lines), borrowed(memory)

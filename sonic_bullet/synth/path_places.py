@@ -1,10 +1,9 @@
-"""Where bodies are and were, and whether what they emit can be taken in: the sound path's tables.
+"""Tables of the sound path: where bodies are and were, and whether their emission can be stored.
 
-A body has a chain of places, by when it came there: its present position is the last, and those before it, which it was
-moved away from by hand, stay until the last of their sound has arrived. A line is one place and one microphone, line
-place·channels + c. Its history lies in memory from place.memory_at + c·2·(size + MIRRORED) on: emitted, then delays,
-both rings of a power of two with their first MIRRORED elements once more at their ends, so that what is read is always
-contiguous.
+A body has a chain of places, by when it came there. Its present position is the last. Those before it, from which it
+was teleported, stay until the last of their sound has arrived. A line is one place and one microphone, line place·
+channels + c. Its history lies in memory from place.memory_at + c·2·(size + MIRRORED) on: emitted, then delays, both
+rings of a power of two with their first MIRRORED elements repeated at their ends, so that reads are always contiguous.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -17,7 +16,7 @@ from sonic_bullet.synth.fractional_delay import INFINITE, TAPS, greatest
 from sonic_bullet.synth.vector import LANES
 
 DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
-"""What `hear` says. But for DONE nothing has changed. After MEMORY_SHORT (a place's size is below its need) and
+"""Results of `hear`. But for DONE nothing has changed. After MEMORY_SHORT (a place's size is below its need) and
 PLACES_SHORT (one more a body are enough) it may be called again with longer tables: `path.grow`.
 """
 
@@ -25,7 +24,7 @@ FARTHEST_M = 1000.0
 BLOCK = 256
 MIRRORED = TAPS + LANES
 MARGIN = BLOCK + 64
-"""Samples remembered beyond the longest delay: a block is emitted before any of it is listened to."""
+"""Samples remembered beyond the longest delay: a block is emitted before any of it is read."""
 
 SOURCE = np.dtype(
     [
@@ -33,14 +32,14 @@ SOURCE = np.dtype(
         ("oldest", "i8"),  # place: the first of its chain
         ("main", "i8"),  # its present place, the last of the chain
         ("leaving", "i8"),  # the place it left in step ``left``; -1: none
-        ("left", "i8"),  # step in which it was last moved by hand; -1: none
+        ("left", "i8"),  # step in which it was last teleported; -1: none
         ("sounds", "i8"),  # 1: emits something in this call
         ("fresh", "i8"),  # place it gets in this call; -1: none
         ("away_m", "f8"),  # where `hear` says TOO_FAR: from the farthest microphone; else 0
     ],
     align=True,
 )
-"""A body that sounds."""
+"""A body that emits sound."""
 
 PLACE = np.dtype(
     [
@@ -53,7 +52,7 @@ PLACE = np.dtype(
     ],
     align=True,
 )
-"""A body's present position or one that it was moved away from."""
+"""A body's present position or one from which it was teleported."""
 
 LINE = np.dtype([("awake", "i8"), ("cursor", "i8"), ("newest", "i8")], align=True)
 """awake: sound is under way; cursor: the emitted sample arrived last; newest: the last emitted that is not zero."""
@@ -61,7 +60,7 @@ LINE = np.dtype([("awake", "i8"), ("cursor", "i8"), ("newest", "i8")], align=Tru
 
 @njit(nogil=True, error_model="numpy")
 def _awake(lines, place, channels):  # pragma: no cover - compiled
-    """Whether sound of the place is under way to any microphone."""
+    """Test whether sound of the place is under way to any microphone."""
     line, stop = place * channels, (place + 1) * channels
     while line < stop and lines[line].awake == 0:
         line += 1
@@ -70,7 +69,7 @@ def _awake(lines, place, channels):  # pragma: no cover - compiled
 
 @njit(nogil=True, error_model="numpy")
 def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
-    """DONE, or what is wrong with a place that sounds at a distance of such a square."""
+    """Return DONE, or what is wrong with a place that emits at the distance √square."""
     away_m = np.sqrt(square)
     if not away_m < np.inf:
         return NOT_FINITE
@@ -86,7 +85,7 @@ def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
 
 @njit(nogil=True, error_model="numpy")
 def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover - compiled
-    """The next place from p on that nothing is heard from and no body needs; the number of places for none."""
+    """Find the next place from p on that no sound comes from and no body needs; the number of places for none."""
     while p < len(places):
         b = places[p].body
         if b < 0:
@@ -101,10 +100,9 @@ def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover 
 @njit(nogil=True, error_model="numpy")
 def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m,
            sources, places, lines):  # fmt: skip  # pragma: no cover - compiled
-    """Mark which bodies emit anything, find new places for those moved by hand in this step, and say what is in the
-    way: the distance of what sounds is greatest at an end of the step.
+    """Mark which bodies emit, find new places for those teleported in this step, and return what is in the way.
 
-    Silence needs no fade: a body of which nothing is observed keeps its place.
+    The distance of what emits is greatest at an end of the step. Silence needs no fade: a silent body keeps its place.
     """
     channels, long = len(microphone_m), source.shape[1]
     free, wrong = np.int64(0), DONE  # a plain 0 is a type of its own, and each callee is compiled for it too
@@ -144,7 +142,7 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
 
 @njit(nogil=True, error_model="numpy")
 def move_body(step, sources, places, b, p):  # pragma: no cover - compiled
-    """Give body b the present place p; the one it had is left."""
+    """Give body b the present place p; the one it had becomes a left one."""
     old = places[p].body
     if old >= 0:  # out of the chain that it was asleep in
         if sources[old].oldest == p:

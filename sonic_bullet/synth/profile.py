@@ -1,16 +1,16 @@
-"""The height profile of a surface, read at the distance it has swept: self-affine noise without end.
+"""Height profile of a surface, read at the distance it has swept: endless self-affine noise.
 
     PSD(κ) ∝ κ^-(1+2H)  for wavelengths from LONGEST_M down to LONGEST_M / 2^(OCTAVES-1),  flat above
         [Mandelbrot; Persson 2005]
     h(x) = Σ_j g_j A_j n_j(x/Δ_j),   A_j ∝ Δ_j^H,  Σ A_j² = rms²,  Δ_j = LONGEST_M·LATTICE / 2^j
     n_j: cubic B-spline (C²) on hashed lattice values of unit variance
 
-The rms height of a Material is that of a 100 mm long trace. What a stylus instrument with a cut-off of 0.8 mm calls Rq
-is (0.8/100)^H of it: 1/37 at H = 0.75. So smooth glass has some 0.1 µm, a sanded board 20 µm.
+The rms height of a Material is that of a 100 mm long trace. The Rq of a stylus instrument with a cut-off of 0.8 mm is
+(0.8/100)^H of it: 1/37 at H = 0.75. So smooth glass has some 0.1 µm, a sanded board 20 µm.
 
 Gains g_j (an octave's wavelength is λ_j):
     contact patch
-        (1 + a/λ)^(-1/2), a: Hertz' radius: a rough contact rides on about 1 + a/λ independent spots and feels their
+        (1 + a/λ)^(-1/2), a: Hertz' radius: a rough contact rests on about 1 + a/λ independent spots and follows their
         mean;
                     -3 dB at λ = a, that is at v/a. (Remington's filter, [1987] and [Thompson 2003], averages full,
                         smooth contact and falls
@@ -19,14 +19,14 @@ Gains g_j (an octave's wavelength is λ_j):
     anti-aliasing   1 below 0.2 sr at v/λ, falling to 0 at 0.4 sr
     slow waves      1 above 16 Hz, falling to 0 at 8 Hz: they only lift the body, inaudibly
 
-The voice needs dh/dt alone: Σ g A n'(x/Δ)·v/Δ. So a changing gain never moves a surface that stands, and v = 0 is
-exactly 0.
+The contact oscillator needs dh/dt alone: Σ g A n'(x/Δ)·v/Δ. So a changing gain never moves a surface at rest, and v = 0
+is exactly 0.
 
-The way of the data: height_octaves once a pair, gains once a step and side, sweep_profile: dh/dt of every sample. The
+Data flow: height_octaves once a pair, gained_heights once a step and side, sweep_profile: dh/dt of every sample. The
 lattices nest, so the octaves are summed from coarse to fine on the lattice points that the samples pass (a cubic
 B-spline on Δ is one on Δ/2 with the coefficients [1 4 6 4 1]/8; `_refine`) and read once a sample (`_read`: the
-derivative is the quadratic B-spline of the differences). A coefficient hangs on its place alone, so where a block
-begins makes no difference. Coefficients and what they gain until the step's end stand in two arrays, ``change`` apart.
+derivative is the quadratic B-spline of the differences). A coefficient depends on its place alone, so where a block
+begins makes no difference. Coefficients and their growth until the step's end stand in two arrays, ``change`` apart.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -55,7 +55,7 @@ _UNIT_RMS = np.sqrt(3.0 * 315 / 151)
 
 @njit(nogil=True, error_model="numpy")
 def height_octaves(roughness_m, hurst, out):
-    """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
+    """Write A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
     total = 0.0
     for j in range(OCTAVES):
         out[j] = _WAVE_M[j] ** hurst
@@ -67,7 +67,7 @@ def height_octaves(roughness_m, hurst, out):
 
 @njit(nogil=True, error_model="numpy")
 def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
-    """g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
+    """Write g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
     for j in range(OCTAVES):
         f = speed_m_s / _WAVE_M[j]
         fine, slow = (0.4 - f / sr) / 0.2, f / SLOWEST_HZ - 1.0
@@ -78,10 +78,11 @@ def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
 
 @intrinsic
 def _refine(typingctx, work, coarse, fine, change, pairs, first, height, growth):
-    """2·pairs coefficients from work[fine] on: those of work[coarse] … work[coarse + pairs + 1] on half the lattice,
-    plus height times this octave's noise from ``first`` on; and the same ``change`` further on, plus growth times it.
+    """Compute 2·pairs coefficients from work[fine] on: those of work[coarse] … on half the lattice, plus noise.
 
-    Noise: values on ±1 by a 32-bit integer mix [Wellons 2018, "lowbias32"]. Up to 14 values more are written.
+    They take work[coarse] … work[coarse + pairs + 1], plus height times this octave's noise from ``first`` on; and the
+    same ``change`` further on, plus growth times it. Noise: values on ±1 by a 32-bit integer mix [Wellons 2018,
+    "lowbias32"]. Up to 14 values more are written.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -126,10 +127,11 @@ def _refine(typingctx, work, coarse, fine, change, pairs, first, height, growth)
 
 @intrinsic
 def _read(typingctx, work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out):
-    """Add dh/dt of ``count`` samples, a multiple of 8, to rate[out] …: places work[where] … in m, shares of the step
-    work[share] …; coefficients from work[lattice] on, the first at the lattice point ``origin`` (a whole number).
+    """Add dh/dt of ``count`` samples, a multiple of 8, to rate[out] ….
 
-    speed, gain: at the step's start and until its end; inverse: lattice points a metre.
+    Places are work[where] … in m, fractions of the step work[share] …. Coefficients begin at work[lattice], the first
+    at the lattice point ``origin`` (a whole number). speed, gain: at the step's start, and growth until its end;
+    inverse: lattice points a metre.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -184,11 +186,18 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
 
 @njit(nogil=True, error_model="numpy")
 def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s, work, rate, out):
-    """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s; returns the distance swept after the n
-    samples, and the scratch, longer where it was too short.
+    """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s.
 
-    swept: distance before; speed0, speed1: at the step's ends; x (n,): share of the step; height0, height1 (OCTAVES,):
-    g·A at the step's ends; key: of this surface. rate: as long as if n were the next multiple of 8.
+    Returns the distance swept after the n samples, and the scratch, longer where it was too short.
+
+    Parameters
+    ----------
+    swept : distance before
+    speed0, speed1 : at the step's ends
+    x : (n,) fraction of the step
+    height0, height1 : (OCTAVES,) g·A at the step's ends
+    key : of this surface
+    rate : as long as if n were the next multiple of 8
     """
     n, gain = len(x), speed1 - speed0
     whole = (n + LANES - 1) & -LANES
@@ -234,7 +243,7 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
 
 @njit(nogil=True, error_model="numpy")
 def _lattice(first, last, halvings):
-    """First and last coefficient that those from first (even) to last (odd) hang on, so many octaves coarser."""
+    """Return the first and last coefficient, ``halvings`` octaves coarser, for those first (even) … last (odd)."""
     for _ in range(halvings):
         first, last = ((first >> 1) - 1) & -2, ((last >> 1) + 1) | 1
     return first, last

@@ -1,4 +1,4 @@
-"""A strike is a finite force pulse: how long it lasts, its shape, and what of it bodies that give way take.
+"""Force pulse of a strike: its length, its shape, and the reduction of its impulse by compliant bodies.
 
     1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)]            effective mass at the contact
         [Johnson 1985, Contact Mechanics, sec. 11.1]
@@ -9,8 +9,8 @@
         [Sneddon 1965; Johnson 1985, eq. 3.36]
     δ'' = -δ^(3/2),  F ∝ δ^(3/2)               the Hertz pulse's own shape; flat: F ∝ sin(πt/τ)
 
-The cumulated force Q(s) = ∫F over the pulse's share s in [0, 1] (Q(1) = 1) is the table everything reads: for the Hertz
-pulse Q = (1 - δ'/v)/2, because the force is what changes the velocity.
+All reads use the table of the cumulated force Q(s) = ∫F over the fraction s of the pulse in [0, 1] (Q(1) = 1). For the
+Hertz pulse Q = (1 - δ'/v)/2, because the force is what changes the velocity.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -26,14 +26,13 @@ from sonic_bullet.records import Array
 
 SHORTEST_S, LONGEST_S = 20e-6, 50e-3
 """A pulse below 20 µs has its -3 dB point above 30 kHz and sounds like an impulse; above 50 ms nothing audible is
-struck.
-"""
+struck."""
 
 _CELLS = 1024
 
 
 def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
-    """|F̂(f)/F̂(0)| at the products f·τ, by fine quadrature (flat: |cos(πfτ)/(1-4f²τ²)|)."""
+    """Compute |F̂(f)/F̂(0)| at the products f·τ, by fine quadrature (flat: |cos(πfτ)/(1-4f²τ²)|)."""
     s = (np.arange(4096) + 0.5) / 4096
     force = _force(s, flat)
     return np.asarray(
@@ -47,19 +46,23 @@ SPECTRUM_CELLS_PER_F_TAU, _SPECTRUM_TO = 40, 8
 
 @lru_cache(maxsize=1)
 def spectrum_table() -> Array:
-    """(2, 321): |F̂(f)/F̂(0)| of the Hertz pulse and of the flat one, at equidistant products f·τ from 0 to 8."""
+    """Tabulate |F̂(f)/F̂(0)| (2, 321) of the Hertz and the flat pulse, at equidistant products f·τ from 0 to 8."""
     f_tau = np.linspace(0.0, _SPECTRUM_TO, _SPECTRUM_TO * SPECTRUM_CELLS_PER_F_TAU + 1)
     return np.ascontiguousarray([pulse_spectrum(f_tau, flat=flat) for flat in (False, True)])
 
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, approach_m_s):
-    """Length τ in s of a pulse, and 1 where it is flat (a half-sine), 0 where it is Hertz'. Source: the module's τ.
+    """Compute the length τ in s of a pulse, and 1 where it is flat (a half-sine), 0 where it is Hertz'.
 
-    relative_curvature κ1+κ2 in 1/m: zero or below where the faces conform. flat_area_m2: nominal area of touching, 0
-    where none is known. A contact is never stiffer than the flat punch that its area allows, so the longer of both τ
-    wins; without area Hertz decides alone, without curvature the punch; with neither, with infinite mass or at no speed
-    τ is LONGEST_S. Clamped to SHORTEST_S … LONGEST_S.
+    A contact is never stiffer than the flat punch that its area allows, so the longer τ counts. Without area Hertz
+    decides alone, without curvature the punch. With neither, with infinite mass or at no speed τ is LONGEST_S. Clamped
+    to SHORTEST_S … LONGEST_S. Equations: the module's τ.
+
+    Parameters
+    ----------
+    relative_curvature_per_m : κ1+κ2, zero or below where the faces conform
+    flat_area_m2 : nominal contact area, 0 where none is known
     """
     curvature, area = relative_curvature_per_m, flat_area_m2
     if not curvature > 0 and not area > 0:
@@ -75,14 +78,19 @@ def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, ap
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def compliance(push, frequency_hz, first, modes, tau_s, spectrum):
-    """Σ (Uᵀj |F̂(fτ)|)² over one body's modes: push (m, …) is Uᵀj of the whole impulse j, the modes have the
-    frequencies from ``first`` on; spectrum (cells + 1,): a row of `spectrum_table`.
+    """Compute Σ (Uᵀj |F̂(fτ)|)² over one body's modes.
 
-    The first contact of bodies that give way hands over 1/(1 + m*/j² · this sum, of both bodies) of a rigid body's
-    impulse. What a mode moves within the pulse it takes from the approach, as if its 1/g², g = Uᵀj/j, were one more
-    mass in series with m* [1/m = 1/m* + Σ g²: the module's first equation, with the modes as further motions of the
-    bodies, e.g. Stronge 2000, Impact Mechanics, sec. 7.1]. The modes' energy is then at most m*v²/2·((1+e)/2)², and
-    not without bound. The rest of the simulator's impulse comes later, softly: it is heard as support.
+    The first contact of compliant bodies transmits 1/(1 + m*/j² · this sum, of both bodies) of a rigid body's impulse.
+    A mode's motion within the pulse reduces the approach as if its 1/g², g = Uᵀj/j, were one more mass in series with
+    m* [1/m = 1/m* + Σ g²: the module's first equation, with the modes as further motions of the bodies, e.g. Stronge
+    2000, Impact Mechanics, sec. 7.1]. So the modes' energy is bounded by m*v²/2·((1+e)/2)². The rest of the simulator's
+    impulse comes later, softly: it is rendered as support.
+
+    Parameters
+    ----------
+    push : (m, …) Uᵀj of the whole impulse j
+    frequency_hz : of the modes, from ``first`` on
+    spectrum : (cells + 1,) a row of `spectrum_table`
     """
     total = 0.0
     for m in range(modes):
@@ -95,7 +103,7 @@ def compliance(push, frequency_hz, first, modes, tau_s, spectrum):
 
 
 def _force(s: Array, flat: bool) -> Array:
-    """Force at the shares s, mean 1."""
+    """Compute the force at the fractions s, mean 1."""
     if flat:
         return np.asarray(np.pi / 2 * np.sin(np.pi * np.clip(s, 0, 1)))
     table = pulse_table()
@@ -104,10 +112,10 @@ def _force(s: Array, flat: bool) -> Array:
 
 @lru_cache(maxsize=1)
 def pulse_table() -> Array:
-    """(2, cells + 1): Q and F of the Hertz pulse at equidistant shares. δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the
-    classical Runge-Kutta method.
+    """Tabulate Q and F (2, cells + 1) of the Hertz pulse at equidistant fractions.
 
-    The pulse is symmetric, so half of it is solved (to δ' = 0) and mirrored: Q(s) + Q(1-s) = 1.
+    δ'' = -δ^(3/2) from δ = 0, δ' = 1, by the classical Runge-Kutta method. The pulse is symmetric, so half of it is
+    solved (to δ' = 0) and mirrored: Q(s) + Q(1-s) = 1.
     """
     fine = 16
     # Energy gives δmax = (5/4)^(2/5); half the duration is δmax ∫du/√(1-u^(5/2)) = δmax √π Γ(2/5)/Γ(9/10) · 2/5.
@@ -135,7 +143,7 @@ def pulse_table() -> Array:
 
 @njit(nogil=True)
 def cumulated(s, table, flat):
-    """Q at the share s of the pulse: 0 before it, 1 after. table: `pulse_table`; flat: half-sine, not Hertz'."""
+    """Interpolate Q at the fraction s of the pulse: 0 before it, 1 after. table: `pulse_table`; flat: half-sine."""
     if s <= 0.0:
         return 0.0
     if s >= 1.0:

@@ -1,19 +1,19 @@
-"""Loads of touching pairs, split into what is silent, what strikes and what rubs.
+"""Split of the loads of touching pairs into support, strikes and friction.
 
     impulses of each step -> load F (pairs, steps) -> support N = opening of F -> strike = top-hat F - N over a rising
         edge
 
-A physics step tells only a force averaged over it. Fed to a mode as it is, a resting weight would be a comb at the step
-rate [van den Doel, Kry, Pai 2001, sec. 5 discuss the same of recorded forces]. The split is a morphological opening of
-the load over `SPAN` steps [Serra 1982, ch. II]: what lasts that long carries weight and is silent (it loads the surface
-model instead), what is shorter is an impact. Impacts of up to SPAN - 1 steps become one strike: simulators spread one
-impact over 2-3 steps.
+A physics step gives only the mean force over it. Applied to a mode as it is, a resting weight would be a comb at the
+step rate [van den Doel, Kry, Pai 2001, sec. 5 discuss the same of recorded forces]. The split is a morphological
+opening of the load over `SPAN` steps [Serra 1982, ch. II]. What lasts that long carries weight and is silent (it loads
+the surface model instead), what is shorter is an impact. Impacts of up to SPAN - 1 steps become one strike: simulators
+spread one impact over 2-3 steps.
 
-An impact needs a cause. A solver's flicker between the corners of a resting box looks like an impact but nothing
-approached: a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by what
-a struck neighbour hands on. Where a mobile body of the pair carried load within the last SPAN - 1
-steps, v counts above the speed that gravity gives along the normal in one step: below it, leaving and landing cannot be
-distinguished from resting, nor a roll from one support on to the next from a fall.
+An impact needs a cause. A solver's flicker between the corners of a resting box looks like an impact, but nothing
+approached. So a pair's strike is bounded by 2·m*·v (an elastic impact at the approach speed v before the step), or by
+what a struck neighbour transmits. Where a mobile body of the pair carried load within the last SPAN - 1 steps, v counts
+above the speed that gravity gives along the normal in one step: below it, leaving and landing cannot be distinguished
+from resting, nor a roll from one support on to the next from a fall.
 
 Surfaces that overlap when a step starts have met in the step before (with `contactProcessingThreshold=0`, Bullet sees a
 contact only then): strikes are looked for one step ahead of the step being rendered, so that they can be dated back.

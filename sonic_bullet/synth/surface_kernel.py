@@ -1,14 +1,14 @@
-"""Rolling and sliding: one voice a touching pair, excited by the height profiles its two surfaces sweep.
+"""Rolling and sliding: one contact oscillator a touching pair, excited by the height profiles its two surfaces sweep.
 
     dz/dt = dh_a/dt + dh_b/dt - u
-        z: penetration beyond the resting one, u: how fast the body is lifted
+        z: penetration beyond the resting one, u: speed of contact separation
     m* du/dt = f - N
     δ = δ0(N) + z,   f = k δ^(3/2) (1 + c(dh/dt - u)),  never below 0
         [Hunt & Crossley 1975, eq. 12; clamped: micro-collisions]
     k = (4/3) E* √R*,   N = k δ0^(3/2),   a = (3 N R*/4E*)^(1/3)            [Johnson 1985, eq. 4.22-4.24]
     c = 2ζ √(m* dN/dδ0)/N                                                   ζ: damping ratio of the resting contact
 
-The voice gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip.
+The oscillator gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip.
 Rolling (both surfaces sweep), sliding (one does) and anything between differ in the two sweep speeds only: no switch. A
 contact at rest is an exact equilibrium (z = u = 0 gives f = N to the bit) whatever N does, so support at rest and a
 load that drifts are silent; a new pair starts there, without a click. Within a step δ0, c, speeds and gains run
@@ -16,12 +16,12 @@ linearly from the step's start to its end.
 
 Time: semi-implicit Euler, the damping implicit, 1 … 8 substeps a sample by the contact's resonance at the step's loads.
 Beyond the penetration at which the contact's own stiffness would pass m*/h² (substep h: a resonance of sr·substeps/2π)
-the law goes on as a straight line, so ωh ≤ 1 everywhere and the scheme is stable for any stiffness, mass and load
-[Hairer, Lubich, Wanner 2006, I.1.4]. All that a sample needs hangs on the sample before it and on its step: any split
-into blocks gives the same bits, and so does any company of other pairs.
+the law continues as a straight line, so ωh ≤ 1 everywhere and the scheme is stable for any stiffness, mass and load
+[Hairer, Lubich, Wanner 2006, I.1.4]. A sample depends on the sample before it and on its step alone: any split into
+blocks gives the same bits, whatever other pairs there are.
 
-The way of the data, for the voices that move in a step: `_law` -> rates of eight voices (`profile.sweep_profile`) ->
-`_oscillate`: the eight at once, one a lane -> f - N, a row a voice. State and constants stand in the table of pairs
+Data flow, for the oscillators that move in a step: `_law` -> rates of eight (`profile.sweep_profile`) -> `_oscillate`:
+the eight at once, one a lane -> f - N, a row each. State and constants stand in the table of pairs
 (render.tables.PAIR), loads and speeds of the step in the scratch table VOICE. Lengths in δ_lim, forces in
 k·δ_lim^(3/2), u and dh/dt in δ_lim/h, damping in h/δ_lim: then for every pair f = min(δ, 1)^(3/2) + 1.5(δ - 1)₊, and
 one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follow the substeps; nothing is rounded twice.
@@ -46,7 +46,7 @@ MOST_SUBSTEPS = 8.0
 FASTEST_M_S = 50.0
 LEAST_DAMPING_RATIO = 0.25
 _STILL = 1e-9
-"""Below this share of the resting penetration, on surfaces that stand, the contact is at rest."""
+"""Below this fraction of the resting penetration, on surfaces that do not sweep, the contact is at rest."""
 
 VOICE = np.dtype(
     [
@@ -59,25 +59,24 @@ VOICE = np.dtype(
         ("begin", "i8"),  # its rows of the step that follows
         ("end", "i8"),
         ("total_n_s", "f8"),  # their load
-        ("order", "i8"),  # the voice that comes in this one's place
+        ("order", "i8"),  # index of the voice at this position of the order
     ],
     align=True,
 )
-"""A voice that moves, for one step: scratch."""
+"""A contact oscillator that moves, for one step: scratch."""
 
-# what `_law` tells of a voice, a row a lane for `_oscillate`; two rows: at the step's start, and until its end
+# rows that `_law` writes for `_oscillate`, a lane each; two rows: at the step's start, and growth until its end
 _DEPTH, _LIFT, _REST, _DAMPING, _RATE_UNIT, _FORCE_UNIT, _SUBSTEPS, _STANDS, _PATCH = 0, 1, 2, 4, 6, 7, 8, 9, 10
 _ROWS = 12
 
 
 @njit(nogil=True, error_model="numpy")
 def damping_ratio(restitution):
-    """ζ of the linear oscillator that rebounds with this coefficient of restitution: -ln e/√(π² + ln² e), within
-    0.25 … 1.
+    """Compute ζ of the linear oscillator that rebounds with this restitution, within 0.25 … 1.
 
-    The floor is a model's choice: a rolling contact also sends waves into both bodies, which restitution of whole-body
-    impacts (e = 0.95 would ring ten times) does not tell. Below it the level laws of rough, stiff, fast pairs bend
-    (benchmarks/surface_law.py).
+    -ln e/√(π² + ln² e). The floor is a model's choice: a rolling contact also sends waves into both bodies, which the
+    restitution of whole-body impacts (e = 0.95 would ring ten times) does not include. Below it the level laws of
+    rough, stiff, fast pairs bend (benchmarks/surface_law.py).
     """
     log = np.log(restitution if restitution > 1e-9 else 1e-9)
     log = 0.0 if log > 0.0 else log
@@ -87,7 +86,7 @@ def damping_ratio(restitution):
 
 @njit(nogil=True, error_model="numpy")
 def contact_radius_m(relative_curvature_per_m, flat_area_m2):
-    """R* = 1/(κ1+κ2), at most the radius √(A/π) of the nominal area of touching (1 m where A is 0: none known).
+    """Compute R* = 1/(κ1+κ2), at most the radius √(A/π) of the nominal contact area (1 m where A is 0: none known).
 
     A flat face rests on its highest spots; each is taken for a cap as blunt as the face is wide.
     """
@@ -97,7 +96,7 @@ def contact_radius_m(relative_curvature_per_m, flat_area_m2):
 
 @njit(nogil=True, error_model="numpy")
 def _law(pair, voice, sr, constants, at):
-    """The contact law of a voice in this step into constants[at] …, with its pair's state in the units of that law."""
+    """Write the contact law of a voice in this step into constants[at] …, with its pair's state in that law's units."""
     mass, radius, modulus = pair.mass_kg, pair.radius_m, pair.modulus_pa
     load0, load1 = voice.load_n
     k = 4.0 / 3.0 * modulus * np.sqrt(radius)
@@ -135,7 +134,7 @@ def _law(pair, voice, sr, constants, at):
 
 @njit(nogil=True, error_model="numpy")
 def _line_up(voices, count, constants):
-    """The voices' order by substeps, so that few lanes wait for others."""
+    """Order the voices by substeps, so that few lanes wait for others."""
     last = 0
     for substeps in range(1, int(MOST_SUBSTEPS) + 1):
         for v in range(count):
@@ -146,8 +145,9 @@ def _line_up(voices, count, constants):
 
 @njit(nogil=True, error_model="numpy")
 def sound_voices(pairs, voices, count, x, sr, force):
-    """Force f - N in newton of the voices 0 … count - 1 into force (voices, n), at the n samples that lie at the shares
-    ``x`` (n,) in [0, 1) of one physics step; their pairs move on. Call again with the rest of the step's x for its
+    """Compute the force f - N in newton of the voices 0 … count - 1 into force (voices, n), and advance their pairs.
+
+    x (n,): fractions in [0, 1) of one physics step at the n samples. Call again with the rest of the step's x for its
     other samples. sr: float, in Hz.
     """
     n = len(x)
@@ -192,8 +192,9 @@ def sound_voices(pairs, voices, count, x, sr, force):
 
 @intrinsic
 def _oscillate(typingctx, lanes, x, count, most, rate, apart):
-    """f - N of eight pairs at ``count`` samples in the place of their dh/dt: lane k's from rate[k·apart] on; state
-    lanes[:16] moves on. most: the largest number of substeps among them.
+    """Replace dh/dt of eight pairs at ``count`` samples by f - N: lane k's from rate[k·apart] on.
+
+    State lanes[:16] advances. most: the largest number of substeps among them.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Vector instructions for numba kernels, which have no vector type of their own: a thin writer of LLVM's language.
+"""Vector instructions for numba kernels, which have no vector type: a thin writer of LLVM code.
 
 Every multiply-add is stated and every sum has a fixed order: the bits are the same on each call, whatever the caller's
 loops. Vectors are eight doubles (two or four registers where the machine has narrower ones; the bits are the same).
@@ -23,7 +23,7 @@ Pair = tuple[Value, Value]
 
 
 class Emit:
-    """Writes vector instructions; arguments arrive as data pointers (arrays) or values (scalars)."""
+    """Writer of vector instructions; arguments arrive as data pointers (arrays) or values (scalars)."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
         self.builder = builder
@@ -36,45 +36,51 @@ class Emit:
         self._fma = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC] * 3), "llvm.fma.v8f64")
 
     def index(self, value: int) -> Value:
+        """Return a 64-bit integer constant."""
         return ir.Constant(I64, value)
 
     def shifted(self, base: Value, offset: int) -> Value:
+        """Return the index base + offset."""
         return self.builder.add(base, self.index(offset)) if offset else base
 
     def _place(self, array: Value, offset: Value) -> Value:
         return self.builder.bitcast(self.builder.gep(array, [offset]), VEC.as_pointer())
 
     def load(self, array: Value, offset: Value) -> Value:
+        """Load eight doubles of an array from an offset."""
         return self.builder.load(self._place(array, offset), align=8)
 
     def store(self, value: Value, array: Value, offset: Value) -> None:
+        """Store eight doubles to an array at an offset."""
         self.builder.store(value, self._place(array, offset), align=8)
 
     def spread(self, scalar: Value) -> Value:
-        """The scalar in all lanes."""
+        """Copy the scalar to all lanes."""
         none = ir.Constant(VEC, ir.Undefined)
         first = self.builder.insert_element(none, scalar, ir.Constant(I32, 0))
         return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(I32, LANES), [0] * LANES))
 
     def broadcast(self, array: Value, offset: Value) -> Value:
+        """Load one double and copy it to all lanes."""
         return self.spread(self.builder.load(self.builder.gep(array, [offset])))
 
     def reversed(self, vector: Value) -> Value:
-        """The lanes in opposite order."""
+        """Reverse the order of the lanes."""
         return self.builder.shuffle_vector(
             vector, ir.Constant(VEC, ir.Undefined), ir.Constant(ir.VectorType(I32, LANES), list(range(LANES))[::-1])
         )
 
     def fma(self, a: Value, b: Value, c: Value) -> Value:
+        """Multiply and add, a·b + c, rounded once."""
         return self.builder.call(self._fma, [a, b, c])
 
     def product(self, a: Pair, b: Pair) -> Pair:
-        """Complex a·b."""
+        """Multiply complex numbers, a·b."""
         real = self.fma(a[0], b[0], self.builder.fneg(self.builder.fmul(a[1], b[1])))
         return real, self.fma(a[0], b[1], self.builder.fmul(a[1], b[0]))
 
     def loop(self, count: Value, step: int, carried: list[Value], body: Any) -> list[Value]:
-        """``for k in range(0, count, step): carried = body(k, carried)``; the last values."""
+        """Run ``for k in range(0, count, step): carried = body(k, carried)`` and return the last values."""
         b = self.builder
         before, inside, after = b.block, b.append_basic_block("each"), b.append_basic_block("after")
         b.cbranch(b.icmp_signed(">", count, self.index(0)), inside, after)
@@ -116,5 +122,5 @@ class Emit:
 
 
 def constant(value: float) -> Value:
-    """The number in all lanes."""
+    """Return the number in all lanes."""
     return ir.Constant(VEC, [float(value)] * LANES)

@@ -8,12 +8,12 @@
 (that is q̇ = e^{-dt}(cos ωt - (d/ω) sin ωt): the continuous-time response, sampled; strikes are exact at any sub-sample
 time, and nothing aliases.)
 
-    layout (tables) | strike_pool, phasors (pulses under way) | drive (what is driven) | tile (what rings free) |
-    translation (the rigid body) | poles, passing (what touches) -> bank_kernel.advance
+    layout (tables) | strike_pool, phasors (pulses under way) | drive (driven motion) | tile (free ringing) |
+    translation (the rigid body) | poles, passing (contacts) -> bank_kernel.advance
     instrument: bodies in, tables out
 
-A body below the floor costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any way of
-cutting the calls gives the same bits. All work in place: `copy()` a state first to look ahead and come back.
+A body below the floor costs nothing. Time is counted in absolute samples; blocks of 256 lie on that grid, so any split
+into calls gives the same bits. All work in place: `copy()` a state first to look ahead and come back.
 """
 
 from sonic_bullet.synth.bank.instrument import (

@@ -1,4 +1,4 @@
-"""The modal bank's compiled loops.
+"""Compiled loops of the modal bank.
 
 Strict IEEE arithmetic, and stated multiply-adds in `tile` and `drive`: one set of bits.
 
@@ -7,8 +7,8 @@ Strict IEEE arithmetic, and stated multiply-adds in `tile` and `drive`: one set 
     block end:    z <- z + f p,  f <- 0
     bent bodies:  p of each block by |z| at its start, and of what is driven within it every 32 samples
 
-Blocks lie on a fixed grid of absolute samples, and f runs sample by sample: where a frame ends changes nothing. Whoever
-gives a body other poles does so where one of the 32 begins (pole) or a block (block, too): see `poles`.
+Blocks lie on a fixed grid of absolute samples, and f runs sample by sample: where a frame ends changes nothing. New
+poles of a body take effect where one of the 32 begins (pole) or a block (block, too): see `poles`.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -33,8 +33,9 @@ DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 def _ring(
     b, start, columns, z, pole, block, weight, modes, observed, sound, ringing, passes, pass_weight, pass_sound, scratch
 ):  # pragma: no cover - compiled
-    """Tiles of body b for the block that starts: sound (W, b, BLOCK), pass_sound (J·W, b, BLOCK). Turns z to the next
-    block. False where all modes are below the floor.
+    """Compute the tiles of body b for the block that starts: sound (W, b, BLOCK), pass_sound (J·W, b, BLOCK).
+
+    Advances z to the next block. False where all modes are below the floor.
     """
     now, powers = scratch[: 2 * CHUNK], scratch[2 * CHUNK : 12 * CHUNK]
     table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
@@ -75,7 +76,7 @@ def _copy_flushed(values, out):  # pragma: no cover - compiled
 
 @uncounted
 def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
-    """End of a block: what was driven within it joins the free state of the next."""
+    """End a block: what was driven within it is added to the free state of the next."""
     for re in range(start, stop):
         im = re + modes
         x, y = driven[re], driven[im]
@@ -93,7 +94,7 @@ def _flush(values, count):  # pragma: no cover - compiled
 
 @uncounted
 def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - compiled
-    """A force's impulses, parted between both ends of its gains; zeros behind."""
+    """Split a force's impulses between both ends of its gains; zeros behind."""
     stride, whole = signal.shape[2], n - n % LANES
     early, late = signal[d, 0], signal[d, 1]
     drive.part_force(
@@ -113,7 +114,7 @@ def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - 
 def list_forces(
     n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
 ):  # pragma: no cover - compiled
-    """Forces by body: first (b+1,) where each body's begin in side, 2·drive + side each, in order of the drives.
+    """List forces by body: first (b+1,) where each body's begin in side, 2·drive + side each, in order of the drives.
 
     drive_body (drives, 2): -1 for nobody. signal (drives, 2, stride): impulses at both ends, F·period·(1 - x) and
     F·period·x, 0 behind the last. Gains and impulses below FLUSH become 0, the gains in place.
@@ -146,9 +147,9 @@ def list_forces(
 def _press_strikes(
     sample, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
 ):  # pragma: no cover - compiled
-    """Add what body b's strikes give ``lanes`` lanes from ``column`` on at ``count`` samples: 1 where push is in use.
+    """Add body b's strikes to ``lanes`` lanes from ``column`` on at ``count`` samples; return 1 where push is in use.
 
-    pushes: 1 where push is in use already. keep, final: their phasors, and they themselves, move on.
+    pushes: 1 where push is in use already. keep, final: their phasors, and they themselves, advance.
     """
     width = rows.shape[2]
     slot = ringing[b].strike
@@ -168,9 +169,7 @@ def _drive(
     at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, passes, pass_weight,
     pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """``count`` samples from ``i`` on, within one of the DRIVEN: strikes and forces enter, free and driven part are
-    heard together.
-    """
+    """Advance ``count`` samples from ``i`` on, within one of the DRIVEN; sum driven and free part."""
     modes = law.shape[1]
     push, partial = scratch[:PUSH_SCRATCH], scratch[PUSH_SCRATCH : PUSH_SCRATCH + DRIVEN * LANES]
     total = scratch[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
@@ -218,7 +217,7 @@ def _drive(
 def _sound_free(
     b, i, end, place, observed, ringing, sound, passes, pass_sound, passed, source
 ):  # pragma: no cover - compiled
-    """Samples i … end - 1 of a body that only rings, or is silent."""
+    """Compute samples i … end - 1 of a body that only rings, or is silent."""
     for w in range(len(observed)):
         if observed[w, b]:
             if ringing[b].tiled:
@@ -238,7 +237,7 @@ def _open_block(
     b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
     pass_sound, scratch,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """Begin of a block: its poles where they go with the level or are new, and its free sound."""
+    """Begin a block: take new poles and those that depend on the level, and compute its free sound."""
     poles.take_coming(b, start, stop, ringing, law, pole, block, coming)
     passing.move_on(b, ringing, passes)
     if bodies[b].bent and ringing[b].ringing:
@@ -255,7 +254,7 @@ def _advance_modes(
     at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
     pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """Samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
+    """Compute samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
     start, stop, modes = bodies[b].start, bodies[b].stop, law.shape[1]
     i = np.int64(0)  # a literal would be a type of its own, and what it is passed to compiled twice
     while i < n:
@@ -294,9 +293,9 @@ def advance(
     pass_sound, passed, strikes, rows, free, hertz, drive_count, drive_body, force_n, gain0, gain1, direction0,
     direction1, progress, first, side, signal, kick, plan, scratch, source, pushed, sounds,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """Samples at … at + n - 1 into source (W, b, n or more) and pushed (b, 3, n or more).
+    """Compute samples at … at + n - 1 into source (W, b, n or more) and pushed (b, 3, n or more).
 
-    sounds (b, 2): 1 where a body's rows of source, of pushed are not zero; its other rows are zero as they were handed
+    sounds (b, 2): 1 where a body's rows of source, of pushed are not zero; its other rows are zero as they were passed
     in, where sounds said so. See layout.py for the tables; all in place.
     """
     period = 1.0 / sr

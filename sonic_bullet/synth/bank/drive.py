@@ -1,4 +1,4 @@
-"""What is driven in the bank, some tens of samples at a time, as vector instructions (`vector`).
+"""Driven modes of the bank, some tens of samples at a time, as vector instructions (`vector`).
 
     forces      push[n] = (1 + i d/ω) Σ (a0 g0 + a1 g1)                    a0 = F·period·(1 - x), a1 = F·period·x
     strikes     push[n] += r Σ_k J_k D^(K-k),   r <- r E                   `strike_pool`
@@ -33,7 +33,7 @@ def _halves(e: Emit, array: Value, place: Value) -> list[Value]:
 
 @intrinsic
 def part_force(typingctx, force_n, at, progress, period, count, signal, early, late):
-    """a0 and a1 of ``count`` samples, whole vectors: force·period·(1 - progress), force·period·progress.
+    """Compute a0 and a1 of ``count`` samples, whole vectors: force·period·(1 - progress), force·period·progress.
 
     force_n: flat from ``at`` on; signal: flat, a0 from early and a1 from late on. Impulses below FLUSH are 0.
     """
@@ -76,7 +76,7 @@ def press(
     lanes,
     count,
 ):
-    """All forces of a body on ``lanes`` lanes from column ``column`` on, ``count`` samples from ``at`` on: sets push.
+    """Set push to all forces of a body on ``lanes`` lanes from column ``column`` on, ``count`` samples from ``at`` on.
 
     side[first … last - 1]: 2·drive + side of each force, in order. gain0, gain1: flat (2·drives, columns). signal: flat
     (drives, 2, stride), a0 and a1. law: flat, d/ω of the first lane at quadrature_at.
@@ -127,7 +127,7 @@ def press(
 
 @intrinsic
 def clear(typingctx, push, lanes, count):
-    """Push of ``lanes`` lanes and ``count`` samples set to 0."""
+    """Set push of ``lanes`` lanes and ``count`` samples to 0."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -151,10 +151,10 @@ def clear(typingctx, push, lanes, count):
 
 @intrinsic
 def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last, keep):
-    """A strike's impulses of the samples first … last - 1: r <- r·E, push += r·Horner(due, D).
+    """Add a strike's impulses of the samples first … last - 1: r <- r·E, push += r·Horner(due, D).
 
     rows: flat, phasors r, D, E0, E1 of ``lanes`` lanes from ``at`` on, real and imaginary in turn, ``width`` apart.
-    plan: flat (samples, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many places of theirs are empty behind the
+    plan: flat (samples, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many of their places are empty behind the
     last. due: impulses, node after node. keep: False leaves r as it was.
     """
 
@@ -222,7 +222,7 @@ def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last
 
 @intrinsic
 def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep):
-    """``count`` samples of ``lanes`` lanes: f <- f p + push, partial += Re(w f).
+    """Advance ``lanes`` lanes by ``count`` samples: f <- f p + push, partial += Re(w f).
 
     weight: flat, that of lane ``start`` at weight_at. pushes: 0 where push is one sample of zeros for all. keep: False
     leaves the state as it was.
@@ -268,10 +268,10 @@ def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, pu
 
 @intrinsic
 def shove(typingctx, kick, width, side, first, last, signal, stride, direction0, direction1, count):
-    """Impulses of all forces along each axis: rows 0, 2, 4 of kick (6, width) = Σ ± (a0 d0 + a1 d1), whole vectors.
+    """Sum the impulses of all forces along each axis: rows 0, 2, 4 of kick (6, width) = Σ ± (a0 d0 + a1 d1).
 
-    side, signal: as `press` has them; direction0, direction1: flat (drives, 3), on the lower body, the negative on the
-    higher.
+    In whole vectors. side, signal: as in `press`; direction0, direction1: flat (drives, 3), on the lower body, the
+    negative on the higher.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -307,7 +307,7 @@ def shove(typingctx, kick, width, side, first, last, signal, stride, direction0,
 
 @intrinsic
 def across(typingctx, partial, count, out):
-    """out (count,) = sums over the lanes of partial, in halves."""
+    """Sum partial over the lanes, in halves, into out (count,)."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)

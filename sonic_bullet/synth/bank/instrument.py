@@ -1,4 +1,4 @@
-"""The bank as an instrument: bodies' modes in, tables and flat arrays out, and the state that goes with them.
+"""The bank as an instrument: tables and flat arrays from bodies' modes, and the state that goes with them.
 
 A body has two parts: its modes (with the lines of its residual, which sound into the same signal) and its three
 translations, which share one pole. b bodies, m lanes of all of them, W weight sets.
@@ -24,10 +24,10 @@ SLOWEST_TURN = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Translation:
-    """The pole of a body's three translations, and weight: pressure at 1 m, in Pa·m per N·s along an axis.
+    """Pole of a body's three translations, and weight: pressure at 1 m, in Pa·m per N·s along an axis.
 
     Forces act evenly over the sample before each instant, pulses over cells of the sample grid, not at once: such modes
-    are gone within a few samples, and a slow force must leave its slope alone.
+    decay within a few samples, and a slow force must contribute by its slope alone.
     """
 
     omega_rad_s: float
@@ -37,11 +37,15 @@ class Translation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModeSet:
-    """One body for the bank: omega_rad_s (m,) of the damped modes, decay_per_s (m,), weight (W, m) complex.
+    """Modes of one body for the bank, all `audible`.
 
-    All `audible`. bend, damping_growth (m,): of level-dependent modes, ω (1 + bend·|z|²) and d (1 +
-    (damping_growth·|z|)^damping_growth_power); None: linear. See `poles.bend_poles`. translation: None where only
-    the modes sound.
+    Attributes
+    ----------
+    omega_rad_s, decay_per_s : (m,) of the damped modes
+    weight : (W, m) complex
+    bend, damping_growth : (m,) of level-dependent modes, None: linear; see `poles.bend_poles`
+        ω (1 + bend·|z|²) and d (1 + (damping_growth·|z|)^damping_growth_power)
+    translation : None where only the modes sound
     """
 
     omega_rad_s: Array
@@ -55,8 +59,10 @@ class ModeSet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bank:
-    """The instrument. body (b,) BANK_BODY; law (6, m): of each lane s/sr, d/ω and how its pole goes with its level;
-    weight (W, 2·m), real parts first; observed (W, b): whether any weight of the body is not zero.
+    """Constants of the instrument.
+
+    body (b,) BANK_BODY; law (6, m): of each lane s/sr, d/ω and how its pole depends on its level; weight (W, 2·m), real
+    parts first; observed (W, b): whether any weight of the body is not zero.
     """
 
     sr: int
@@ -67,25 +73,35 @@ class Bank:
 
     @property
     def body_count(self) -> int:
+        """Number of bodies."""
         return len(self.body)
 
     @property
     def mode_count(self) -> int:
+        """Number of modes of all bodies."""
         return int(self.body["columns"].sum())
 
     @property
     def columns(self) -> int:
-        """Lanes of the body that has most: gains have so many, in whole groups."""
+        """Lanes of the body that has most, in whole groups: gains have as many."""
         return int((self.body["stop"] - self.body["start"]).max(initial=PAIR))
 
 
 @dataclass(slots=True, eq=False)
 class BankState:
-    """What the bank remembers. at: the next sample. z, driven (2·m,): free state at the next block's start, and what
-    was driven since this block's. sound (W, b, 256): the block's free ringing. pole, block (2·m,): e^s and e^{256 s},
-    bent by level where a body is. law (7, m): the bank's, with poles as they are now; coming (8, m): see `poles`.
-    passes (b, J) PASS, pass_weight (J·W, 2·m), pass_sound (J·W, b, 256): see `passing`. ringing (b,) RINGING; strikes
-    (pool,) STRIKE, rows (pool, 8, columns) their phasors, free (pool + 1,): how many rows are free, and which.
+    """State of the bank.
+
+    Attributes
+    ----------
+    at : the next sample
+    z, driven : (2·m,) free state at the next block's start, and what was driven since this block's
+    sound : (W, b, 256) the block's free ringing
+    pole, block : (2·m,) e^s and e^{256 s}, bent by level where a body is
+    law, coming : (7, m) the bank's, with poles as they are now; (8, m) see `poles`
+    passes, pass_weight, pass_sound : (b, J) PASS, (J·W, 2·m), (J·W, b, 256), see `passing`
+    ringing : (b,) RINGING
+    strikes, rows : (pool,) STRIKE and (pool, 8, columns) their phasors
+    free : (pool + 1,) how many rows are free, and which
     """
 
     at: int
@@ -105,13 +121,13 @@ class BankState:
     free: Array
 
     def copy(self) -> BankState:
-        """A state of its own: advancing one leaves the other."""
+        """Return an independent copy: advancing one leaves the other."""
         names = (field.name for field in fields(self) if field.name != "at")
         arrays: dict[str, Any] = {name: getattr(self, name).copy() for name in names}
         return BankState(at=self.at, **arrays)
 
     def with_room(self, strikes: int) -> None:
-        """See to it that so many strikes can be entered."""
+        """Make room for so many strikes."""
         free = int(self.free[0])
         if free >= strikes:
             return
@@ -128,9 +144,9 @@ class BankState:
 
 
 def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
-    """(m,) bool: modes the bank can play at the rate ``sr``; count the others with ``~``.
+    """Return (m,) bool: modes the bank can play at the rate ``sr``; count the others with ``~``.
 
-    Dropped: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), or gone within a sample (d ≥ 2 sr), or
+    Not audible: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), gone within a sample (d ≥ 2 sr), or
     not finite.
     """
     omega, decay = np.asarray(omega_rad_s, float), np.asarray(decay_per_s, float)
@@ -145,14 +161,14 @@ def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
 
 
 def flushed(values: Array) -> Array:
-    """Values with what lies below 1e-30 set to zero: no product of theirs becomes subnormal."""
+    """Set values below 1e-30 to zero: no product of theirs becomes subnormal."""
     return np.asarray(np.where(np.abs(values) < FLUSH, 0, values))
 
 
 def empty_bank(sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0) -> tuple[Bank, BankState]:
-    """A bank without bodies and its state at absolute sample ``at``; passes: partners that each may pass on to.
+    """Build a bank without bodies and its state at absolute sample ``at``.
 
-    Raises AudioError on a rate outside 1 … 10 MHz.
+    passes: partners to which each body may transmit. Raises AudioError on a rate outside 1 … 10 MHz.
     """
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
@@ -175,11 +191,9 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0) -> t
 
 
 def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Bank, BankState]:
-    """Bank and state with further bodies, silent at first; those already there go on unchanged, bit by bit.
+    """Return bank and state with further bodies, silent at first; the others continue unchanged, bit by bit.
 
-    The old pair stays usable.
-
-    Raises AudioError where a mode is not `audible`, or shapes or numbers are wrong.
+    The old pair stays usable. Raises AudioError where a mode is not `audible`, or shapes or numbers are wrong.
     """
     sets = bank.weight.shape[0]
     for one in bodies:
@@ -241,8 +255,9 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
 
 
 def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
-    """Bank and state of the bodies (k,) of ascending numbers alone, which go on unchanged, bit by bit. The others must
-    be `silent`. The strikes are the old state's own: it is of no use afterwards.
+    """Return bank and state with only the bodies ``keep`` (k,), ascending, which continue unchanged, bit by bit.
+
+    The others must be `silent`. The strikes are the old state's own: it must not be used afterwards.
     """
     body = bank.body[keep]
     size = body["stop"] - body["start"]
@@ -265,18 +280,18 @@ def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
 
 
 def silent(state: BankState) -> Array:
-    """(b,) whether nothing of a body rings, and no strike on it is under way."""
+    """Return (b,) whether nothing of a body rings, and no strike on it is under way."""
     now = state.ringing
     rings = (now["ringing"] != 0) | (now["driven"] != 0) | (now["tiled"] != 0) | (now["moving"] != 0)
     return np.asarray(~rings & (now["strike"] < 0))
 
 
 def silence(state: BankState) -> BankState:
-    """The state at the same sample with nothing ringing and no strike under way."""
+    """Return the state at the same sample with nothing ringing and no strike under way."""
     state = state.copy()
     for name in ("z", "driven", "sound", "pass_sound"):
         getattr(state, name)[...] = 0
-    for name in ("ringing", "driven", "tiled", "moving", "motion"):  # poles and passes stay: what touches does
+    for name in ("ringing", "driven", "tiled", "moving", "motion"):  # poles and passes stay: contacts do
         state.ringing[name] = 0
     state.ringing["strike"] = -1
     state.passes["phase"] = SILENCED[state.passes["phase"]]
@@ -328,6 +343,6 @@ def _or_zero(values: Array | None, m: int) -> Array:
 
 
 def _joined(flat: Array, more: Array) -> Array:
-    """A flat array, real parts first, with the complex values ``more`` behind it."""
+    """Append the complex values ``more`` to a flat array, real parts first."""
     half = len(flat) // 2
     return np.concatenate([flat[:half], more.real, flat[half:], more.imag])

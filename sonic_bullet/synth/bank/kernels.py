@@ -1,5 +1,6 @@
-"""How the bank's kernels are compiled. They allocate nothing, so nobody counts references: each array that crosses a
-call would cost nanoseconds.
+"""How the bank's kernels are compiled: they allocate nothing, so references are not counted.
+
+Counting would cost nanoseconds for each array that crosses a call.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The bank's tables and the numbers that its kernels share: one row a body or strike, each in a fixed place.
+"""Tables of the bank and the numbers that its kernels share: one row a body or strike, each in a fixed place.
 
-    BANK_BODY   what a body is: its lanes in the flat arrays, and the pole that its three translations share
-    RINGING     what of it sounds: flags, the translations' state, the first of its strikes
+    BANK_BODY   a body: its lanes in the flat arrays, and the pole that its three translations share
+    RINGING     its activity: flags, the translations' state, the first of its strikes
     STRIKE      a pulse under way: a pool of rows, those of a body linked in order of start, then of arrival
 
 Modes of all bodies lie in flat arrays, a body's `columns` (audible modes, then the lines of its residual) in whole
@@ -20,30 +20,29 @@ from sonic_bullet.synth.vector import LANES
 PAIR = 2 * LANES
 """Lanes that are driven side by side: two vectors hide the latency of each other's multiply-adds."""
 DRIVEN = 32
-"""Samples, on the grid of absolute time, that are driven at a time; as long what is driven keeps its bent poles."""
+"""Samples, on the grid of absolute time, that are driven at a time; driven modes keep their bent poles as long."""
 ROOM = DRIVEN + LANES
-"""Samples of room for pushes: whole tiles are computed, and those past the end are left."""
+"""Samples of room for pushes: whole tiles are computed, and those past the end are not used."""
 COLUMNS = 64
 """Lanes of a body that are driven at a time: their pushes stay in the first cache."""
 MOST_DUE = 128
 """Nodes of one strike in DRIVEN samples, at most: 24 in all, or two a sample and a few."""
 
 FLOOR = 1e-15
-"""Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at 300
-K.
+"""Modes with |z| below this (in √J·√2) are set to zero: ½|z|² = 5e-31 J is 1e-10 of the mode's thermal energy kT at
+300 K.
 """
 FLUSH = 1e-30
 """Output samples below this become 0: they have no meaning in pascal or m/s, and their float32 would be subnormal.
-Gains and forces below it, too: no product of theirs becomes subnormal.
-"""
+Gains and forces below it, too: no product of theirs becomes subnormal."""
 
 BANK_BODY = np.dtype(
     [
         ("start", "i8"),  # lanes in the flat arrays
         ("stop", "i8"),
         ("columns", "i8"),  # of those, in use
-        ("bent", "i8"),  # 1: its poles go with its level
-        ("rigid", "i8"),  # 1: its translations sound
+        ("bent", "i8"),  # 1: its poles depend on its level
+        ("rigid", "i8"),  # 1: its translations are active
         ("rigid_log_pole", "f8", (2,)),  # s of the translations
         ("rigid_pole", "f8", (2,)),
         ("rigid_onset", "f8", (2,)),  # (1 + i d/ω)(e^s - 1)/s: of a force that acts evenly over the sample before
@@ -61,7 +60,7 @@ RINGING = np.dtype(
         ("moving", "i8"),  # 1: a translation's state is not zero
         ("fresh", "i8"),  # 1: other poles at the next block's start
         ("passes", "i8"),  # passes that are not off
-        ("passed_to", "i8"),  # 1: within a call, somebody passed something on to it
+        ("passed_to", "i8"),  # 1: within a call, a body transmitted to it
         ("strike", "i8"),  # slot of its first strike, -1 for none
         ("motion", "f8", (3, 2)),  # state of the translations
     ],
@@ -89,7 +88,7 @@ STRIKE = np.dtype(
         ("cell_first", "i8"),
         ("cell_stop", "i8"),
         ("cell_turn", "f8", (2,)),  # e^{s/cells} of the translations
-        ("cell_onset", "f8", (2,)),  # what a cell's impulse leaves of itself at its end
+        ("cell_onset", "f8", (2,)),  # response to a cell's impulse at the cell's end
         ("shove_n_s", "f8", (3,)),
     ],
     align=True,

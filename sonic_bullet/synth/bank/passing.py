@@ -1,11 +1,11 @@
-"""What of one body's modes sounds at another that it touches.
+"""Transmission: modes of one body that sound at another that it touches.
 
     passes (b, J) PASS: up to J partners of each body;  set j·W + w of weights at the lanes of body b:
         y[w, to, n] += ramp[n] Σ Re(weight z[n])
 
-A mode of coupled bodies moves all of them; its shape on the others is the weight here, its pole the coupled one
+A mode of coupled bodies moves all of them. Its shape on the others is the weight here, its pole the coupled one
 (`poles`), so a pass has no memory of its own. It begins and ends where a block of absolute time does, fading in over
-its first block and out over its last: nothing jumps, and any cutting of calls gives the same bits.
+its first block and out over its last: nothing jumps, and any split into calls gives the same bits.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from sonic_bullet.synth.bank.instrument import Bank, BankState
 
 PASSES = 8
-"""Partners of a body to which it passes on at a time, those that fade out among them."""
+"""Partners to which a body transmits at a time, those that fade out among them."""
 OFF, STEADY, COMING, RISING, LEAVING, FALLING, BRIEF = range(7)
 """States of a pass. COMING, LEAVING: from the next block on RISING, FALLING; BRIEF: rises and is to fall."""
 PASS = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
 LEAVES = np.array([OFF, LEAVING, OFF, BRIEF, LEAVING, FALLING, BRIEF])
-"""What each becomes where it is to end."""
+"""State that each becomes where it is to end."""
 SILENCED = np.array([OFF, STEADY, STEADY, STEADY, OFF, OFF, OFF])
-"""What each becomes where nothing sounds any more, and nothing has to fade."""
+"""State that each becomes where nothing sounds any more, and nothing has to fade."""
 
 
 @uncounted
 def move_on(b, ringing, passes):  # pragma: no cover - compiled
-    """Begin of body b's block: its passes move on."""
+    """Advance the passes of body b at the begin of its block."""
     left = 0
     for j in range(passes.shape[1] if ringing[b].passes else 0):
         phase = passes[b, j].phase
@@ -56,13 +56,13 @@ def move_on(b, ringing, passes):  # pragma: no cover - compiled
 
 @uncounted
 def sounds(phase):  # pragma: no cover - compiled
-    """Whether a pass is heard."""
+    """Return whether a pass is active."""
     return phase not in (OFF, COMING)
 
 
 @uncounted
 def last_set(b, ringing, observed, passes):  # pragma: no cover - compiled
-    """The last set of weights that reads body b; 0 where none does."""
+    """Return the last set of weights that reads body b; 0 where none does."""
     last, sets = 0, len(observed)
     for w in range(sets):
         if observed[w, b]:
@@ -76,8 +76,9 @@ def last_set(b, ringing, observed, passes):  # pragma: no cover - compiled
 
 @uncounted
 def pass_on(b, j, w, i, place, values, count, passes, ringing, passed):  # pragma: no cover - compiled
-    """Add ``count`` values of body b's j-th pass, set w, to what its partner hears from sample i on; place: of the
-    first within its block.
+    """Add ``count`` values of body b's j-th pass, set w, to its partner from sample i on.
+
+    place: of the first value within its block.
     """
     phase, to = passes[b, j].phase, passes[b, j].to
     ringing[to].passed_to = 1
@@ -90,7 +91,7 @@ def pass_on(b, j, w, i, place, values, count, passes, ringing, passed):  # pragm
 
 @uncounted
 def add_passed(n, ringing, observed, source, passed, loud):  # pragma: no cover - compiled
-    """What was passed on joins what the bodies sound themselves; loud (b, 2): those now sound."""
+    """Add what was transmitted to the bodies' own sound; loud (b, 2): those now active."""
     for b in range(len(ringing)):
         if ringing[b].passed_to:
             ringing[b].passed_to, loud[b, 0] = 0, 1
@@ -102,8 +103,10 @@ def add_passed(n, ringing, observed, source, passed, loud):  # pragma: no cover 
 
 
 def set_passes(bank: Bank, state: BankState, b: int, wanted: Mapping[int, Array]) -> None:
-    """What body b passes on from the next block's start, at once where nothing of it sounds: weights (W, m) complex by
-    partner. What it passed on till then ends. Where places are wanting, the first of ``wanted`` have them.
+    """Set what body b transmits from the next block's start, at once where nothing of it is active.
+
+    wanted: weights (W, m) complex by partner. Earlier passes end. Where there are too few places, the first of
+    ``wanted`` have them.
     """
     start, m, modes = int(bank.body[b]["start"]), int(bank.body[b]["columns"]), bank.law.shape[1]
     now, mine, sets = state.ringing[b], state.passes[b], len(bank.observed)

@@ -1,4 +1,4 @@
-"""The phasors of a strike, eight modes at a time: complex exponentials without a library.
+"""Phasors of a strike, eight modes at a time: complex exponentials without a library.
 
 e^z = (Σ_k (z/8)^k / k!)^8        k ≤ 14: with |z| ≤ 3.73 (|Im s| < π, Re s > -2) the rest is below 1e-17
 """
@@ -20,7 +20,7 @@ SQUARED = 3
 
 
 def _exponential(e: Emit, s: Pair, times: Value) -> Pair:
-    """e^{s·times}, |s·times| ≤ 3.73."""
+    """Compute e^{s·times}, |s·times| ≤ 3.73."""
     scaled = e.builder.fmul(times, constant(0.5**SQUARED))
     z = e.builder.fmul(s[0], scaled), e.builder.fmul(s[1], scaled)
     last = constant(1 / factorial(DEGREE))
@@ -35,8 +35,10 @@ def _exponential(e: Emit, s: Pair, times: Value) -> Pair:
 
 @intrinsic
 def fill_phasors(typingctx, rows, at, width, law, modes, start, lanes, gain, share, phase, delta, stay, less):
-    """Rows r = gain·share·(1 + i d/ω) e^{s·phase}, D = e^{s·delta}, E0 = e^{s·stay}, E1 = e^{s·less} of ``lanes`` lanes
-    from ``at`` on, real and imaginary parts in turn, rows ``width`` apart. law: flat (6, modes); gain (lanes,).
+    """Fill rows with r = gain·share·(1 + i d/ω) e^{s·phase}, D = e^{s·delta}, E0 = e^{s·stay}, E1 = e^{s·less}.
+
+    ``lanes`` lanes from ``at`` on, real and imaginary parts in turn, rows ``width`` apart. law: flat (6, modes); gain
+    (lanes,).
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

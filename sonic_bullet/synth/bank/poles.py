@@ -1,9 +1,9 @@
-"""Poles that change: of bodies whose contacts do (take_coming), of modes that depend on their level (bend_poles).
+"""Changing poles: of bodies whose contacts change (take_coming), of level-dependent modes (bend_poles).
 
     coming (8, m): d and ω a sample, d/ω, e^s and e^{256 s}, lift -> law, pole, block at the next block's start
 
-Block starts lie on the grid of absolute time: any cutting of calls gives the same bits. ½|z|² is a mode's energy
-whatever its pole is, and z goes on as it is: no change of poles adds energy, and none is heard as a jump.
+Block starts lie on the grid of absolute time: any split into calls gives the same bits. ½|z|² is a mode's energy
+whatever its pole is, and z continues as it is: no change of poles adds energy or causes a jump.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @uncounted
 def take_coming(b, start, stop, ringing, law, pole, block, coming):  # pragma: no cover - compiled
-    """Begin of body b's block: poles that were to come are there."""
+    """Take the poles that were to come, at the begin of body b's block."""
     modes = law.shape[1]
     if ringing[b].fresh:
         ringing[b].fresh = 0
@@ -36,8 +36,7 @@ def take_coming(b, start, stop, ringing, law, pole, block, coming):  # pragma: n
 
 @uncounted
 def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
-    """Poles of a level-dependent body for the ``span`` samples to come: means over them of what its modes do if nothing
-    strikes them.
+    """Compute the poles of a level-dependent body for the ``span`` samples to come: means over the unforced decay.
 
     a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),
         ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
@@ -63,8 +62,10 @@ def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no co
 
 
 def set_poles(bank: Bank, state: BankState, b: int, step: Array, lift: Array | None = None) -> None:
-    """Other poles (m,), s = (-d + iω)/sr, for body b's modes: from the next block's start, at once where nothing of it
-    sounds. lift (m,): share of a contact's load that a mode's velocity of 1 lifts; None: none.
+    """Set other poles (m,), s = (-d + iω)/sr, of body b's modes from the next block's start.
+
+    At once where nothing of it is active. lift (m,): fraction of a contact's load that a modal velocity of 1 removes
+    (contact separation); None: none.
     """
     start, stop, m = (int(bank.body[b][name]) for name in ("start", "stop", "columns"))
     lanes = slice(start, start + m)

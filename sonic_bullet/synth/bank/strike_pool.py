@@ -23,18 +23,18 @@ from sonic_bullet.synth.bank.phasors import fill_phasors
 
 NODES_PER_PULSE = 24
 CELLS_PER_RADIAN = 4.0
-"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is what its level may err."""
+"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is the error allowed in its level."""
 MOST_CELLS = 4096
 """Cells a sample: a pulse shorter than one is even over it."""
 AT_ONCE = 1e-3
-"""Samples: a shorter pulse acts all at the first sample that any of it has come to."""
+"""Samples: a shorter pulse acts whole at the first sample that any of it has come to."""
 SHORTEST = 1e-12
-"""Samples: what is shorter is as long."""
+"""Shortest length of a pulse, in samples; shorter ones get it."""
 
 
 @uncounted
 def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
-    """Force at a share of the pulse in [0, 1], mean 1. hertz: the pulse's table (synth.pulse)."""
+    """Interpolate the force at a fraction of the pulse in [0, 1], mean 1. hertz: the pulse's table (synth.pulse)."""
     if flat:
         return 0.5 * np.pi * np.sin(np.pi * share)
     cells = hertz.shape[1] - 1
@@ -127,7 +127,7 @@ def _enter_nodes(
 
 @uncounted
 def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
-    """The pulse as cells of the sample grid, which no sample cuts through, and what one of them leaves:
+    """Divide the pulse into cells of the sample grid, which no sample cuts through, and compute a cell's response.
 
     (1 + i d/ω) (e^{s/cells} - 1)/(s/cells): an impulse that acts evenly over the cell, at the cell's end.
     """
@@ -160,7 +160,7 @@ def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
 
 @uncounted
 def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
-    """Give back the rows of body b's strikes that have acted."""
+    """Free the rows of body b's strikes that have acted."""
     before, slot = -1, ringing[b].strike
     while slot >= 0:
         after = strikes[slot].next
@@ -178,7 +178,7 @@ def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
 
 @uncounted
 def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
-    """Whether a strike on the modes of body b has nodes to come before sample ``end``."""
+    """Return whether a strike on the modes of body b has nodes to come before sample ``end``."""
     slot = ringing[b].strike
     while slot >= 0:
         if strikes[slot].modal and strikes[slot].first < end:
@@ -189,8 +189,10 @@ def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
 
 @uncounted
 def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no cover - compiled
-    """What nodes of a strike act at the samples at … at + count - 1: plan (count, 3) and due as `drive.strike_nodes`
-    reads them; the samples they begin and end with. final: the strike moves on.
+    """Plan which nodes of a strike act at the samples at … at + count - 1.
+
+    Fills plan (count, 3) and due as `drive.strike_nodes` reads them; returns the samples they begin and end with.
+    final: the strike advances.
     """
     strike = strikes[slot]
     upcoming, phase, filled = strike.upcoming, strike.phase, 0
@@ -221,8 +223,7 @@ def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no
 def enter_pulses(
     pulses, count, push, begin_s, after_s, at, sr, bodies, law, ringing, strikes, rows, free, hertz
 ):  # pragma: no cover - compiled
-    """Enter a step's pulses on both bodies of each, in order: how many were, less than ``count`` where the pool is
-    full.
+    """Enter a step's pulses on both bodies of each, in order; return how many, fewer where the pool is full.
 
     pulses: PULSE rows of render.tables; push (pulses, 2, columns): Uᵀj of the whole impulse. begin_s, after_s: of the
     rendered step, absolute: those found in the step after it count from there. at: the next sample.

@@ -1,12 +1,12 @@
-"""The bank's inner loop as vector instructions: free ringing of a chunk of modes over one block of 256 samples.
+"""Inner loop of the bank as vector instructions: free ringing of a chunk of modes over one block of 256 samples.
 
     y[16 q + r] = Σ_modes Re(u p^(16 q) p^r) = Σ Re(u s^q)·Re(p^r) - Im(u s^q)·Im(p^r),    u = w z,  s = p^16,
         q, r in 0 … 15
 
-an outer product of two short geometric rows per mode: two multiply-adds a sample, accumulators in registers. numba has
-no vector type and its loop vectoriser keeps accumulators in memory, so these four functions are written in LLVM's own
-language; all sums have a fixed order and every multiply-add is stated, so the bits are the same on every call. Arrays
-are float64, contiguous; a body's modes fill whole groups of LANES (spare lanes are zero).
+It is an outer product of two short geometric rows per mode: two multiply-adds a sample, accumulators in registers.
+numba has no vector type and its loop vectoriser keeps accumulators in memory, so these four functions are written in
+LLVM's own language. All sums have a fixed order and every multiply-add is stated, so the bits are the same on every
+call. Arrays are float64, contiguous; a body's modes fill whole groups of LANES (spare lanes are zero).
 """
 
 from __future__ import annotations
@@ -31,10 +31,8 @@ _TILE_ROWS = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  
 def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  # type: ignore[no-untyped-def]
     """Take the state at a block's start: now = z (0 where |z|² < floor), z <- now·p^256, powers = p, p², p⁴, p⁸, p¹⁶.
 
-    Returns lanes alive.
-
-    z, pole, block: flat (2·modes), real parts first; now (2·CHUNK); powers (10·CHUNK). start, count: the chunk, count a
-    multiple of LANES.
+    Returns the active lanes. z, pole, block: flat (2·modes), real parts first; now (2·CHUNK); powers (10·CHUNK). start,
+    count: the chunk, count a multiple of LANES.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -68,8 +66,9 @@ def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  #
 
 @intrinsic
 def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
-    """table (CHUNK, 2·ROW): Re p^r, then Im p^r, r = 0 … 15, of each mode: p^r as the product of p, p², p⁴, p⁸ where
-    r has that bit.
+    """Fill table (CHUNK, 2·ROW) with Re p^r, then Im p^r, r = 0 … 15, of each mode.
+
+    p^r is the product of p, p², p⁴, p⁸ where r has that bit.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -104,7 +103,7 @@ def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def columns(typingctx, now, weight, modes, start, powers, count, column):  # type: ignore[no-untyped-def]
-    """column (2·ROWS, CHUNK): Re u s^q, then -Im u s^q, q = 0 … 15, with u = weight·now. weight: flat (2·modes)."""
+    """Fill column (2·ROWS, CHUNK) with Re u s^q, then -Im u s^q, q = 0 … 15, u = weight·now. weight: flat (2·modes)."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -134,7 +133,7 @@ def columns(typingctx, now, weight, modes, start, powers, count, column):  # typ
 
 @intrinsic
 def outer(typingctx, column, table, count, sound):  # type: ignore[no-untyped-def]
-    """sound (BLOCK,) += Σ over the chunk's modes of column ⊗ table, mode after mode."""
+    """Add Σ over the chunk's modes of column ⊗ table to sound (BLOCK,), mode after mode."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)

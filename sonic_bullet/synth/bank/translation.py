@@ -1,12 +1,12 @@
-"""The three translations of a rigid body: one pole, three axes, forces and cells of pulses in, far pressure out.
+"""Translations of a rigid body: one pole, three axes, forces and cells of pulses in, far pressure out.
 
     z <- z p + (1 + i d/ω) (e^s - 1)/s · F period + Σ strikes,    pushed = weight Re z
     force: acts evenly over the sample before its instant; strike: even over the cells of the sample grid,
         at each sample   j (1 + i d/ω) (D - 1)/(s/c) Σ_i ΔQ_i D^i    over the c cells before it,  D = e^{s/c}
-        (its own impulses, evenly over the cells, as what such a mode hears of a slow force is its slope)
+        (its own impulses, evenly over the cells, as such a mode responds to the slope of a slow force)
     all forces on a body act as one:   F = Σ ± f (d0 + (d1 - d0) x)
 
-Such a mode (see render.resonator) is gone within some ten or hundred samples: it runs sample by sample, and rests where
+Such a mode (see render.resonator) decays within some ten or hundred samples: it runs sample by sample, and rests where
 it has fallen below the floor at one of every DRIVEN samples of absolute time.
 """
 
@@ -21,7 +21,7 @@ from sonic_bullet.synth.pulse import cumulated
 
 @uncounted
 def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
-    """kick (6, n or more): from impulses in rows 0, 2, 4 to what they leave in real and imaginary part of each axis."""
+    """Turn the impulses in rows 0, 2, 4 of kick (6, n or more) into real and imaginary part of each axis."""
     for axis in range(3):
         real, imag = kick[2 * axis], kick[2 * axis + 1]
         for k in range(n):
@@ -57,7 +57,7 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
 
 @uncounted
 def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
-    """The recursion on all axes, through the samples at … at + n - 1."""
+    """Run the recursion on all axes through the samples at … at + n - 1."""
     p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
     motion = ringing[b].motion
     x, xi, y, yi, z, zi = motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1], motion[2, 0], motion[2, 1]
@@ -94,7 +94,7 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
 def translate(
     at, n, b, bodies, ringing, strikes, hertz, first, last, side, signal, direction0, direction1, kick, pushed
 ):  # pragma: no cover - compiled
-    """Samples at … at + n - 1 of body b's translations into pushed (3, n). False, and nothing done, where they rest.
+    """Compute samples at … at + n - 1 of body b's translations into pushed (3, n). False where they rest.
 
     side[first … last - 1]: 2·drive + side of its forces; signal (drives, 2, more than n): their impulses at both ends;
     kick (6, n and a vector more): scratch.
