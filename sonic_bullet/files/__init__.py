@@ -1,11 +1,11 @@
-"""Audio and npz in and out: what reaches a disk is whole, finite and said.
+"""Read and write audio, contact logs, models, meshes and cases; files are written whole or not at all.
 
     samples (channels, n) Pa -> scale -> check -> clip and count -> partial file -> read back -> fsync -> NAME.EXT
     ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
-`audio` writes sound, as loud as `levels` says, `recordings` reads it, `logs` and `models` write contact logs and modal
-models (`logs` describes both), `container` is the npz beneath them, `meshes` and `cases` read what they are named
-after, `reading` is the boundary of all readers, `atomic` the replacing.
+`audio` writes sound at the level that `levels` finds, `recordings` reads it, `logs` and `models` write contact logs and
+modal models (`logs` describes both), `container` is the npz below them, `meshes` and `cases` read meshes and cases,
+`reading` is the boundary of all readers, `atomic` replaces files.
 """
 
 from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing

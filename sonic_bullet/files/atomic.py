@@ -1,6 +1,6 @@
-"""Write beside, then replace: under the final name there is either the old file or the whole new one.
+"""Write to a partial file, then replace: the final name holds either the old file or the whole new one.
 
-    check_output: can a file of that name be made there? tried, before anything is computed
+    check_output: tries, before anything is computed, whether a file of that name can be made
     replacing:
         partial file (locked, `sonic_bullet.machine.partial_file`) -> write -> flush -> fsync -> os.replace -> NAME
 
@@ -24,11 +24,13 @@ NAME_BYTES_MAX = 255  # NAME_MAX of POSIX file systems
 
 
 def check_output(path: str | os.PathLike[str]) -> Path:
-    """The real, absolute path (links followed) that a file called ``path`` would be written to; a file is made beside
-    it and removed.
+    """Return the real, absolute path (links followed) of an output file, after a trial file in its folder.
 
-    Raises FileError where it could not be written: the folder is missing or takes no file, the name is too long or no
-    Unicode, or it belongs to a folder, a device or, in a folder like /tmp, to somebody else.
+    Raises
+    ------
+    FileError
+        The file cannot be written: the folder is missing or takes no file, the name is too long or not Unicode, or it
+        is that of a folder, a device or, in a folder like /tmp, another user's file.
     """
     target = _target(path)
     try:
@@ -39,11 +41,11 @@ def check_output(path: str | os.PathLike[str]) -> Path:
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
-    """The real path of ``path``, where its name can be one of a file. Raises FileError."""
+    """Return the real path of ``path``; FileError where it cannot be that of a file."""
     name = os.fspath(path)
     if not name or "\0" in name:
         raise FileError(f"{name!r} is no file name", "name a file")
-    # no UTF-8: neither JSON nor a report could say where the file is
+    # not UTF-8: neither JSON nor a report could name the file
     if any("\ud800" <= letter <= "\udfff" for letter in name):
         raise FileError(f"{name!r} is no file name: it is not valid Unicode", "name a file in UTF-8")
     try:
@@ -67,7 +69,7 @@ def _target(path: str | os.PathLike[str]) -> Path:
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """What stands at ``path``, None for nothing. Raises OSError, where a name is too long for one."""
+    """Return the status of ``path``, None where nothing is there; OSError, where a name is too long."""
     try:
         return path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -75,7 +77,7 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def cannot(verb: str, path: object, error: OSError) -> FileError:
-    """FileError for what the operating system said about ``path``."""
+    """Make the FileError of an operating system's error about ``path``."""
     remedies = {
         "FileNotFoundError": "check the path",
         "PermissionError": "choose a place you may use",
@@ -87,9 +89,7 @@ def cannot(verb: str, path: object, error: OSError) -> FileError:
 
 
 def kept_name(target: Path) -> Path:
-    """NAME.partial.EXT beside NAME.EXT, for what an interrupted run leaves to be used; the stem is cut where the whole
-    would be too long.
-    """
+    """Return NAME.partial.EXT for NAME.EXT, the file of an interrupted run; a stem that is too long is cut."""
     ending = f".partial{target.suffix}"
     stem = os.fsencode(target.stem)[: NAME_BYTES_MAX - len(os.fsencode(ending))]
     return target.with_name(stem.decode("utf-8", "ignore") + ending)
@@ -97,10 +97,14 @@ def kept_name(target: Path) -> Path:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A binary file that takes the place of ``path`` when the block ends without an error, and vanishes with one.
+    """Open a binary file that replaces ``path`` when the block ends without an error, and is removed with one.
 
-    Raises FileError where the path cannot be written. A library that hides why its writes failed is asked again: the
-    disk says.
+    Where a library hides why its writes failed, the disk is tested again for the reason.
+
+    Raises
+    ------
+    FileError
+        The path cannot be written.
     """
     target = _target(path)
     try:

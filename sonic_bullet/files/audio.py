@@ -1,16 +1,15 @@
-"""Samples in pascals to an audio file.
+"""Write samples in pascals to an audio file.
 
     y = g·x,  g of `levels`: 1 by default, so that 1.0 in the file is 1 Pa
 
-Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: what is beyond is clipped and
+Float files hold y as it is, above full scale too. Every other format holds |y| ≤ 1: larger samples are clipped and
 counted in `AudioReport.clipped`. float32 subnormals are flushed to zero (decaying tails are full of them, and they slow
-every player), NaN and infinities are refused. What full scale is in pascals stands in the file (riff/scale.py), and
-`read_audio` gives pascals back. The same samples give the same bytes, except in OGG, whose streams carry
-a random serial number.
+every player), NaN and infinities are refused. The file states its full scale in pascals (riff/scale.py), and
+`read_audio` returns pascals. Equal samples give equal bytes, except in OGG, whose streams carry a random serial number.
 
-libsndfile says neither why a write failed nor, when it closes, whether one did: before a file gets its name it is read
-to its end and its rate, channels and frames are compared with what was written; where they differ the disk itself is
-asked why.
+libsndfile reports neither why a write failed nor, when it closes, whether one did. Before a file gets its name it is
+therefore read to its end and its rate, channels and frames are compared with those written; where they differ the disk
+is tested for the reason.
 """
 
 from __future__ import annotations
@@ -57,9 +56,9 @@ SMALLEST_NORMAL = 2.0**-126  # of float32
 
 
 def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
-    """Real path, container and sample format that ``path`` asks for, before any sample is rendered.
+    """Return real path, container and sample format for ``path``, before any sample is rendered.
 
-    Raises FileError where the place cannot be written or the extension or subtype is unknown.
+    Raises FileError where the file cannot be written, or its extension or subtype is unknown.
     """
     path = as_path(path, "path", "name a sound file, such as out.wav")
     extension = Path(path).suffix.lower()
@@ -89,11 +88,10 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
 class AudioWriter:
     """An audio file that grows block by block; a context manager.
 
-    `write` takes (channels, n) pascals, into a partial file; leaving the block gives that the name NAME.EXT, once it
-    has been read back. Leaving it with an error, or with Ctrl-C, keeps what was written as a valid file
-    NAME.partial.EXT and says so in the error; NAME.EXT is untouched. gain_per_pa: file units for one pascal.
-    expected_frames: chooses RF64 over WAV where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV. scale:
-    whether the file says what its full scale is; False: what is written is of no known level.
+    `write` appends (channels, n) pascals to a partial file. Leaving the block reads it back and gives it the name
+    NAME.EXT. Leaving it with an error, or with Ctrl-C, keeps the samples as a valid file NAME.partial.EXT, which the
+    error names; NAME.EXT is untouched. gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV
+    where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV. scale: whether the file states its full scale.
     """
 
     def __init__(
@@ -108,10 +106,7 @@ class AudioWriter:
         chunks: bytes = b"",
         scale: bool = True,
     ) -> None:
-        """Opens the partial file.
-
-        Raises FileError (place, extension, subtype) and AudioError (rate, channels, gain, size).
-        """
+        """Open the partial file; FileError (place, extension, subtype), AudioError (rate, channels, gain, size)."""
         import soundfile
 
         self.path = os.fspath(path)
@@ -150,6 +145,7 @@ class AudioWriter:
 
     @property
     def is_float(self) -> bool:
+        """Whether samples are floating-point numbers."""
         return self.subtype in ("FLOAT", "DOUBLE")
 
     def write(self, samples: Array) -> None:
@@ -194,7 +190,7 @@ class AudioWriter:
             self.energy_pa2 += float(np.sum(block**2))
 
     def report(self) -> AudioReport:
-        """What has been written so far."""
+        """Report what has been written so far."""
         rms = math.sqrt(self.energy_pa2 / (self.frames * self.channels)) if self.frames else 0.0
         return AudioReport(
             self.path, self.format, self.subtype, self.sr, self.channels, self.frames, self.gain_per_pa, self.peak_pa,
@@ -202,15 +198,17 @@ class AudioWriter:
         )  # fmt: skip
 
     def __enter__(self) -> AudioWriter:
+        """Return the writer."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Name the whole file, or keep the partial one after an error."""
         if error is not None:
             note_closing()
         try:
-            with suppress(RuntimeError):  # LibsndfileError: what became of the file is seen when it is read back
+            with suppress(RuntimeError):  # LibsndfileError: reading the file back shows its state
                 self.file.close()
             if error is None:
                 self._name_it()
@@ -230,7 +228,7 @@ class AudioWriter:
         error.add_note(saved)
 
     def _name_it(self) -> None:
-        """Give the whole file its name. Raises FileError, OSError."""
+        """Give the whole file its name; raises FileError, OSError."""
         self._append()
         if self._read_back() != self.frames:
             raise self._refused()
@@ -238,28 +236,26 @@ class AudioWriter:
         self.partial.replace(self.target)
 
     def _append(self) -> None:
-        """What the file says of itself, behind its samples. Raises OSError."""
+        """Append the chunks after the samples; raises OSError."""
         if self.chunks:
             append_chunks(self.partial.fd, self.chunks)
 
     def _keep(self) -> int:
-        """Keep what can be read of an unfinished file beside its target; how many frames that is. Raises OSError."""
+        """Keep the readable part of an unfinished file; return its frames; raises OSError."""
         frames = self._read_back() if self.frames else 0
         if frames:
-            with suppress(OSError):  # the disk may be full: what is kept of it then says no scale
+            with suppress(OSError):  # the disk may be full: the kept file then has no scale
                 self._append()
             self.partial.replace(kept_name(self.target))
         return frames
 
     def _refused(self) -> FileError:
-        """Why the file is not what was written to it, by what the disk says."""
+        """Find, by the disk, why the file differs from what was written."""
         reason = self.partial.refusal() or OSError("the disk took only a part of it")
         return cannot("write", self.path, reason)
 
     def _read_back(self) -> int:
-        """How many frames the closed file holds, decoded to its end; -1 where it is of another rate or number of
-        channels, 0 where it cannot be read.
-        """
+        """Count the frames of the closed file by decoding it; -1 of another rate or channels, 0 if unreadable."""
         import soundfile
 
         os.lseek(self.partial.fd, 0, os.SEEK_SET)
@@ -289,13 +285,29 @@ def write_audio(
 ) -> AudioReport:
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
-    The extension chooses the format (`FORMATS`), ``subtype`` the sample format in libsndfile's names. ``peak_dbfs``
-    (dB re full scale) or ``lufs`` scales; both: a loudness whose true peak a limiter keeps below peak_dbfs (of lufs
-    alone below -1 dBTP); neither: full_scale_pa is 1.0 in the file. The file says what its full scale is, and
-    `read_audio` undoes it; full_scale_pa None: samples are in no known unit, and it says none. Over 4 GiB a .wav is
-    written as RF64. cues: places named in a .wav (none of them: [] still says where the file begins), time_reference:
-    its first sample on the timeline it is for (files.riff). Raises AudioError (rate, NaN, silence or under 0.4 s where
-    loudness is asked, a loudness beyond reach) and FileError (place, format).
+    The extension chooses the format (`FORMATS`). Over 4 GiB a .wav is written as RF64. The file states its full scale,
+    and `read_audio` undoes it.
+
+    Parameters
+    ----------
+    peak_dbfs, lufs
+        Level of the peak, dB re full scale, or loudness. Both: a loudness whose true peak a limiter keeps below
+        peak_dbfs; of lufs alone below -1 dBTP. Neither: full_scale_pa is 1.0 in the file.
+    full_scale_pa
+        None: samples are in no known unit, and the file states no scale.
+    subtype
+        Sample format in libsndfile's names.
+    cues
+        Named places in a .wav; an empty list still writes the time reference.
+    time_reference
+        First sample of the file on its timeline (files.riff).
+
+    Raises
+    ------
+    AudioError
+        Rate, NaN, silence or under 0.4 s where loudness is asked for, a loudness that cannot be reached.
+    FileError
+        The file cannot be written in that place or format.
     """
     rate = check_sr(sr)
     _, container, _ = check_audio_output(path, subtype)
@@ -324,7 +336,7 @@ def write_at_level(
     *,
     scale: bool = True,
 ) -> AudioReport:
-    """What `write_audio` writes once the level is found. Raises AudioError, FileError."""
+    """Write as `write_audio` does, at a level already found; raises AudioError, FileError."""
     gain, (channels, frames) = level.gain_per_pa, sound.shape
     words = f"{Path(path).stem[:80]}; {scale_text(1 / gain)}" if scale else Path(path).stem
     chunks = b"" if cues is None else wave_chunks(cues, description=words, time_reference=time_reference)

@@ -1,12 +1,12 @@
-"""What was computed once, kept on disk under the name of what it was computed from.
+"""Cache of computed arrays on disk, under a hash of their inputs.
 
     KIND-sha256(numbers, options, source text that computes it) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache
         folder
 
-A file is written beside its name and moved there whole; a cut, foreign or damaged file is a miss, is computed anew and
-replaced. Nothing is pickled. When a save passes the limit, what was unused for longest goes
-(`sonic_bullet.machine.kept_files`), and another process may take any entry away at any time. The user's cache folder is
-private (`sonic_bullet.machine.user_folder`); without a home nothing is kept.
+Files are written atomically. A cut, foreign or damaged file is a miss: it is computed anew and replaced. Nothing is
+pickled. When a save passes the limit, the entries unused for longest are removed (`sonic_bullet.machine.kept_files`),
+and another process may remove any entry at any time. The user's cache folder is private
+(`sonic_bullet.machine.user_folder`); without a home directory nothing is cached.
 """
 
 from __future__ import annotations
@@ -34,9 +34,7 @@ class _Header(msgspec.Struct):
 
 
 def folder(place: Place) -> Path | None:
-    """The cache's folder: ``place``, or for "default" SONIC_BULLET_CACHE or the user's cache folder; None for no
-    cache.
-    """
+    """Return the cache's folder: ``place``, or for "default" SONIC_BULLET_CACHE or the user's; None: no cache."""
     if place is None:
         return None
     if place != "default":
@@ -46,13 +44,13 @@ def folder(place: Place) -> Path | None:
 
 
 def holds(place: Place, name: str) -> bool:
-    """Whether there is an entry of that name, sound or not."""
+    """Tell whether there is an entry of that name, valid or not."""
     at = folder(place)
     return at is not None and (at / f"{name}.npz").is_file()
 
 
 def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
-    """Arrays and note kept under ``name``, or None where there is no such entry that can be read."""
+    """Return arrays and note of the entry ``name``, or None where no entry can be read."""
     where = folder(place)
     if where is None:
         return None
@@ -66,8 +64,12 @@ def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
 
 
 def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
-    """Keep arrays and note under ``name``; a full or read-only disk costs the next run time, not this one its
-    result. Raises FileError where SONIC_BULLET_CACHE_LIMIT is no size.
+    """Store arrays and note under ``name``; a full or read-only disk is ignored.
+
+    Raises
+    ------
+    FileError
+        SONIC_BULLET_CACHE_LIMIT is not a size.
     """
     where = folder(place)
     if where is None:
@@ -79,8 +81,11 @@ def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
 
 
 def bound(where: Path) -> None:
-    """Remove what was unused for longest, where there is more than the limit.
+    """Remove the entries unused for longest, where the cache is over its limit.
 
-    Raises FileError where SONIC_BULLET_CACHE_LIMIT is no size.
+    Raises
+    ------
+    FileError
+        SONIC_BULLET_CACHE_LIMIT is not a size.
     """
     bounded(computed(where), limit_bytes())

@@ -1,6 +1,6 @@
-"""The fields of case.json as classes that msgspec decodes, with the bounds that each number has.
+"""Fields of case.json as classes that msgspec decodes, with the bounds of each number.
 
-case_schema.py says what each means, cases.py makes a `Case` of them.
+case_schema.py describes each field, cases.py makes a `Case` of them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Vector = tuple[Number, Number, Number]
 
 
 class ElasticFields(msgspec.Struct, frozen=True):
-    """Guessed constants."""
+    """Estimated elastic constants."""
 
     youngs_modulus: float | None = None
     density: Annotated[float, msgspec.Meta(ge=1e-3, le=LARGEST)] | None = None
@@ -44,13 +44,13 @@ class FixedFields(msgspec.Struct, frozen=True):
 
 
 class SupportFields(msgspec.Struct, frozen=True):
-    """How the objects were held."""
+    """Supports of the objects."""
 
     fixed: tuple[FixedFields, ...] = ()
 
 
 class SensorFields(msgspec.Struct, frozen=True):
-    """What recorded the strikes."""
+    """The sensor that recorded the strikes."""
 
     type: str = ""
     response: str = ""
@@ -59,7 +59,7 @@ class SensorFields(msgspec.Struct, frozen=True):
 
 
 class ForceFields(msgspec.Struct, frozen=True):
-    """The force of an instrumented hammer."""
+    """Force signal of an instrumented hammer."""
 
     file: str
     channel: Channel = 0
@@ -67,7 +67,7 @@ class ForceFields(msgspec.Struct, frozen=True):
 
 
 class StrikeFields(msgspec.Struct, frozen=True):
-    """Where and how hard."""
+    """Position, direction and impulse of a strike."""
 
     position: Vector | None = None
     direction: Vector | None = None
@@ -76,7 +76,7 @@ class StrikeFields(msgspec.Struct, frozen=True):
 
 
 class Line(msgspec.Struct, frozen=True):
-    """A measured resonance: freq_hz, and what else was measured of it."""
+    """A measured resonance: freq_hz, and the other quantities measured."""
 
     freq_hz: Hertz
     decay_per_s: Hertz | None = None

@@ -1,9 +1,9 @@
-"""What each field of case.json means, and the JSON Schema made of these words and of the classes that read it.
+"""Descriptions of the fields of case.json, and the JSON Schema made of them and of the classes that read the file.
 
     CaseFields (case_fields.py) -> msgspec's schema + ABOUT -> JSON Schema
     -> `sonic-bullet case schema`, docs/reference/case.md
 
-A field that a class gets without words here is an error, so the page cannot fall behind.
+A field without a description here is an error, so that the page stays complete.
 """
 
 from __future__ import annotations
@@ -118,7 +118,13 @@ ABOUT: dict[str, tuple[str, dict[str, str]]] = {
 
 
 def case_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of case.json. Raises KeyError where a field has no words in ABOUT."""
+    """Return the JSON Schema (draft 2020-12) of case.json.
+
+    Raises
+    ------
+    KeyError
+        ABOUT lacks a field.
+    """
     made = msgspec.json.schema(CaseFields)
     text = json_bytes(made).decode()
     for name in made["$defs"]:  # the classes are called after the schema's parts and what they hold

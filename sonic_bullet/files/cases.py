@@ -1,10 +1,10 @@
-"""Cases: recorded strikes of known objects, and what whoever recorded them declares.
+"""Cases: recorded strikes of known objects, with the declarations of whoever recorded them.
 
     FOLDER/case.json ("sonic-bullet-case/1") -> typed, every path inside the folder -> Case
 
-A case may lack a mesh, positions, impulses, a sensor, or give measured `features` in place of a file; what it does not
-declare is None and is found by the fit, or said to be unknown. Fields that this version does not know are left alone,
-and named (`unread.py`). Nothing in a case is ever executed.
+A case may lack a mesh, positions, impulses, a sensor, or give measured `features` in place of a file. What it does not
+declare is None: the fit finds it, or it stays unknown. Fields that this version does not know are ignored and named in
+a warning (`unread.py`). Nothing in a case is ever executed.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none")
 IN_AIR = ("velocity", "pressure")
-"""Sensors of real things: what they recorded was in air where a case does not say otherwise."""
+"""Sensors of real objects: their recordings are in air where a case does not say otherwise."""
 DIMENSION_TOLERANCE = 0.005
-"""Relative standard error of a mesh's dimensions where nobody says better: ± 0.1 mm, any error in it as likely, has
+"""Relative standard error of a mesh's dimensions by default: ± 0.1 mm, any error in it as likely, has
 0.058 mm, 0.5 % of 12 mm. [ISO 2768-1, class f, 6 to 30 mm]
 """
 MOST_TOLERANCE = 0.2  # beyond it a shape is not known at all
@@ -69,10 +69,9 @@ MOST_TOLERANCE = 0.2  # beyond it a shape is not known at all
 
 @dataclass(frozen=True, slots=True)
 class CaseObject:
-    """One object: its mesh file and metres per unit, the name of the guessed material, and guessed constants in SI
-    units.
+    """One object: its mesh file, metres per unit of it, the estimated material, and estimated constants.
 
-    dimension_tolerance: relative standard error of the mesh's dimensions.
+    fixed: clamps, each x, y, z and radius in m. dimension_tolerance: relative standard error of the mesh's dimensions.
     """
 
     name: str
@@ -88,10 +87,9 @@ class CaseObject:
 
 @dataclass(frozen=True, slots=True)
 class CaseRecording:
-    """One strike: an audio file or measured lines, on which object, for what use, and where and how hard; None where
-    not declared.
+    """One strike: an audio file or measured lines, its object, its use, and the strike; None where not declared.
 
-    channel: counted from 0; None: the first that is not dead.
+    channel: counted from 0; None: the first that is not dead. force: file, channel and newtons per unit of the force.
     """
 
     file: Path | None
@@ -107,12 +105,21 @@ class CaseRecording:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A case. sensor: "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a
-    microphone), "sum" (of modes) or "unknown".
+    """A case as declared.
 
-    onset_s: when the impulse arrives in every file, or None. support: as declared, in words; clamps stand with the
-    objects. medium: what the object radiates into, "air", "none" or "unknown": as declared, else air where a microphone
-    or a vibrometer listened. warnings: of fields that are not read, one line each.
+    Parameters
+    ----------
+    sensor
+        "velocity" (of the surface at sensor_m along sensor_direction, by object), "pressure" (a microphone), "sum" (of
+        modes) or "unknown".
+    onset_s
+        Arrival of the impulse in every file, or None.
+    support
+        As declared, in words; clamps are in the objects.
+    medium
+        What the object radiates into: "air", "none" or "unknown"; by default air for a microphone or a vibrometer.
+    warnings
+        One line for each field that is not read.
     """
 
     name: str
@@ -130,9 +137,12 @@ class Case:
 
 
 def read_case(folder: str | os.PathLike[str]) -> Case:
-    """The case in a folder (or of a case.json).
+    """Read the case in a folder (or a case.json); audio may be missing.
 
-    Raises FileError naming the file and what is wrong with it; audio may be missing.
+    Raises
+    ------
+    FileError
+        Names the file and its fault.
     """
     path = Path(folder)
     with reading(path, "case", FileError, _REMEDY):
@@ -191,14 +201,20 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
 
 
 def medium_of(declared: str | None, sensor: str) -> str:
-    """What the object radiates into: "air", "none" or "unknown"."""
+    """Return the medium that the object radiates into: "air", "none" or "unknown"."""
     if declared is None:
         return "air" if sensor in IN_AIR else "unknown"
     return declared if declared in MEDIA else "unknown"
 
 
 def dimension_tolerance(given: float | None, name: str, default: float = DIMENSION_TOLERANCE) -> float:
-    """A relative error of dimensions as given, or the default. Raises FileError where it is out of range."""
+    """Return the relative error of dimensions as given, or the default.
+
+    Raises
+    ------
+    FileError
+        It is out of range.
+    """
     if given is None:
         return default
     if not 0 <= given <= MOST_TOLERANCE:
@@ -265,7 +281,13 @@ def _recording(
 
 
 def inside(folder: Path, name: str) -> Path:
-    """The path of a file a case names. Raises FileError where it leads out of the folder, by name or by link."""
+    """Return the path of a file that a case names.
+
+    Raises
+    ------
+    FileError
+        It is outside the folder, by name or by link.
+    """
     if not name or "\0" in name or os.path.isabs(name) or "\\" in name:
         raise FileError(f"case names the file {name!r}", "name files inside the case's folder")
     if (
@@ -291,7 +313,7 @@ def _by_object(value: dict[str, Vector] | Vector | None, objects: dict[str, Case
 
 
 def _response(sensor: SensorFields) -> str:
-    """What is recorded: the declared response decides, then the sensor's type."""
+    """Return the recorded quantity, by the declared response, else by the sensor's type."""
     for text in (sensor.response.lower(), sensor.type.lower()):
         if "velocity" in text or "vibromet" in text:
             return "velocity"
@@ -303,7 +325,7 @@ def _response(sensor: SensorFields) -> str:
 
 
 def _onset(value: Any) -> float | None:
-    """A number of seconds, or "sample K" in words; None where it is not said."""
+    """Return a number of seconds, 0 for "sample 0" in words, else None."""
     if isinstance(value, (int, float)):
         return float(value)
     if isinstance(value, str) and "sample 0" in value.lower():

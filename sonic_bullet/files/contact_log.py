@@ -1,4 +1,4 @@
-"""The contact log: everything that a later render needs, by value.
+"""Contact log: all data that a later render needs, by value.
 
 Step (records.contacts) one after another -> ContactLog -> npz (files.logs) -> ContactLog -> render
 """
@@ -23,15 +23,28 @@ from sonic_bullet.records.simulated import Change, Values, frozen_texts, frozen_
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactLog:
-    """All that a later render or comparison needs, by value: bodies with their models, steps, sensors, rate and seed.
+    """All data that a later render or comparison needs, by value.
 
-    steps: whatever was given, a sequence whose steps are made when they are asked for (`LogSteps`), as a slice of it
-    is. untouched: ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
-    events: what happened besides contacts, in its order. engine: the simulator's settings at the first step, under its
-    own names; what is not among them is not known. versions: of sonic_bullet, the packages that its numbers hang on and
-    the simulator, by name. changes: what was set otherwise later, of engine and bodies, in order;
-    `dynamics` and `settings` give what holds at a step. residual: whether it is rendered with what materials sound
-    beside their modes; supports: whether with what bodies stand on.
+    Parameters
+    ----------
+    bodies, sensors, sr, seed, air
+        Bodies with their models, sensors, sample rate in Hz, and seed.
+    steps
+        A sequence of `Step`; stored as `LogSteps`, which makes steps, and slices of them, on request.
+    untouched
+        Ids of bodies that were in the world and touched nothing; known while listening, not kept in files.
+    events
+        Events other than contacts, in their order.
+    engine
+        Settings of the simulator at the first step, under its own names; a setting that is missing is not known.
+    versions
+        Of sonic_bullet, of the packages that its numbers depend on and of the simulator, by name.
+    changes
+        Later changes of engine and bodies, in order; `dynamics` and `settings` give the values at a step.
+    residual
+        Whether it is rendered with the residuals of materials.
+    supports
+        Whether it is rendered with the supports of resting bodies.
     """
 
     bodies: tuple[Body, ...]
@@ -49,6 +62,7 @@ class ContactLog:
     supports: bool = True
 
     def __post_init__(self) -> None:
+        """Check the fields and their order."""
         ids = ("give ids of bodies",)
         checked = {
             "bodies": as_kinds(self.bodies, Body, "log: bodies", "give a tuple of Body", error=LogError),
@@ -80,10 +94,11 @@ class ContactLog:
             raise LogError("a step has a pose of a body that the log has not", "use an unbroken contact log")
 
     def __len__(self) -> int:
-        """Rows in all: one per contact and step."""
+        """Return the number of rows: one per contact and step."""
         return self._steps.row_counts[1]
 
     def __iter__(self) -> Iterator[Step]:
+        """Iterate over the steps."""
         return iter(self.steps)
 
     @property
@@ -92,11 +107,12 @@ class ContactLog:
 
     @property
     def duration_s(self) -> float:
+        """Sum of the steps' lengths."""
         return float(np.sum(self._steps.lengths_s()))
 
     @property
     def start_s(self) -> Array:
-        """(s,) time at which each step starts."""
+        """Start time of each step (s,)."""
         return np.concatenate([[0.0], np.cumsum(self._steps.lengths_s())])[: len(self.steps)]
 
     @property
@@ -105,24 +121,29 @@ class ContactLog:
         return Contacts.trusted(joined([block.contact for block in self.blocks()], CONTACT))
 
     def blocks(self) -> Iterator[StepBlock]:
-        """The rows of some steps at a time, in order, for logs that are larger than the memory."""
+        """Iterate over the rows of some steps at a time, in order, for logs larger than the memory."""
         return self._steps.blocks()
 
     @property
     def step(self) -> Array:
-        """(k,) the step of each row."""
+        """Step of each row (k,)."""
         counts = [np.zeros(0, np.int64), *(block.counts("contact") for block in self.blocks())]
         return np.repeat(np.arange(len(self.steps)), np.concatenate(counts))
 
     @property
     def time_s(self) -> Array:
-        """(k,) start of the step of each row."""
+        """Start of the step of each row (k,)."""
         return self.start_s[self.step]
 
     def dynamics(self, index: int, step: int = 0) -> Values:
-        """Friction, restitution, damping and mass of body ``index`` of `bodies` in a step, by the simulator's names.
+        """Return friction, restitution, damping and mass of body ``index`` in a step, by the simulator's names.
 
-        What is not there is not known. Raises LogError where there is no such body.
+        A value that is missing is not known.
+
+        Raises
+        ------
+        LogError
+            There is no such body.
         """
         index = as_whole(
             index, "index", "give an index into bodies", least=0, most=len(self.bodies) - 1, error=LogError
@@ -130,7 +151,7 @@ class ContactLog:
         return self._at(step, index, self.bodies[index].dynamics)
 
     def settings(self, step: int = 0) -> Values:
-        """Settings of the engine in a step; what is not there is not known."""
+        """Return the settings of the engine in a step; a setting that is missing is not known."""
         return self._at(step, None, self.engine)
 
     def _at(self, step: int, body: int | None, first: Values) -> Values:
@@ -142,19 +163,31 @@ class ContactLog:
         return frozen_values({name: x for name, x in values.items() if x is not None}, "values")
 
     def impulse_on(self, body: int, link: int | None = None) -> Array:
-        """(k, 3) world-frame impulses in N·s that acted on the body, friction included, one row per contact and step.
+        """Return the impulses on a body, friction included, one row per contact and step.
 
-        link None: all links of the body. Where ids were given anew (removal, reset), the newest bearer of the id
-        counts. Raises LogError where the log never saw the body.
+        Parameters
+        ----------
+        body
+            Id; where it was reused (removal, reset), the newest body of that id.
+        link
+            None: all links of the body.
+
+        Returns
+        -------
+        Array, shape (k, 3)
+            In N·s, world frame.
+
+        Raises
+        ------
+        LogError
+            The log has no such body.
         """
         rows = self.rows
         sign, mask = self._side(rows, body, link)
         return np.asarray((sign[:, None] * rows.impulse_n_s)[mask])
 
     def rows_on(self, body: int, link: int | None = None) -> Array:
-        """(k,) row numbers (into `rows`, `step`, `time_s`) of the impulses that `impulse_on` lists, in the
-        same order.
-        """
+        """Return the row numbers (k,), into `rows`, `step`, `time_s`, of the impulses of `impulse_on`, in its order."""
         return np.flatnonzero(self._side(self.rows, body, link)[1])
 
     def _side(self, rows: Contacts, body: int, link: int | None) -> tuple[Array, Array]:
@@ -179,7 +212,7 @@ class ContactLog:
         return on_a.astype(float) - on_b.astype(float), on_a ^ on_b
 
     def first(self, count: int) -> ContactLog:
-        """The log of the first ``count`` steps and of what happened up to their end."""
+        """Return the log of the first ``count`` steps, with events and changes up to their end."""
         return replace(
             self,
             steps=self.steps[:count],
@@ -190,8 +223,15 @@ class ContactLog:
     def save(self, path: object, models: object = "included") -> None:
         """Write the log as npz (numpy arrays and JSON, no pickle), whole or not at all.
 
-        models: "included", or "reference": a smaller file that names them, and `read_log` finds them in the cache.
-        Raises FileError.
+        Parameters
+        ----------
+        models
+            "included", or "reference": a smaller file that names them, and `read_log` finds them in the cache.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written.
         """
         from sonic_bullet.files.logs import write_log
 
@@ -199,7 +239,7 @@ class ContactLog:
 
 
 def _as_steps(steps: object) -> LogSteps:
-    """Steps as columns. Raises LogError for what are none."""
+    """Convert steps to columns; LogError where they are not steps."""
     if isinstance(steps, LogSteps):
         return steps
     return LogSteps.of(as_kinds(steps, Step, "log: steps", "give a tuple of Step", error=LogError))

@@ -1,12 +1,11 @@
-"""npz of arrays and one JSON entry.
+"""npz files of arrays and one JSON entry.
 
     header.npy  (n,) uint8: UTF-8 JSON, first key "format"
     NAME.npy    one array each, little-endian bool, integer or float
 
-Entries are stored, but for those whose names begin as the caller says: they are deflated. Nothing is pickled, and the
-shape in an npy header is compared with the entry's true length before anything is allocated. ``numpy.load(path)`` reads
-the file too. What is larger than memory is written block by block (`Column`), and stays in the file when it is read
-(`RowsOfEntry`).
+Entries are stored; those with a given prefix are deflated. Nothing is pickled, and the shape in an npy header is
+compared with the entry's true length before anything is allocated. ``numpy.load(path)`` reads the file too. Arrays
+larger than memory are written block by block (`Column`), and stay in the file when it is read (`RowsOfEntry`).
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class _Format(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """An entry that is written block by block: dtype, shape, and a call that gives its blocks (·, *shape[1:])."""
+    """An entry that is written block by block: dtype, shape, and a function that yields its blocks (·, *shape[1:])."""
 
     dtype: Any
     shape: tuple[int, ...]
@@ -54,16 +53,18 @@ class Column:
 
 
 class RowsOfEntry:
-    """An array that stays in its file: [start:stop] reads those rows. Its file is open for as long as this is."""
+    """An array that stays in its open file: [start:stop] reads those rows."""
 
     def __init__(self, file: BinaryIO, at: int, dtype: np.dtype[Any], shape: tuple[int, ...], what: str) -> None:
         self.dtype, self.shape, self.ndim = dtype, shape, len(shape)
         self._file, self._at, self._what = file, at, what
 
     def __len__(self) -> int:
+        """Return the number of rows."""
         return self.shape[0]
 
     def __getitem__(self, rows: slice) -> Array:
+        """Read rows start … stop-1."""
         start, stop, _ = rows.indices(len(self))
         tail = self.shape[1:]
         size = self.dtype.itemsize * math.prod(tail)
@@ -78,8 +79,17 @@ def write_container(
     arrays: Mapping[str, Array | Column],
     packed: str | None = None,
 ) -> None:
-    """Write header and arrays, whole or not at all; equal input gives equal bytes. packed: what the names of entries
-    begin with that are deflated, None: none is. Raises FileError.
+    """Write header and arrays, whole or not at all; equal input gives equal bytes.
+
+    Parameters
+    ----------
+    packed
+        Prefix of the entries that are deflated; None: none.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
     """
     entries = {HEADER: np.frombuffer(json_bytes(header), np.uint8), **arrays}
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
@@ -105,12 +115,23 @@ def read_container(
     what: str,
     lazy: Collection[str] = (),
 ) -> tuple[Header, dict[str, Array]]:
-    """The header as ``kind`` and all arrays, by name, read-only.
+    """Read the header as ``kind`` and all arrays, by name, read-only.
 
-    form: the format id asked for; what: the thing, in words, for messages ("contact log"); lazy: arrays that stay in
-    the file where they are stored and have over `LOADED_BYTES` (`RowsOfEntry`: used like the others by [start:stop]).
+    Parameters
+    ----------
+    form
+        Format id that the file must have.
+    what
+        Name of the file's content for messages ("contact log").
+    lazy
+        Arrays that stay in the file where they are stored and have over `LOADED_BYTES` (`RowsOfEntry`).
 
-    Raises FileError where there is no readable file, LogError where it is cut, foreign, damaged or pickled.
+    Raises
+    ------
+    FileError
+        There is no readable file.
+    LogError
+        It is cut, foreign, damaged or pickled.
     """
     with reading(path, what, LogError, REMEDY):
         if not stat.S_ISREG(os.stat(path).st_mode):  # a pipe would be waited for without end
@@ -130,13 +151,19 @@ def read_container(
 
 
 def _is_older(found: str, form: str) -> bool:
-    """Whether a format is ``form`` with a lower number."""
+    """Tell whether a format is ``form`` with a lower number."""
     (kind, _, number), (known, _, latest) = found.rpartition("/"), form.rpartition("/")
     return kind == known and number.isdecimal() and int(number) < int(latest)
 
 
 def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:
-    """The array ``name`` if it has that dtype and shape (None: any length). Raises LogError."""
+    """Return the array ``name`` of that dtype and shape (None: any length).
+
+    Raises
+    ------
+    LogError
+        It is missing or of another dtype or shape.
+    """
     if name not in arrays:
         raise LogError(f"{path}: array '{name}' is missing", REMEDY)
     array = arrays[name]
@@ -150,7 +177,7 @@ def take(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | 
 
 
 def distinct(things: list[Any], key: Any) -> tuple[list[Any], list[int | None]]:
-    """The different things by content, in order of appearance, and the index of each; None stays None."""
+    """Return the different objects by content, in order of appearance, and the index of each; None stays None."""
     kept: dict[Any, int] = {}
     by_identity = {id(thing): key(thing) for thing in things if thing is not None}
     index = [None if thing is None else kept.setdefault(by_identity[id(thing)], len(kept)) for thing in things]
@@ -166,7 +193,7 @@ def _entries(archive: zipfile.ZipFile) -> Iterator[tuple[str, zipfile.ZipInfo]]:
 
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, lazy: bool) -> Any:
-    """The array of an entry, or its rows in the file. zipfile compares checksums when it comes to an entry's end."""
+    """Read the array of an entry, or its rows in the file; zipfile compares checksums at an entry's end."""
     where = f"entry '{info.filename}'"
     with archive.open(info) as entry:
         head = entry.read(HEAD_BYTES)
@@ -184,7 +211,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, lazy
 
 
 def _npy_head(raw: bytes, entry_bytes: int, where: str) -> tuple[np.dtype[Any], tuple[int, ...], bool, int]:
-    """dtype, shape, whether in Fortran's order, and where the numbers begin, of an npy file that begins so."""
+    """Parse dtype, shape, Fortran order, and the offset of the numbers from the first bytes of an npy file."""
     stream = io.BytesIO(raw)
     try:
         version = np.lib.format.read_magic(stream)

@@ -1,11 +1,11 @@
-"""How loud a file is to be: the factor between pascals and file units, of a full scale, a peak or a programme loudness.
+"""Level of a sound file: the factor between pascals and file units, from a full scale, a peak or a programme loudness.
 
 g = 1/full_scale_pa                      calibrated (the default: 1.0 in the file = 1 Pa)
     10^(peak_dbfs/20)/max|x|             --peak-dbfs alone: of the samples
     10^((lufs - L(x))/20)                --lufs, L: programme loudness [ITU-R BS.1770-5, annex 1]
 
-Where that loudness would pass a true peak of peak_dbfs (-1 dBTP unless it is given) a limiter holds it below, and g
-rises until what it leaves has the loudness asked for. AudioReport says how much was taken off.
+Where that loudness would pass a true peak of peak_dbfs (-1 dBTP by default) a limiter reduces it, and g rises until the
+result has the loudness asked for. AudioReport holds the reduction.
 """
 
 from __future__ import annotations
@@ -25,17 +25,25 @@ SR_MIN_HZ, SR_MAX_HZ = 8000, 384_000
 
 
 TRUE_PEAK_DBTP = -1.0
-"""Above which no programme is to go [EBU R 128, rec. h]."""
+"""Maximum true peak of a programme [EBU R 128, rec. h]."""
 RISE_DB, MOST_RISE_DB = 6.0, 36.0
-"""Of g above what the loudness asks for without a limiter: a step, and where a sound is as flat as it will be."""
+"""Rise of g above the gain without a limiter: a step, and the limit beyond which a sound gets no flatter."""
 LUFS_WITHIN = 0.01
 LOOKS, MOST_STEPS = 6, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileLevel:
-    """gain_per_pa: file units for one pascal. curve: a factor a frame besides (fades, limiter), None: ones. limited_db:
-    most that the limiter takes off, limited_s: for how long it takes more than 0.1 dB.
+    """Level of a sound file.
+
+    Parameters
+    ----------
+    gain_per_pa
+        File units for one pascal.
+    curve
+        Additional factor per frame (fades, limiter); None: ones.
+    limited_db, limited_s
+        Largest reduction by the limiter, and how long it is more than 0.1 dB.
     """
 
     gain_per_pa: float
@@ -47,8 +55,14 @@ class FileLevel:
 def find_level(
     sound: KeptSound, sr: int, peak_dbfs: float | None, lufs: float | None, full_scale_pa: float
 ) -> FileLevel:
-    """The level of the module's head; peak and loudness are of the whole sound, its fades included: a peak takes a
-    pass over it, a loudness all of it in memory. Raises AudioError where the level cannot be reached.
+    """Find the level by the module's equations, of the whole sound with its fades.
+
+    A peak takes one pass over the sound; a loudness needs all of it in memory.
+
+    Raises
+    ------
+    AudioError
+        The level cannot be reached.
     """
     if sound.shape[0] == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
@@ -72,7 +86,7 @@ def find_level(
 
 
 def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceiling_dbtp: float) -> FileLevel:
-    """The level of a loudness below a true peak. Raises AudioError."""
+    """Find the level of a loudness below a true peak; raises AudioError."""
     from sonic_bullet.files.loudness.limiter import MARGIN_DB
     from sonic_bullet.files.loudness.true_peak import find_true_peak, sample_true_peaks
 
@@ -81,7 +95,7 @@ def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceil
     if peak_db.max() <= ceiling_dbtp:
         return FileLevel(gain, sound.curve)
     goal_db = ceiling_dbtp - MARGIN_DB
-    for _ in range(LOOKS):  # a factor that changes makes peaks of its own between samples: tenths of a dB
+    for _ in range(LOOKS):  # a varying factor creates new peaks between samples: tenths of a dB
         rise, factor = _rise(sound.scaled(gain), sr, peak_db, lufs, goal_db)
         left = sound.limited(factor)
         excess_db = 20 * math.log10(gain * rise * find_true_peak(left)) - (ceiling_dbtp - MARGIN_DB)
@@ -93,8 +107,9 @@ def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceil
 
 
 def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float) -> tuple[float, Array]:
-    """By how much more a sound of the loudness ``lufs`` must rise so that a limiter leaves it that, and the limiter's
-    factors. peak_db (n,): its true peaks; goal_db: the limiter's ceiling. Raises AudioError.
+    """Find the rise above ``lufs`` after which a limited sound has ``lufs``, and the limiter's factors, or AudioError.
+
+    peak_db (n,): true peaks of the sound at that loudness; goal_db: ceiling of the limiter.
     """
     from scipy.optimize import brentq
 
@@ -104,7 +119,7 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
     gain = 1.0 if sound.curve is None else sound.curve.gain
 
     def limited(rise_db: float, release_db_s: float) -> tuple[Array, float]:
-        """The factors, and how far the loudness is from the one asked for."""
+        """Return the factors, and the measured loudness minus the one asked for."""
         factor = limiter_factor(peak_db + rise_db, sr, goal_db, release_db_s)
         measured = integrated_lufs(sound.limited(factor).scaled(gain * 10 ** (rise_db / 20)), sr)
         return factor, (-math.inf if measured is None else measured) - lufs
@@ -130,8 +145,12 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
 
 
 def as_sound(samples: object) -> KeptSound:
-    """Samples (channels, n) or (n,) as float64, kept or in memory. Raises AudioError where they are no array of real
-    numbers of that shape.
+    """Convert samples (channels, n) or (n,) to float64 sound, in a spool or in memory.
+
+    Raises
+    ------
+    AudioError
+        They are not an array of real numbers of that shape.
     """
     if isinstance(samples, KeptSound):
         return samples
@@ -148,7 +167,13 @@ def as_sound(samples: object) -> KeptSound:
 
 
 def check_sr(sr: object) -> int:
-    """``sr`` as a whole number of Hz between 8000 and 384 000. Raises AudioError on anything else."""
+    """Return ``sr`` as a whole number of Hz between 8000 and 384 000.
+
+    Raises
+    ------
+    AudioError
+        It is anything else.
+    """
     remedy = f"give a whole number of Hz between {SR_MIN_HZ} and {SR_MAX_HZ}, 48000 say"
     try:
         return as_whole(sr, "sr", remedy, least=SR_MIN_HZ, most=SR_MAX_HZ, error=AudioError)
@@ -158,7 +183,7 @@ def check_sr(sr: object) -> int:
 
 
 def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
-    """Raise AudioError where a level cannot be asked for: before anything is rendered."""
+    """Raise AudioError where a level is not valid, before anything is rendered."""
     if peak_dbfs is not None:
         as_number(
             peak_dbfs,
@@ -180,8 +205,9 @@ def check_levels(peak_dbfs: float | None, lufs: float | None) -> None:
 
 
 def _loudness_gain(sound: KeptSound, sr: int, peak_pa: float, lufs: float) -> float:
-    """The gain that gives a sound a loudness [ITU-R BS.1770-5, annex 1], without a limiter: what of it lies above the
-    gate hangs on the gain, so it is found by steps. Raises AudioError where it has none.
+    """Find, by iteration, the gain to a loudness without a limiter [ITU-R BS.1770-5, annex 1]; AudioError if none.
+
+    The part of the sound above the gate depends on the gain.
     """
     from sonic_bullet.files.loudness.meter import CHANNEL_WEIGHT, integrated_lufs
 

@@ -1,6 +1,6 @@
-"""What a contact log's header says, and how records become that and come back: all that is no array.
+"""Header of a contact log: conversion of records to JSON and back, except their arrays.
 
-Body, Material, Sensor, Change -> structs (msgspec) -> JSON -> structs -> the same records; arrays lie beside it
+Body, Material, Sensor, Change -> structs (msgspec) -> JSON -> structs -> the same records; arrays are other entries
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class _ModalSum(msgspec.Struct, tag="modal-sum"):
 
 
 class LogHeader(msgspec.Struct):
-    """The header. What a log may leave out has its default: not known, or none of it."""
+    """The header. A field that a log may omit has its default: not known, or none."""
 
     format: str
     sr: int
@@ -107,7 +107,7 @@ class LogHeader(msgspec.Struct):
 
 
 def material_key(material: Material) -> bytes:
-    """A material's content: equal ones are stored once."""
+    """Return the content of a material, by which equal ones are stored once."""
     more = (
         b"".join(getattr(material.residual, name).tobytes() for name in RESIDUAL_ARRAYS)
         if material.residual is not None
@@ -117,7 +117,7 @@ def material_key(material: Material) -> bytes:
 
 
 def pack_material(x: Material) -> _Material:
-    """The header's part of a material."""
+    """Convert a material to the header's struct."""
     return _Material(
         name=as_json_text(x.name),
         density_kg_m3=float(x.density_kg_m3),
@@ -135,7 +135,7 @@ def pack_material(x: Material) -> _Material:
 
 
 def pack_body(x: Body, material: int | None, model: int | None) -> _Body:
-    """The header's part of a body; material, model: their places among those of the log."""
+    """Convert a body to the header's struct; material, model: their indices in the log."""
     numbers = (int(x.body_id), int(x.link), int(x.epoch))
     return _Body(
         *numbers,
@@ -155,27 +155,27 @@ def pack_body(x: Body, material: int | None, model: int | None) -> _Body:
 
 
 def unpack_body(x: _Body, **parts: Any) -> Body:
-    """The body of that entry; parts: its fields that are no part of the header. Raises RecordError."""
+    """Build the body of that entry; parts: its fields outside the header; raises RecordError."""
     return Body(**{**msgspec.structs.asdict(x), **parts})
 
 
 def pack_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by name, as JSON can hold the names."""
+    """Make the names of values valid in JSON."""
     return {as_json_text(name): x for name, x in values.items()}
 
 
 def pack_change(x: Change) -> _Change:
-    """The header's part of a change."""
+    """Convert a change to the header's struct."""
     return _Change(int(x.step), None if x.body is None else int(x.body), pack_values(x.values))
 
 
 def unpack_change(x: _Change) -> Change:
-    """The change of that entry. Raises LogError, RecordError."""
+    """Build the change of that entry; raises LogError, RecordError."""
     return Change(x.step, x.body, x.values)
 
 
 def pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
-    """The header's part of a sensor."""
+    """Convert a sensor to the header's struct."""
     if isinstance(sensor, Microphone):
         return _Microphone(_vector(sensor.position_m))
     if isinstance(sensor, Vibrometer):
@@ -189,7 +189,7 @@ def _vector(array: Array) -> Vector:
 
 
 def unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index: int, path: object) -> Residual | None:
-    """The residual of material ``index``, where it has one. Raises LogError, RecordError."""
+    """Build the residual of material ``index``, where it has one; raises LogError, RecordError."""
     if header is None:
         return None
     parts = {
@@ -199,7 +199,7 @@ def unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index
 
 
 def unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
-    """The sensor of that entry. Raises RecordError."""
+    """Build the sensor of that entry; raises RecordError."""
     if isinstance(sensor, _Microphone):
         return Microphone(np.array(sensor.position_m))
     if isinstance(sensor, _Vibrometer):
@@ -212,7 +212,7 @@ def unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
 
 
 def pick(things: list[Any], index: int | None, path: object) -> Any:
-    """The thing of that index, None where there is no index. Raises LogError."""
+    """Return the object of that index, None without an index; LogError where it is out of range."""
     if index is not None and not 0 <= index < len(things):
         raise LogError(f"{path}: a body refers to a part that is not there", REMEDY)
     return None if index is None else things[index]

@@ -6,9 +6,9 @@ their own:
     format "sonic-bullet-contacts/3"; b bodies, s steps, p = Σ bodies in each step, k = Σ contacts of each step
       step_dt_s (s,) f8                     length of each step
       step_gravity_m_s2 (s, 3) f8            gravity in the world
-      step_body_count, step_contact_count (s,) i8   how many of the p and k rows are each step's, in order
+      step_body_count, step_contact_count (s,) i8   number of each step's rows among the p and k rows, in order
       pose_position_m (p, 3) f8, pose_quaternion_xyzw (p, 4) f8, pose_teleported (p,) bool
-      pose_body (p,) i4                     whose they are: indices, ascending in a step; who has gone is not there
+      pose_body (p,) i4                     indices of the bodies, ascending in a step; removed bodies are absent
       contact_<field> (k, …)
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
                                             sweep_m_s, approach_m_s, gap_m f8
@@ -17,16 +17,16 @@ their own:
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4,
           _curvature_per_m (f,) f8
-      model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes go with their level
+      model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes depend on their level
           all arrays of models: deflated, as planes (n, …) u1 of numbers of n bytes: all first bytes, all second ones, …
       model<i>_shape u2, model<i>_shape_exponent (m,) i2
-          in place of _shape f4, where shapes are whole multiples of powers of two, as those that are solved here are:
+          in place of _shape f4, where shapes are whole multiples of powers of two, as those solved here are:
           `differences` of those numbers, and the powers (records/mode_shapes.py)
       models (in the header)
-          what is no array of each; or its SHA-256, where it lies in the cache
+          each model without its arrays; or its SHA-256, where it is in the cache
       events (in the header)
           in order: {"kind": "quench", "reset" or "moved", "step": the step before which it happened,
-                     "body": index of who was moved, or null: all}
+                     "body": index of the moved body, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
       of each body: dynamics, options, mounting, silent; of all: engine, versions, residual, supports (see `Body`,
@@ -77,7 +77,15 @@ LOG_FORMAT = "sonic-bullet-contacts/3"
 def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "included") -> None:
     """Write a contact log, whole or not at all; equal logs give equal bytes.
 
-    models: "included", or "reference": they are left to the cache, and the log names them. Raises FileError.
+    Parameters
+    ----------
+    models
+        "included", or "reference": they go to the cache, and the log names them.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
     """
     materials, material_of = distinct([body.material for body in log.bodies], material_key)
     entries, model_of, model_arrays = pack_models([body.model for body in log.bodies], models)
@@ -114,10 +122,14 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
 
 
 def read_log(path: str | os.PathLike[str]) -> ContactLog:
-    """The contact log that `write_log` wrote.
+    """Read the contact log that `write_log` wrote.
 
-    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent, or of models that the cache has
-    not).
+    Raises
+    ------
+    FileError
+        There is no such file.
+    LogError
+        It is cut, foreign, forged or inconsistent, or its models are not in the cache.
     """
     path = as_path(path, "path", "name a contact log (.npz)")
     header, arrays = read_container(path, LogHeader, LOG_FORMAT, "contact log", LAZY)

@@ -1,9 +1,9 @@
-"""Mesh files -> triangles as the file has them: OBJ is read here, STL, PLY, OFF, GLB and what else there is by trimesh.
+"""Read mesh files as triangles: OBJ here; STL, PLY, OFF, GLB and others by trimesh.
 
     f 1 2 3      the first vertex is 1        [Wavefront, Advanced Visualizer manual, appendix B1]
     f -3 -2 -1   the last vertex so far is -1
 
-A face that names a vertex which is not there is refused: taken as an index from the end, it would be another mesh.
+A face that names a missing vertex is refused: read as an index from the end, it would give another mesh.
 """
 
 from __future__ import annotations
@@ -27,11 +27,16 @@ SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
-    """Objects of a mesh file, in its own unit: (vertices (v, 3), faces (f, 3)) each, polygons as fans, nothing merged
-    or repaired.
+    """Read the objects of a mesh file in its own unit: (vertices (v, 3), faces (f, 3)) each.
 
-    Raises FileError where it cannot be read, MeshError where it is of no known kind, broken, or a face names no vertex
-    (line or number of the face).
+    Polygons become fans; nothing is merged or repaired.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read.
+    MeshError
+        Its kind is unknown, it is broken, or a face names a missing vertex (line or number of the face).
     """
     with reading(path, "mesh", MeshError, REMEDY):
         if not path.is_file():
@@ -43,9 +48,12 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
 
 
 def read_own_vertices(path: Path) -> MeshSurface:
-    """All vertices (v, 3) of a mesh file in the file's own order, those that no face names too, and its faces (f, 3).
+    """Read all vertices (v, 3) of a mesh file in its order, unused ones too, and its faces (f, 3).
 
-    Raises FileError and MeshError as `read_surfaces` does.
+    Raises
+    ------
+    FileError, MeshError
+        As `read_surfaces` does.
     """
     if path.suffix.lower() != ".obj":
         parts = read_surfaces(path)
@@ -71,7 +79,7 @@ def _check(path: Path, vertex: Array, face: Array) -> None:
 
 
 def _obj(path: Path) -> Iterator[MeshSurface]:
-    """Each object of a Wavefront OBJ with the vertices that it uses."""
+    """Yield each object of a Wavefront OBJ with the vertices that it uses."""
     points, objects = _parsed_obj(path)
     for faces in objects:
         if faces:
@@ -80,8 +88,9 @@ def _obj(path: Path) -> Iterator[MeshSurface]:
 
 
 def _parsed_obj(path: Path) -> tuple[Array, list[list[tuple[int, int, int]]]]:
-    """Vertices (v, 3) of a Wavefront OBJ, and of each object its triangles by vertices counted from 1: v, f, and o or g
-    as the start of an object; texture and normals are skipped.
+    """Parse a Wavefront OBJ: its vertices (v, 3), and the triangles of each object by vertices counted from 1.
+
+    Reads v, f, and o or g as the start of an object; skips texture and normals.
     """
     vertex: list[tuple[float, float, float]] = []
     objects: list[list[tuple[int, int, int]]] = [[]]  # of vertices as they are counted, from 1
@@ -121,7 +130,7 @@ def _vertex(words: list[str]) -> tuple[float, float, float]:
 
 
 def _corners(line: str, words: list[str], so_far: int) -> list[int]:
-    """Numbers, from 1, of the vertices that a face names. Raises ValueError."""
+    """Return the numbers, from 1, of the vertices that a face names; raises ValueError."""
     first = [word.split("/", 1)[0] for word in words[1:]] if "/" in line else words[1:]
     if "_" in line:
         raise ValueError("a face names vertices by their numbers")
@@ -164,7 +173,7 @@ def _other(path: Path) -> Iterator[MeshSurface]:
 
 
 def _check_off(path: Path) -> None:
-    """An OFF's faces by their lines: trimesh refuses them too, and does not say which. Raises MeshError."""
+    """Raise MeshError with the line of a wrong face of an OFF file, which trimesh does not report."""
     lines = [
         (number, line.split("#")[0].split())
         for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1)
@@ -182,10 +191,7 @@ def _check_off(path: Path) -> None:
 
 
 def _check_counts(path: Path, kind: str) -> None:
-    """A glTF accessor without a buffer stands for as many zeros as it says: no more than the file has bytes.
-
-    Raises MeshError.
-    """
+    """Raise MeshError where a glTF accessor without a buffer (zeros) claims more numbers than the file has bytes."""
     if kind not in ("glb", "gltf"):
         return
     content = path.read_bytes()

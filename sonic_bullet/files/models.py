@@ -1,4 +1,4 @@
-"""Modal models on disk, alone, inside a contact log or in the cache beside it: every number bit for bit, no pickle.
+"""Modal models on disk, alone, inside a contact log or in the cache: every number bit for bit, no pickle.
 
 format "sonic-bullet-model/2"           one model: model0_<array> as `logs` describes them, in `container`'s npz
 
@@ -33,9 +33,9 @@ from sonic_bullet.records.mode_shapes import differences, from_multiples, summed
 
 MODEL_FORMAT = "sonic-bullet-model/2"
 MODELS = ("included", "reference")
-"""Where a log's models are: in it, or in the cache."""
+"""Place of a log's models: in it, or in the cache."""
 PACKED = "model"
-"""What the names of arrays begin with that may be deflated."""
+"""Prefix of the arrays that are deflated."""
 MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "freq_hz": (float, (None,)),
     "decay_per_s": (float, (None,)),
@@ -45,15 +45,15 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "curvature_per_m": (float, (None,)),
 }
 BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m"}
-"""Array in the file -> field, of models whose modes go with their level; others have none."""
+"""Array in the file -> field, of models whose modes depend on their level; others have none."""
 
 
 ModelHash = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
-"""What the header says of a model that lies in the cache."""
+"""Entry in the header of a model that is in the cache."""
 
 
 class ModelEntry(msgspec.Struct, omit_defaults=True):
-    """What the header says of a model: all that is no array."""
+    """A model in the header, without its arrays."""
 
     volume_m3: float
     mass_kg: float
@@ -72,14 +72,19 @@ class _ModelHeader(msgspec.Struct):
 
 
 def write_model(path: str | os.PathLike[str], model: ModalModel) -> None:
-    """Write one modal model, whole or not at all. Raises FileError."""
+    """Write one modal model, whole or not at all; raises FileError."""
     write_container(path, _ModelHeader(MODEL_FORMAT, _pack_model(model)), _packed_arrays(model, 0), PACKED)
 
 
 def read_model(path: str | os.PathLike[str]) -> ModalModel:
-    """The modal model that `write_model` wrote.
+    """Read the modal model that `write_model` wrote.
 
-    Raises FileError (no such file) and LogError (cut, foreign, forged, inconsistent).
+    Raises
+    ------
+    FileError
+        There is no such file.
+    LogError
+        It is cut, foreign, forged or inconsistent.
     """
     header, arrays = read_container(path, _ModelHeader, MODEL_FORMAT, "modal model")
     with reading(path, "modal model", LogError, REMEDY):
@@ -89,10 +94,22 @@ def read_model(path: str | os.PathLike[str]) -> ModalModel:
 def pack_models(
     models: Sequence[ModalModel | None], where: object
 ) -> tuple[list[LoggedModel], list[int | None], dict[str, Array]]:
-    """What a log's header says of its bodies' models, each once, the number of each body's, and their arrays by their
-    names in the file.
+    """Pack the models of a log's bodies, each once.
 
-    where: one of `MODELS`; by reference they are kept in the cache. Raises FileError.
+    Parameters
+    ----------
+    where
+        One of `MODELS`; by reference they are stored in the cache.
+
+    Returns
+    -------
+    tuple
+        Entries of the header, the number of each body's model, and the arrays by their names in the file.
+
+    Raises
+    ------
+    FileError
+        `where` is unknown, or the cache cannot take them.
     """
     if not isinstance(where, str) or where not in MODELS:
         raise FileError(f"models is {shown(where)}", nearest(str(where), MODELS))
@@ -108,10 +125,14 @@ def pack_models(
 def recalled_models(
     entries: Sequence[LoggedModel], users: Sequence[tuple[int | None, str]], path: object
 ) -> dict[int, ModalModel]:
-    """The models, by their numbers, that the log ``path`` left to the cache. users: number and name of each body's
-    model.
+    """Load from the cache the models, by number, that the log ``path`` refers to.
 
-    Raises LogError where the cache has not all of them.
+    users: number and name of each body's model.
+
+    Raises
+    ------
+    LogError
+        The cache lacks one.
     """
     found = {i: _kept_model(entry) for i, entry in enumerate(entries) if isinstance(entry, str)}
     models = {i: model for i, model in found.items() if model is not None}
@@ -132,7 +153,7 @@ def unpack_models(
     recalled: Mapping[int, ModalModel],
     path: object,
 ) -> list[ModalModel]:
-    """The models of which a log's header says ``entries``, but for those that are recalled. Raises LogError."""
+    """Build the models of a log's header, those in the cache as recalled; raises LogError."""
     return [
         recalled[i] if isinstance(entry, str) else _unpack_model(entry, arrays, i, path)
         for i, entry in enumerate(entries)
@@ -140,9 +161,9 @@ def unpack_models(
 
 
 def _keep_models(models: Sequence[ModalModel]) -> list[str]:
-    """Keep models in the cache, where they are not yet, for logs that refer to them. Returns the SHA-256 of each.
+    """Store models in the cache for logs that refer to them; return the SHA-256 of each.
 
-    Raises FileError where there is no cache, or none that takes them all.
+    Raises FileError where there is no cache, or it cannot take them all.
     """
     keys, place = [model_key(model) for model in models], cache.folder("default")
     instead = "set SONIC_BULLET_CACHE to a folder that you may write to, or leave the models in the log"
@@ -162,7 +183,7 @@ def _keep_models(models: Sequence[ModalModel]) -> list[str]:
 
 
 def _kept_model(key: str) -> ModalModel | None:
-    """The model of that SHA-256 from the cache; None where it is not there, or is not that one."""
+    """Load the model of that SHA-256 from the cache; None where it is missing or another."""
     place = cache.folder("default")
     if place is None:
         return None
@@ -181,7 +202,7 @@ def _kept_at(place: Path, key: str) -> Path:
 
 
 def model_key(model: ModalModel) -> str:
-    """SHA-256 of a model's content, in hexadecimal: equal models are stored once."""
+    """Return the SHA-256 of a model's content in hexadecimal; equal models are stored once."""
     digest = hashlib.sha256(json_bytes(_pack_model(model)))
     for name, array in _arrays(model).items():
         digest.update(f"model0_{name} {array.shape}".encode() + array.tobytes())
@@ -189,7 +210,7 @@ def model_key(model: ModalModel) -> str:
 
 
 def _pack_model(x: ModalModel) -> ModelEntry:
-    """The header's part of a model."""
+    """Convert a model to the header's struct."""
     return ModelEntry(
         float(x.volume_m3),
         float(x.mass_kg),
@@ -201,13 +222,13 @@ def _pack_model(x: ModalModel) -> ModelEntry:
 
 
 def _arrays(model: ModalModel) -> dict[str, Array]:
-    """The arrays of a model, by their names in a file."""
+    """Return the arrays of a model, by their names in a file."""
     bent = {name: field for name, field in BENT_ARRAYS.items() if getattr(model, field) is not None}
     return {name: getattr(model, field) for name, field in ({name: name for name in MODEL_ARRAYS} | bent).items()}
 
 
 def _packed_arrays(model: ModalModel, index: int) -> dict[str, Array]:
-    """The arrays of a model as a file holds them, by their names there."""
+    """Return the arrays of a model as a file holds them, by their names there."""
     arrays = _arrays(model)
     exact = whole_multiples(model.shape)
     if exact is not None:
@@ -216,20 +237,20 @@ def _packed_arrays(model: ModalModel, index: int) -> dict[str, Array]:
 
 
 def _planes(array: Array) -> Array:
-    """(n, …) u1 of an array (…) of n bytes each: the first byte of every number, the second, and so on."""
+    """Convert an array (…) of n bytes each to planes (n, …) u1: all first bytes, all second ones, and so on."""
     parts = np.ascontiguousarray(array)[..., None].view(np.uint8)
     return np.ascontiguousarray(np.moveaxis(parts, -1, 0))
 
 
 def _taken(arrays: Mapping[str, Array], name: str, dtype: Any, shape: tuple[int | None, ...], path: object) -> Array:
-    """The array of the planes ``name``. Raises LogError."""
+    """Read an array back from the planes ``name``; raises LogError."""
     planes = take(arrays, name, np.uint8, (np.dtype(dtype).itemsize, *shape), path)
     found = np.ascontiguousarray(np.moveaxis(planes, 0, -1)).view(dtype)
     return np.asarray(found.reshape(planes.shape[1:]))
 
 
 def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, path: object) -> ModalModel:
-    """The model that these were made of. Raises LogError, RecordError."""
+    """Build a model from its header and arrays; raises LogError, RecordError."""
     exact = f"model{index}_shape_exponent" in arrays
     kinds = MODEL_ARRAYS | ({"shape": (np.uint16, MODEL_ARRAYS["shape"][1])} if exact else {})
     parts = {name: _taken(arrays, f"model{index}_{name}", dtype, shape, path) for name, (dtype, shape) in kinds.items()}
@@ -256,5 +277,5 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
 
 
 def as_json_text(text: str) -> str:
-    """``text`` as JSON can hold it: lone surrogates, as undecodable names carry them, become question marks."""
+    """Make a text valid in JSON: lone surrogates, as undecodable names carry them, become question marks."""
     return text.encode("utf-8", "replace").decode()

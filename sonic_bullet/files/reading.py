@@ -1,11 +1,10 @@
-"""The boundary of every reader: what a foreign file makes a parser throw leaves as one error of ours.
+"""Boundary of every reader: any exception of a parser becomes one error of this package.
 
-    first bytes -> those of a Git LFS pointer, which stands where a large file should -> kind("PATH …", "git lfs pull")
+    first bytes -> those of a Git LFS pointer, in place of a large file -> kind("PATH …", "git lfs pull")
     open, zip, npy, JSON, libsndfile, trimesh -> any exception -> kind("PATH …", remedy), at most 200 characters of it
         the file's own
 
-A lie about a size is no matter for this boundary: MemoryError passes, and readers compare claims with a file's true
-length first.
+False sizes are not handled here: MemoryError passes, and readers compare claims with a file's true length first.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # how every pointer b
 
 @contextmanager
 def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletError], remedy: str) -> Iterator[None]:
-    """Raises FileError where the system cannot read ``path``, else ``kind``, naming the path.
+    """Convert exceptions of the block, with the path: FileError where the system cannot read it, else ``kind``.
 
-    thing: what should be there, in words.
+    thing: expected content, in words.
     """
     try:
         refuse_lfs_pointer(path, kind)
@@ -44,22 +43,20 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
 
 
 def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:
-    """Raises ``kind`` where a file is the pointer that Git LFS leaves in place of a large one."""
+    """Raise ``kind`` where a file is the pointer that Git LFS leaves in place of a large one."""
     try:
         if not os.path.isfile(path):  # a pipe would be read empty
             return
         with open(path, "rb") as file:
             first = file.read(len(LFS_POINTER))
-    except (OSError, ValueError):  # whoever reads it says what is wrong
+    except (OSError, ValueError):  # the reader reports it
         return
     if first == LFS_POINTER:
         raise kind(f"{path} is a Git LFS pointer, not the file itself", "run git lfs pull where it came from")
 
 
 def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError]) -> SonicBulletError | None:
-    """The error as ``kind``, with the path and no more of the file than is allowed; None where it is all that
-    already.
-    """
+    """Return the error as ``kind``, with the path and a limited part of the file's text; None where it already is."""
     # every text has the empty name in it
     before, named, after = error.what.partition(path) if path else (error.what, " ", "")
     if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:

@@ -1,8 +1,8 @@
-"""Recordings: audio files of any make to samples, and which channel of them is listened to.
+"""Read recordings: audio files of any format to samples, and the selection of a channel.
 
     file -> libsndfile, by descriptor, forward only -> blocks to the end -> samples (channels, n), rate
 
-What a file says of its length is not believed: streams may not know it beforehand, and others lie.
+The length stated in a file is not used: streams may not know it beforehand, and other files state it wrongly.
 """
 
 from __future__ import annotations
@@ -29,25 +29,30 @@ UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state 
 BLOCK_SAMPLES = 1 << 18
 DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
 SHORTEST = 64  # samples: a millisecond at a usual rate
-# a range of full scale 1: below the one nothing is heard, below the other it is the last bits that toggle
+# a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
 SILENT, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
 UNBROKEN = "give an unbroken audio file"
 T = TypeVar("T")
 
 
 def read_audio_scale(path: str | os.PathLike[str]) -> float | None:
-    """What full scale of a sound file is in Pa, as it says itself; None: its level is unknown.
+    """Return the full scale in Pa that a sound file states; None: its level is unknown.
 
-    Raises FileError where it cannot be read.
+    Raises
+    ------
+    FileError
+        The file cannot be read.
     """
     return _read(path, _scale)[0]
 
 
 def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
-    """Samples (channels, n) float64 and the rate in Hz: pascals where the file says its scale, else in file units.
+    """Read samples (channels, n) float64 and the rate in Hz: pascals where the file states its scale, else file units.
 
-    Raises FileError where the file is missing, cut, no audio, of a rate that no recording has, or unpacks to more than
-    memory is for.
+    Raises
+    ------
+    FileError
+        The file is missing, cut, not audio, of a rate outside that of recordings, or unpacks to too many samples.
     """
 
     def read(sound: Any, fd: int) -> Array:
@@ -58,7 +63,7 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
 
 
 def _read(path: str | os.PathLike[str], what: Callable[[Any, int], T]) -> tuple[T, int]:
-    """What is read of an open sound file and its descriptor, and its rate. Raises FileError."""
+    """Read something from an open sound file and its descriptor; return it with the rate; raises FileError."""
     import soundfile
 
     path = as_path(path, "path", "name a sound file")
@@ -66,7 +71,7 @@ def _read(path: str | os.PathLike[str], what: Callable[[Any, int], T]) -> tuple[
         if not Path(path).is_file():
             raise FileError(f"cannot read {path}: no such file", "check the path")
     with reading(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:
-        # by its descriptor: what it is stands in its bytes, and a name that ends in .raw would have libsndfile guess
+        # by its descriptor: its bytes determine the format; for a name that ends in .raw libsndfile would guess
         try:
             with _forward()(file.fileno(), "r", closefd=False) as sound:
                 return what(sound, file.fileno()), int(sound.samplerate)
@@ -75,13 +80,13 @@ def _read(path: str | os.PathLike[str], what: Callable[[Any, int], T]) -> tuple[
 
 
 def _scale(sound: Any, fd: int) -> float | None:
-    """Of an open file."""
+    """Return the full scale of an open file."""
     return read_chunk_scale(fd) or scale_in(str(sound.comment).encode("utf-8", "replace"))
 
 
 @cache
 def _forward() -> Any:
-    """SoundFile that reads from start to end and never seeks, which a stream without a stated length cannot."""
+    """Return a SoundFile class that never seeks, which a stream without a stated length cannot."""
     import soundfile
 
     class Forward(soundfile.SoundFile):  # type: ignore[misc]
@@ -92,7 +97,7 @@ def _forward() -> Any:
 
 
 def _samples(sound: Any, path: object, file_bytes: int) -> Array:
-    """All samples (channels, n) of an open file. Raises FileError."""
+    """Read all samples (channels, n) of an open file; raises FileError."""
     if not READ_MIN_HZ <= sound.samplerate <= READ_MAX_HZ:
         raise FileError(
             f"cannot read {path}: sampled at {sound.samplerate} Hz",
@@ -123,7 +128,7 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
 
 
 def read_channel(path: str | os.PathLike[str], channel: int | None = None) -> tuple[Array, int, str]:
-    """Read the channel of a recording that is listened to.
+    """Read one channel of a recording.
 
     Parameters
     ----------
@@ -154,8 +159,14 @@ def read_channel(path: str | os.PathLike[str], channel: int | None = None) -> tu
 
 
 def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Array, str]:
-    """A channel (n,) of samples (channels, n) by its number or, None, the first that is not dead; which it is, in
-    words. Raises FileError, AudioError.
+    """Select a channel (n,) of samples (channels, n) by its number or, None, the first that is not dead; describe it.
+
+    Raises
+    ------
+    FileError
+        There is no such channel.
+    AudioError
+        It is silent, too short or not finite.
     """
     count, frames = samples.shape
     if channel is not None and not 0 <= channel < count:

@@ -1,9 +1,9 @@
-"""JSON from users to its typed form: what does not fit is one line with the key, what is there and what is wanted.
+"""Decode JSON from users to a typed form; an error names the key, the value found and the value wanted in one line.
 
 bytes, form -> value of that form
             -> error("WHERE: recordings 1: strike: position is a list of 2, wanted a list of 3", remedy)
 
-msgspec checks the types. Its messages hold a path and what is wanted; what is there is read off the same bytes anew.
+msgspec checks the types. Its messages hold a path and the wanted type; the value found is read from the same bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sonic_bullet.records.errors import SonicBulletError
 T = TypeVar("T")
 Key = str | int
 ANY = "..."
-"""The step into an object of free names, which msgspec does not name."""
+"""Step into an object of free names, which msgspec does not name."""
 NAMES = {
     "object": "an object {…}",
     "array": "a list [...]",
@@ -46,14 +46,14 @@ def decode_json(content: bytes, form: type[T], where: str, error: type[SonicBull
     form : type
         Struct, or any other type of msgspec.
     where : str
-        What it was read from, in words with its path.
+        Source of the content, in words with its path.
     error : type
-        What is raised where it does not fit, with ``remedy``.
+        Exception that is raised, with ``remedy``, where it does not fit.
 
     Raises
     ------
     SonicBulletError
-        As ``error``: one line that names the key, what is there and what is wanted.
+        As ``error``: one line that names the key, the value found and the value wanted.
     """
     try:
         try:
@@ -65,7 +65,7 @@ def decode_json(content: bytes, form: type[T], where: str, error: type[SonicBull
 
 
 def _untyped(content: bytes) -> Any:
-    """The JSON as it is; None where a number of it has no value."""
+    """Decode the JSON without a form; None where a number of it has no value."""
     try:
         return msgspec.json.decode(content)
     except msgspec.ValidationError:
@@ -73,7 +73,7 @@ def _untyped(content: bytes) -> Any:
 
 
 def _no_json(content: bytes, wrong: Exception) -> str:
-    """Say where text is no JSON."""
+    """Describe where text is not JSON."""
     if isinstance(wrong, UnicodeDecodeError):
         return "this is no UTF-8 text"
     if isinstance(wrong, RecursionError):
@@ -87,7 +87,7 @@ def _no_json(content: bytes, wrong: Exception) -> str:
 
 
 def _misfit(tree: Any, form: Any, message: str) -> str:
-    """What follows the words for the file: key, what is there, what is wanted."""
+    """Describe a validation error: key, value found, value wanted."""
     text, _, path = message.partition(" - at `$")
     keys = _with_names(tree, form, message, [int(i) if i else name or ANY for i, name in _steps(path)])
     key = "".join(f": {shown(k)}" if isinstance(k, str) else f" {k + 1}" for k in keys)
@@ -106,13 +106,13 @@ def _misfit(tree: Any, form: Any, message: str) -> str:
 
 
 def _steps(path: str) -> Iterator[tuple[str, str]]:
-    """(index, "") or ("", name) for each step of a path; neither for an object's free name."""
+    """Yield (index, "") or ("", name) for each step of a path; neither for an object's free name."""
     for step in re.finditer(r"\[(\d+)\]|\[\.\.\.\]|\.([^.\[`]+)", path):
         yield step[1] or "", step[2] or ""
 
 
 def _with_names(tree: Any, form: Any, message: str, keys: list[Key]) -> list[Key]:
-    """Keys with the first free name found: the one that, alone, is refused with the same words; likewise the next."""
+    """Replace free names in keys: each by the entry that, alone, is refused with the same message."""
     for at, key in enumerate(keys):
         if key != ANY or tree is None:
             continue
@@ -134,14 +134,14 @@ def _with_names(tree: Any, form: Any, message: str, keys: list[Key]) -> list[Key
 
 
 def _value(tree: Any, keys: list[Key]) -> Any:
-    """What stands there; raises LookupError, TypeError where nothing does."""
+    """Return the value at a place; LookupError, TypeError where there is none."""
     for key in keys:
         tree = tree[key]
     return tree
 
 
 def _there(tree: Any, keys: list[Key]) -> str:
-    """What stands there, in words."""
+    """Describe the value at a place."""
     try:
         value = _value(tree, keys)
     except (LookupError, TypeError):
@@ -155,7 +155,7 @@ def _there(tree: Any, keys: list[Key]) -> str:
 
 
 def _wanted(said: str) -> str:
-    """msgspec's words for a type and its bounds, as an engineer would say them."""
+    """Convert msgspec's words for a type and its bounds to plain ones."""
     found = re.fullmatch(r"`([^`]*)`(.*)", said)
     if found is None:
         return said.replace("`", "")
@@ -168,7 +168,7 @@ def _wanted(said: str) -> str:
 
 
 def _forms_at(form: msgspec.inspect.Type, keys: list[Key]) -> Iterator[msgspec.inspect.Type]:
-    """The types that may stand at a place; of a union all."""
+    """Yield the types that a place may have; all types of a union."""
     if isinstance(form, msgspec.inspect.UnionType):
         for kind in form.types:
             yield from _forms_at(kind, keys)
@@ -190,7 +190,7 @@ def _forms_at(form: msgspec.inspect.Type, keys: list[Key]) -> Iterator[msgspec.i
 
 
 def _choices(form: msgspec.inspect.Type, keys: list[Key]) -> list[str]:
-    """The values that a place may have, where its type lists them."""
+    """List the values that a place may have, where its type lists them."""
     named = [json_bytes(value).decode() for kind in _forms_at(form, keys)
              if isinstance(kind, msgspec.inspect.LiteralType) for value in kind.values]  # fmt: skip
     tagged = [f'"{kind.tag}"' for kind in _forms_at(form, keys[:-1])

@@ -1,7 +1,6 @@
-"""Fields of a JSON file that its typed form does not read: a name mistyped is said, not passed over.
+"""Report fields of a JSON file that its typed form does not read, so that mistyped names are found.
 
-decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest one that it
-has
+decoded JSON, msgspec.Struct -> one line for each field that no struct at that place has, with the nearest known one
 """
 
 from __future__ import annotations
@@ -21,9 +20,7 @@ QUOTED = 60  # characters of a name from a file
 
 
 def unread_fields(value: Any, form: type[msgspec.Struct], where: str) -> tuple[str, ...]:
-    """A line for each field of a decoded value that ``form`` and the structs inside it do not have, `MOST` at most and
-    how many more.
-    """
+    """Return a line for each field of a decoded value that ``form`` lacks, `MOST` at most, and a count of others."""
     lines = list(_unread(value, msgspec.inspect.type_info(form), where))
     more = len(lines) - MOST
     many = format_count(more, "more field is", "more fields are")
@@ -51,12 +48,12 @@ def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]
 
 
 def nearest_field(name: str, known: tuple[str, ...]) -> str:
-    """The field that may have been meant, in words; all there are where none is like it."""
+    """Name the nearest known field; list all where none is similar."""
     near = difflib.get_close_matches(name[:QUOTED].lower(), known, n=1, cutoff=0.5)
     return f": did you mean '{near[0]}'?" if near else f" (known here: {', '.join(known)})"
 
 
 def shown(text: str) -> str:
-    """A file's own words, short and on one line, as a message may quote them."""
+    """Shorten a text from a file to one line for a message."""
     line = " ".join(text.split())
     return line if len(line) <= QUOTED else line[:QUOTED] + "…"

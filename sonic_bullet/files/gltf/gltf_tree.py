@@ -1,8 +1,8 @@
-"""glTF 2.0 and GLB -> JSON tree and accessors [Khronos, glTF 2.0 Specification, 2021; sections in brackets].
+"""Read glTF 2.0 and GLB as a JSON tree and accessors [Khronos, glTF 2.0 Specification, 2021; sections in brackets].
 
-GLB chunks [4.4], data URI, file beside it -> buffers [3.6.1] -> accessors [3.6.2]
+GLB chunks [4.4], data URI, separate file -> buffers [3.6.1] -> accessors [3.6.2]
 
-Sizes are compared with what is there before anything is made of them.
+Sizes are compared with the bytes present before they are used.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GltfTree:
-    """The JSON tree, and the bytes of each buffer. error, remedy: what is raised where they do not fit."""
+    """The JSON tree, and the bytes of each buffer. error, remedy: raised where they do not fit."""
 
     tree: dict[str, Any]
     buffer: tuple[bytes, ...]
@@ -37,7 +37,7 @@ class GltfTree:
     remedy: str
 
     def accessor(self, index: int) -> Array:
-        """(n, width) float, or integer where it is no normalised one. Raises ``error``."""
+        """Read an accessor (n, width) as float, or integer where it is not normalised; raises ``error``."""
         it = self.tree["accessors"][index]
         kind, width, count = np.dtype(COMPONENT[it["componentType"]]), WIDTH[it["type"]], int(it["count"])
         if "sparse" in it or "bufferView" not in it:
@@ -57,7 +57,7 @@ class GltfTree:
 
 
 def read_tree(path: Path, error: type[SonicBulletError], remedy: str) -> GltfTree:
-    """A .gltf or .glb, its buffers read. Raises ``error`` with ``remedy``, and what a parser raises."""
+    """Read a .gltf or .glb with its buffers; raises ``error`` with ``remedy``, and the parser's exceptions."""
     raw, chunk = path.read_bytes(), b""
     if raw[:4] == b"glTF":  # [4.4]
         version, length = struct.unpack_from("<II", raw, 4)

@@ -1,4 +1,4 @@
-"""JSON tree and numbers -> .glb, or .gltf with its buffer inside [Khronos, glTF 2.0 Specification, 2021].
+"""Write a JSON tree and numbers as .glb, or as .gltf with its buffer inside [Khronos, glTF 2.0 Specification, 2021].
 
 arrays -> GltfBuffer.append: one view and one accessor each [3.6.1, 3.6.2], all in one buffer, 4 bytes aligned
 tree + buffer -> chunks JSON and BIN [4.4], or base64 in a data URI
@@ -27,7 +27,7 @@ LARGEST_BYTES = 1 << 30
 
 @dataclass(slots=True)
 class GltfBuffer:
-    """Views and accessors of the numbers appended so far, and their bytes."""
+    """Views, accessors and bytes of the numbers appended so far."""
 
     views: list[dict[str, Any]] = field(default_factory=list)
     accessors: list[dict[str, Any]] = field(default_factory=list)
@@ -35,7 +35,7 @@ class GltfBuffer:
     size: int = 0
 
     def append(self, values: Array, *, target: int | None = None) -> int:
-        """The number of a new accessor of values (n,) or (n, 3): float32, or uint32 where they are whole."""
+        """Add an accessor of values (n,) or (n, 3), float32, or uint32 where they are whole; return its number."""
         whole = values.dtype.kind in "iu"
         packed = np.ascontiguousarray(values, "<u4" if whole else "<f4")
         view: dict[str, Any] = {"buffer": 0, "byteOffset": self.size, "byteLength": packed.nbytes}
@@ -59,7 +59,7 @@ class GltfBuffer:
 
 
 def write_gltf(path: str | os.PathLike[str], tree: dict[str, Any], buffer: GltfBuffer) -> None:
-    """Write a tree with its buffer, whole or not at all: .glb, else .gltf. Raises FileError."""
+    """Write a tree with its buffer, whole or not at all: .glb, else .gltf; raises FileError."""
     if buffer.size > LARGEST_BYTES:
         raise FileError(f"cannot write {path}: it would hold over a gigabyte", "keep fewer modes or points")
     data = b"".join(buffer.parts)

@@ -1,1 +1,1 @@
-"""How loud a sound is and how it is brought to a level: its meter, its true peak, fades and the limiter."""
+"""Loudness of a sound and its adjustment: meter, true peak, fades and limiter."""

@@ -1,4 +1,4 @@
-"""What a sound file that was written is: how long, how loud, and what was done to it."""
+"""Report of a sound file that was written: duration, level, clipping and limiting."""
 
 from __future__ import annotations
 
@@ -9,11 +9,22 @@ from sonic_bullet.files.loudness.meter import Loudness
 
 @dataclass(frozen=True, slots=True)
 class AudioReport:
-    """What was written: where, how much, how loud.
+    """Report of a sound file that was written.
 
-    gain_per_pa: file units for one pascal. peak_pa, rms_pa: before the gain, over all channels. clipped: samples that
-    were cut at full scale. over: samples beyond it in all (equal to clipped except in float files, where the player
-    clips). limited_db, limited_s: what a limiter took off, at most and how long. loudness: where it was measured.
+    Parameters
+    ----------
+    gain_per_pa
+        File units for one pascal.
+    peak_pa, rms_pa
+        Before the gain, over all channels.
+    clipped
+        Samples that were cut at full scale.
+    over
+        Samples above full scale, equal to clipped except in float files, where the player clips.
+    limited_db, limited_s
+        Largest reduction by a limiter, and its duration.
+    loudness
+        Where it was measured.
     """
 
     path: str
@@ -33,4 +44,5 @@ class AudioReport:
 
     @property
     def seconds(self) -> float:
+        """Duration of the file."""
         return self.frames / self.sr

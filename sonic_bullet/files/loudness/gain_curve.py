@@ -1,4 +1,4 @@
-"""A factor a sample, common to all channels and to all stems of a mix, so that these still add up to it.
+"""Factor per sample, common to all channels and to all stems of a mix, so that the stems still add up to it.
 
     seconds of fading in and out, decibels of a limiter -> GainCurve -> KeptSound.shaped
 
@@ -16,7 +16,19 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GainCurve:
-    """frames: of the sound. fade_in, fade_out: frames. limiter (frames,): factors, None: ones. gain: of all frames."""
+    """Factor per frame of a sound.
+
+    Parameters
+    ----------
+    frames
+        Of the sound.
+    fade_in, fade_out
+        In frames.
+    limiter : Array, shape (frames,)
+        Factors; None: ones.
+    gain
+        Of all frames.
+    """
 
     frames: int
     fade_in: int = 0
@@ -25,7 +37,7 @@ class GainCurve:
     gain: float = 1.0
 
     def read(self, start: int, stop: int) -> Array:
-        """Factors of the frames start … stop - 1, fewer at the end."""
+        """Return the factors of the frames start … stop - 1, fewer at the end."""
         frame = np.arange(start, min(stop, self.frames))
         factor = np.full(len(frame), self.gain)
         if self.limiter is not None:

@@ -1,4 +1,4 @@
-"""A limiter that looks ahead: where a loudness would pass a true peak, the factor that keeps it below.
+"""Look-ahead limiter: the factor that keeps a loudness below a true peak.
 
     true peak a sample p_i, gain g, ceiling c
       -> r_i = min(0, c - g - p_i)                  dB that sample i must go down
@@ -18,16 +18,16 @@ import numpy as np
 from sonic_bullet.records import Array
 
 AHEAD_S = 0.005
-"""One period of 200 Hz: the descent lies below what the ear hears as a click, and is masked by the strike behind it."""
+"""One period of 200 Hz: the descent is too slow to be audible as a click, and the strike after it masks it."""
 RELEASES_DB_S = (100.0, 400.0, 1600.0, 6400.0)
 """6 dB in 60 ms, longer than a period of 20 Hz: a low tone is not bent within itself. Struck bodies die away faster;
 where their loudness asks for it, the next is taken."""
 MARGIN_DB = 0.25
-"""Below the ceiling: what meters of other interpolations read higher, of noise up to half the rate."""
+"""Margin below the ceiling: excess that meters of other interpolations read, of noise up to half the rate."""
 
 
 def limiter_factor(peak_db: Array, sr: int, ceiling_db: float, release_db_s: float) -> Array:
-    """(n,) factors for true peaks (n,) in dB, of which none is to be larger than ``ceiling_db``."""
+    """Return factors (n,) that bring true peaks (n,) in dB down to at most ``ceiling_db``."""
     from scipy.ndimage import minimum_filter1d
     from scipy.signal import oaconvolve
 

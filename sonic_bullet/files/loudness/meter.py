@@ -1,12 +1,12 @@
-"""How loud a sound file is, as broadcasters measure it.
+"""Loudness of a sound file by broadcasting standards.
 
     samples -> K-weighting -> energy of 100 ms -> of 400 ms, gated -> integrated loudness   [ITU-R BS.1770-5, annex 1]
                                                -> of 3 s -> largest: short-term             [EBU Tech 3341, sec. 2.2]
                                                          -> 10 to 95 %, gated: range        [EBU Tech 3342, sec. 4]
             -> interpolated -> largest magnitude: true peak                                 [ITU-R BS.1770-5, annex 2]
 
-By blocks, so that a sound may be longer than the memory. The filters are pyloudnorm's, at any rate; at 48 kHz they lie
-0.04 dB below those of the standard's table, at all frequencies.
+Computed by blocks, so that a sound may be longer than the memory. The filters are pyloudnorm's, at any rate; at 48 kHz
+they are 0.04 dB below those of the standard's table, at all frequencies.
 """
 
 from __future__ import annotations
@@ -28,8 +28,16 @@ ABSOLUTE_GATE_LUFS, RELATIVE_GATE_LU, RANGE_GATE_LU = -70.0, -10.0, -20.0
 
 @dataclass(frozen=True, slots=True)
 class Loudness:
-    """Of a file. integrated_lufs: None for under 0.4 s, for over 5 channels, or where all is below the gate;
-    short_term_lufs: the largest, range_lu: None for under 3 s, too. true_peak_dbtp: None of silence.
+    """Loudness of a file.
+
+    Parameters
+    ----------
+    integrated_lufs
+        None for under 0.4 s, for over 5 channels, or where all is below the gate.
+    short_term_lufs, range_lu
+        The largest, and the range; None for under 3 s, too.
+    true_peak_dbtp
+        None of silence.
     """
 
     integrated_lufs: float | None
@@ -38,6 +46,7 @@ class Loudness:
     true_peak_dbtp: float | None
 
     def __str__(self) -> str:
+        """Return the values that are known, in words."""
         said = (
             ("loudness ", self.integrated_lufs, "LUFS"),
             ("short-term at most ", self.short_term_lufs, "LUFS"),
@@ -48,7 +57,7 @@ class Loudness:
 
 
 def measure_loudness(sound: KeptSound, sr: int, gain: float = 1.0) -> Loudness:
-    """The loudness of a sound whose samples are multiplied by ``gain`` in its file."""
+    """Measure the loudness of a sound whose samples are multiplied by ``gain`` in its file."""
     energy = _block_energy(sound, sr) if 0 < sound.shape[0] <= len(CHANNEL_WEIGHT) else np.zeros(0)
     peak = gain * find_true_peak(sound)
     short = _windows(energy * gain**2, SHORT_TERM)
@@ -61,12 +70,12 @@ def measure_loudness(sound: KeptSound, sr: int, gain: float = 1.0) -> Loudness:
 
 
 def integrated_lufs(sound: KeptSound, sr: int) -> float | None:
-    """Programme loudness alone, of up to 5 channels."""
+    """Measure the programme loudness alone, of up to 5 channels."""
     return _gated_lufs(_windows(_block_energy(sound, sr), MOMENTARY))
 
 
 def _block_energy(sound: KeptSound, sr: int) -> Array:
-    """Mean square of each 100 ms, K-weighted, channels summed by their weights; what is left at the end is no block."""
+    """Compute the K-weighted mean square of each whole 100 ms, channels summed by their weights."""
     from scipy.signal import sosfilt
 
     channels, frames = sound.shape
@@ -83,7 +92,7 @@ def _block_energy(sound: KeptSound, sr: int) -> Array:
 
 
 def k_weighting(sr: int) -> Array:
-    """The head's shelf and the high pass, as second-order sections (2, 6)."""
+    """Return the head's shelf and the high pass as second-order sections (2, 6)."""
     from pyloudnorm import Meter
 
     stages = Meter(sr)._filters.values()
@@ -91,7 +100,7 @@ def k_weighting(sr: int) -> Array:
 
 
 def _windows(energy: Array, count: int) -> Array:
-    """Mean of each ``count`` blocks in a row."""
+    """Average each ``count`` blocks in a row."""
     total = np.concatenate([[0.0], np.cumsum(energy)])
     return np.maximum(total[count:] - total[:-count], 0.0) / count if len(total) > count else np.zeros(0)
 
@@ -105,7 +114,7 @@ def _above(energy: Array, gate_lufs: float) -> Array:
 
 
 def _gated(energy: Array, relative_lu: float) -> Array:
-    """Those above the absolute gate and above the relative one, which lies below the mean of the first."""
+    """Select blocks above the absolute gate and above the relative one, which is below the mean of the former."""
     loud = _above(energy, ABSOLUTE_GATE_LUFS)
     return _above(loud, float(_lufs(loud.mean())) + relative_lu) if len(loud) else loud
 

@@ -1,9 +1,9 @@
-"""The largest magnitude of the waveform between samples, which a converter or a lossy codec rebuilds.
+"""True peak: the largest magnitude of the waveform between samples, as a converter or a lossy codec rebuilds it.
 
     x -> 16 times the rate, by a Kaiser-windowed sinc of 40 samples -> largest magnitude    [ITU-R BS.1770-5, annex 2]
 
-The standard asks for 4 times at least, which may read 0.7 dB low; 16 times reads at most 0.04 dB low: 20·log10 cos(π
-f/n) of a tone at the share f = 1/2 of the rate, n times of it [annex 2, att. 1].
+The standard requires 4 times at least, which may read 0.7 dB low; 16 times reads at most 0.04 dB low: 20·log10 cos(π
+f/n) of a tone at the fraction f = 1/2 of the rate, n times of it [annex 2, att. 1].
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from sonic_bullet.records import Array
 
 OVERSAMPLING = 16
 REACH, KAISER_BETA = 20, 7.0
-"""Samples on either side of which one between is made, and their window: even to 0.45 of the rate."""
+"""Samples on either side of an interpolated one, and their window: even to 0.45 of the rate."""
 BOUND = 3.5
-"""No sample between is larger than that many times the largest around: the sum of the sinc's magnitudes."""
+"""Upper bound of an interpolated sample over the largest around it: the sum of the sinc's magnitudes."""
 BLOCK_FRAMES = 1 << 14
 
 
 def find_true_peak(sound: KeptSound) -> float:
-    """The true peak of all channels. Blocks in which none larger than those before can be are passed over."""
+    """Find the true peak of all channels; blocks that cannot exceed it are skipped."""
     found = 0.0
     for start in range(0, sound.shape[1], BLOCK_FRAMES):
         block = sound.read(max(start - 2 * REACH, 0), start + BLOCK_FRAMES + 2 * REACH)
@@ -34,7 +34,7 @@ def find_true_peak(sound: KeptSound) -> float:
 
 
 def sample_true_peaks(samples: Array) -> Array:
-    """(n,) the true peak within half a sample of each, over channels (c, n)."""
+    """Return the true peak (n,) within half a sample of each sample, over channels (c, n)."""
     frames = samples.shape[1]
     made = np.empty(frames)
     for start in range(0, frames, BLOCK_FRAMES):

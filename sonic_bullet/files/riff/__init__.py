@@ -1,1 +1,1 @@
-"""What stands in a WAV file besides samples."""
+"""Chunks of a WAV file besides its samples."""

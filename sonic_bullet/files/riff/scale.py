@@ -1,12 +1,12 @@
-"""What full scale of a sound file is in pascals, as the file itself says it.
+"""Full scale of a sound file in pascals, as the file states it.
 
     full_scale_pa -> "0 dBFS = 63.1 Pa; full_scale_pa=63.09573444801933"
       WAV, RF64  bext description [EBU Tech 3285 v1, sec. 2.3] and iXML NOTE [iXML 3.01, <BWFXML><NOTE>]
       others     the comment that libsndfile writes (FLAC, OGG, AIFF, CAF); films: the container's comment
       W64        nowhere: libsndfile writes no text there, and miscounts the samples before a further chunk
 
-The number has all its digits, so that dividing by it gives back what was multiplied, to a rounding. A channel that is
-no pressure (a vibrometer) has its own unit in place of Pa, and the same number.
+The number has all its digits, so that dividing by it restores the samples, to a rounding. A channel that is not a
+pressure (a vibrometer) has its own unit in place of Pa, and the same number.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ NUMBER = re.compile(rb"full_scale_pa=([0-9.]{1,25}(?:e[+-]?[0-9]{1,3})?)(?![0-9.
 
 
 def scale_text(full_scale_pa: float) -> str:
-    """What a file says of its scale."""
+    """Return the text that states a scale."""
     return f"0 dBFS = {full_scale_pa:.3g} Pa; full_scale_pa={full_scale_pa!r}"
 
 
 def scale_in(text: bytes) -> float | None:
-    """The full scale in Pa that a text names; None where it names none that could be."""
+    """Find the full scale in Pa in a text; None where there is no valid one."""
     found = NUMBER.search(text)
     try:
         number = float(found[1]) if found else math.nan
@@ -37,7 +37,7 @@ def scale_in(text: bytes) -> float | None:
 
 
 def ixml_chunk(full_scale_pa: float) -> bytes:
-    """The chunk `iXML` of a WAV or RF64."""
+    """Return the chunk `iXML` of a WAV or RF64."""
     note = scale_text(full_scale_pa)
     head = '<?xml version="1.0" encoding="UTF-8"?>'
     body = f"{head}<BWFXML><IXML_VERSION>1.61</IXML_VERSION><NOTE>{note}</NOTE></BWFXML>".encode()
@@ -45,9 +45,7 @@ def ixml_chunk(full_scale_pa: float) -> bytes:
 
 
 def read_chunk_scale(fd: int) -> float | None:
-    """The full scale in Pa that chunks of an open WAV or RF64 name; None where none does, or it is another file.
-    What iXML says goes before bext. Raises OSError.
-    """
+    """Read the full scale in Pa from an open WAV or RF64, iXML before bext; None without one; raises OSError."""
     found: dict[bytes, float | None] = {}
     for name, at, size in _chunks(fd):
         if name in (b"iXML", b"bext"):
@@ -56,7 +54,7 @@ def read_chunk_scale(fd: int) -> float | None:
 
 
 def _chunks(fd: int) -> Iterator[tuple[bytes, int, int]]:
-    """Name, place and bytes of each chunk of a RIFF or RF64."""
+    """Yield name, offset and bytes of each chunk of a RIFF or RF64."""
     head, end = os.pread(fd, 12, 0), os.fstat(fd).st_size
     if head[:4] not in (b"RIFF", b"RF64") or head[8:] != b"WAVE":
         return

@@ -1,11 +1,11 @@
-"""What a WAV file says of its sound: places with names, and when on a longer clock it begins.
+"""Chunks of a WAV file that name places and give its start on a longer timeline.
 
-    cue  (places)  + LIST adtl (labl: a name, ltxt: how long)   [IBM and Microsoft, Multimedia Programming Interface
+    cue  (places)  + LIST adtl (labl: a name, ltxt: duration)    [IBM and Microsoft, Multimedia Programming Interface
                                                                  and Data Specifications 1.0 (1991), ch. 3]
     bext (description, time reference in samples)               [EBU Tech 3285 v1, sec. 2.3]
 
-They stand behind the samples, where readers of RIFF find chunks in any order. No time of day is among them: equal
-sound, equal bytes.
+They follow the samples, where readers of RIFF find chunks in any order. They hold no time of day: equal sound, equal
+bytes.
 """
 
 from __future__ import annotations
@@ -19,27 +19,34 @@ from sonic_bullet.records.coerce import as_items, as_text, as_whole, shown
 from sonic_bullet.records.errors import RecordError
 
 LAST_SAMPLE = 2**32 - 1
-"""Of a cue, which is told in 32 bits: a day at 48 kHz."""
+"""Last sample of a cue, which has 32 bits: a day at 48 kHz."""
 TEXT_BYTES = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Cue:
-    """A place in a sound file: its first sample, how many it lasts (0: a point), and what it is called."""
+    """A place in a sound file: its first sample, its duration in samples (0: a point), and its label."""
 
     sample: int
     samples: int
     label: str
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         for name in ("sample", "samples"):
             as_whole(getattr(self, name), f"{name} of a cue", "count from the start of the file", least=0)
         as_text(self.label, "label of a cue", "give a text")
 
 
 def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: int = 0) -> bytes:
-    """Chunks `bext`, `cue ` and `LIST adtl` for a file. time_reference: its first sample, counted from the start of the
-    timeline it is cut from. Cues beyond `LAST_SAMPLE` are left out. Raises RecordError.
+    """Make the chunks `bext`, `cue ` and `LIST adtl` of a file. Cues beyond `LAST_SAMPLE` are left out.
+
+    time_reference: first sample of the file, counted from the start of its timeline.
+
+    Raises
+    ------
+    RecordError
+        Cues or time reference are not valid.
     """
     remedy = "give a list of cues (sonic_bullet.files.riff.wave_chunks.Cue)"
     listed = as_items(cues, "cues", remedy)
@@ -63,7 +70,7 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
 
 
 def _bext(description: str, time_reference: int) -> bytes:
-    """Version 1: 602 bytes, without date and time."""
+    """Make a `bext` of version 1: 602 bytes, without date and time."""
     body = struct.pack(
         "<256s32s32s10s8sQH64s190s", _text(description, 255), b"sonic_bullet", b"", b"", b"", time_reference, 1, b"",
         b"",
@@ -76,26 +83,27 @@ def _chunk(name: bytes, body: bytes) -> bytes:
 
 
 def _text(text: str, most: int = TEXT_BYTES) -> bytes:
-    """A text for a chunk: UTF-8, no NUL in it."""
+    """Encode a text for a chunk: UTF-8, without NUL."""
     return text.replace("\0", " ").encode("utf-8", "replace")[:most].decode("utf-8", "ignore").encode()
 
 
 def append_chunks(fd: int, chunks: bytes) -> None:
-    """Chunks behind all that an open, whole WAV or RF64 file holds. Raises OSError."""
+    """Append chunks to an open, whole WAV or RF64 file; raises OSError."""
     size = os.lseek(fd, 0, os.SEEK_END)
     left = memoryview(b"\0" * (size % 2) + chunks)
     while left:
         left = left[os.write(fd, left) :]
     whole = os.lseek(fd, 0, os.SEEK_CUR) - 8
     os.lseek(fd, 0, os.SEEK_SET)
-    is_long = os.read(fd, 4) == b"RF64"  # its size stands in the chunk ds64 [EBU Tech 3306, sec. 3.5]
+    is_long = os.read(fd, 4) == b"RF64"  # its size is in the chunk ds64 [EBU Tech 3306, sec. 3.5]
     os.lseek(fd, 20 if is_long else 4, os.SEEK_SET)
     os.write(fd, struct.pack("<Q" if is_long else "<I", whole))
 
 
 def forget_time(fd: int) -> None:
-    """Zero the time of day that libsndfile puts into the PEAK chunk (id, size, version, time) of float files: equal
-    sound, equal bytes.
+    """Zero the time of day that libsndfile writes to the PEAK chunk of float files: equal sound, equal bytes.
+
+    The chunk holds id, size, version, time.
     """
     os.lseek(fd, 0, os.SEEK_SET)
     head = os.read(fd, 512)

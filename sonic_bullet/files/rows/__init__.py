@@ -1,3 +1,4 @@
-"""Rows that need not fit into memory: `spool` keeps them while a run goes on, `log_steps` are a contact log's steps as
-rows, `step_entries` those rows in a file.
+"""Tables that may exceed the memory.
+
+`spool` holds them during a run, `log_steps` are a contact log's steps as rows, `step_entries` those rows in a file.
 """

@@ -1,9 +1,9 @@
-"""The steps of a contact log as columns: what an hour of them is kept as, live and on disk.
+"""Steps of a contact log as columns, in memory and on disk, for logs of hours.
 
-Step -> StepLog -> STEP row + POSE rows + CONTACT rows (spools) -> LogSteps -> Step, when asked for
-npz  -> the same three tables, read where they lie (step_entries) -> LogSteps -> Step
+Step -> StepLog -> STEP row + POSE rows + CONTACT rows (spools) -> LogSteps -> Step, on request
+npz  -> the same three tables, read from the file (step_entries) -> LogSteps -> Step
 
-STEP       length, gravity, and where its rows end among all poses and contacts
+STEP       length, gravity, and the end of its rows among all poses and contacts
 POSE       index of the body into the log's `bodies`, moved by hand or not, position, quaternion
 CONTACT    records.contacts
 """
@@ -33,16 +33,22 @@ BLOCK_STEPS, BLOCK_ROWS = 256, 1 << 16
 
 
 class Table(Protocol):
-    """Rows (·,) of one dtype that are read when asked for: a `Spool`, an array, entries of a file."""
+    """Rows (·,) of one dtype that are read on request: a `Spool`, an array, entries of a file."""
 
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        """Return the number of rows."""
 
-    def __getitem__(self, rows: slice, /) -> Array: ...
+    def __getitem__(self, rows: slice, /) -> Array:
+        """Read rows."""
 
 
 class StepBlock(NamedTuple):
-    """Consecutive steps, all their rows in memory: step (n,) STEP, pose (p,) POSE, contact (k,) CONTACT; the ends in
-    step count from this block's first rows.
+    """Consecutive steps with all their rows in memory.
+
+    Parameters
+    ----------
+    step, pose, contact : Array of STEP, POSE, CONTACT
+        The ends in step count from this block's first rows.
     """
 
     step: Array
@@ -50,11 +56,11 @@ class StepBlock(NamedTuple):
     contact: Array
 
     def counts(self, name: str) -> Array:
-        """(n,) rows of each step; name: "pose" or "contact"."""
+        """Return the rows (n,) of each step; name: "pose" or "contact"."""
         return np.diff(self.step[f"{name}_end"], prepend=0)
 
     def steps(self) -> list[Step]:
-        """The block's steps, whose numbers are known to be numbers."""
+        """Make the block's steps, whose numbers were checked before."""
         made, p0, k0 = [], 0, 0
         position, turned, moved, body = (
             _column(self.pose, name) for name in ("position_m", "quaternion_xyzw", "teleported", "body")
@@ -65,7 +71,7 @@ class StepBlock(NamedTuple):
         columns = (self.step[name].tolist() for name in ("dt_s", "pose_end", "contact_end"))
         for i, (dt_s, p1, k1) in enumerate(zip(*columns, strict=True)):
             rows = Contacts.trusted(self.contact[k0:k1]) if k1 > k0 else none
-            # ascending from 0, so that its last says whether it is the first p1 - p0
+            # ascending from 0, so that the last tells whether it is the first p1 - p0
             usual = p1 == p0 or body[p1 - 1] == p1 - p0 - 1
             who = first_bodies(p1 - p0) if usual else body[p0:p1]
             made.append(Step.trusted(dt_s, position[p0:p1], turned[p0:p1], moved[p0:p1], rows, gravity[i], who))
@@ -74,7 +80,7 @@ class StepBlock(NamedTuple):
 
 
 def _column(table: Array, name: str) -> Array:
-    """A field by itself, contiguous and read-only."""
+    """Copy a field, contiguous and read-only."""
     made = np.ascontiguousarray(table[name])
     made.flags.writeable = False
     return made
@@ -82,10 +88,14 @@ def _column(table: Array, name: str) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogSteps(Sequence[Step]):
-    """Steps start … stop-1 of three tables, made when they are asked for; a slice is made as lazily.
+    """Steps start … stop-1 of three tables, made on request, as are slices.
 
-    step, pose, contact: rows of STEP, POSE, CONTACT; what comes behind ``stop`` is not looked at, so tables may grow.
-    known: more than the largest index of a body in the tables.
+    Parameters
+    ----------
+    step, pose, contact
+        Tables of STEP, POSE, CONTACT; they may grow beyond ``stop``.
+    known
+        More than the largest index of a body in the tables.
     """
 
     step: Table
@@ -98,16 +108,18 @@ class LogSteps(Sequence[Step]):
 
     @classmethod
     def of(cls, steps: Sequence[Step]) -> LogSteps:
-        """Steps that are in memory. Raises FileError where they outgrow memory and disk."""
+        """Pack steps that are in memory; FileError where they outgrow memory and disk."""
         kept = StepLog()
         for step in steps:
             kept.append(step)
         return kept.steps()
 
     def __len__(self) -> int:
+        """Return the number of steps."""
         return self.stop - self.start
 
     def __getitem__(self, index: Any) -> Any:
+        """Return a step, or the steps of a slice."""
         if isinstance(index, slice):
             start, stop, stride = index.indices(len(self))
             if stride != 1:
@@ -126,11 +138,12 @@ class LogSteps(Sequence[Step]):
         return steps[number - first]
 
     def __iter__(self) -> Iterator[Step]:
+        """Iterate over the steps."""
         for block in self.blocks():
             yield from block.steps()
 
     def blocks(self) -> Iterator[StepBlock]:
-        """All of them, a block after the other."""
+        """Iterate over the blocks."""
         return self._blocks(self.start, self.stop)
 
     def _blocks(self, first: int, stop: int) -> Iterator[StepBlock]:
@@ -146,42 +159,43 @@ class LogSteps(Sequence[Step]):
             first += len(step)
 
     def _before(self, number: int) -> tuple[int, int]:
-        """How many poses and contacts come before a step."""
+        """Count the poses and contacts before a step."""
         if number == 0:
             return 0, 0
         (row,) = self.step[number - 1 : number]
         return int(row["pose_end"]), int(row["contact_end"])
 
     def lengths_s(self) -> Array:
-        """(n,) length of each step."""
+        """Return the length (n,) of each step."""
         return np.concatenate([np.zeros(0), *(rows["dt_s"] for rows in self.step_rows())])
 
     def step_rows(self) -> Iterator[Array]:
-        """STEP rows alone, many at once; their ends count from the tables' first rows."""
+        """Iterate over STEP rows alone, many at once; their ends count from the tables' first rows."""
         for first in range(self.start, self.stop, BLOCK_ROWS):
             yield self.step[first : min(first + BLOCK_ROWS, self.stop)]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LogSteps.of, (tuple(self),)  # by value: another process has neither our spool nor our file
+        """Pickle the steps by value."""
+        return LogSteps.of, (tuple(self),)  # by value: another process has neither the spool nor the file
 
     @property
     def rows_before(self) -> tuple[int, int]:
-        """How many poses and contacts of the tables come before the first step."""
+        """Number of poses and contacts in the tables before the first step."""
         return self._before(self.start)
 
     @property
     def row_counts(self) -> tuple[int, int]:
-        """How many poses and contacts the steps have in all."""
+        """Number of poses and contacts of the steps."""
         (p0, k0), (p1, k1) = self.rows_before, self._before(self.stop)
         return p1 - p0, k1 - k0
 
     def bodies(self) -> int:
-        """One more than the largest index of a body that has a pose in them."""
+        """Return one more than the largest index of a body that has a pose."""
         return max((int(block.pose["body"].max(initial=-1)) + 1 for block in self.blocks()), default=0)
 
 
 class StepLog:
-    """Steps as they come, packed into tables."""
+    """Packs steps into tables as they arrive."""
 
     def __init__(self, instead: str = "") -> None:
         self._tables = tuple(Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT))
@@ -190,7 +204,7 @@ class StepLog:
         self._lock = threading.Lock()
 
     def append(self, step: Step) -> None:
-        """Take in a step. Raises FileError where the disk takes no more; the step is in the log all the same."""
+        """Append a step; FileError where the disk takes no more, with the step stored."""
         with self._lock:
             self._fresh.append(step)
             if len(self._fresh) < PACKED:
@@ -200,7 +214,7 @@ class StepLog:
                 table.spill()
 
     def steps(self) -> LogSteps:
-        """Those so far; what comes later is not among them."""
+        """Return the steps so far, without later ones."""
         with self._lock:
             self._pack()
         step, pose, contact = self._tables
@@ -225,4 +239,4 @@ class StepLog:
         steps.append(step)
         poses.append(pose)
         contacts.append(joined([one.contacts.row for one in fresh], CONTACT))
-        self._fresh = []  # last: what interrupts this loses nothing
+        self._fresh = []  # last: an interrupt loses nothing

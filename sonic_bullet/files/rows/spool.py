@@ -1,10 +1,10 @@
-"""Rows that grow for hours: in memory while they are few, beyond that in a temporary file without a name.
+"""Tables that grow for hours: in memory while they are small, then in a temporary file without a name.
 
     append -> fresh rows -> spill -> packed bytes (memory up to `memory_bytes`, then the file) -> [start:stop]
 
-The file is unlinked from its first moment (`tempfile.TemporaryFile`): whatever ends the process, nothing is left. It
-lies where TMPDIR says, else in /tmp. Rows are read by pread(2) on its descriptor, so a reader moves no writer. Another
-thread may read while one appends. A process that was forked goes on in a file of its own.
+The file is unlinked from the start (`tempfile.TemporaryFile`): nothing is left, however the process ends. It is in
+TMPDIR, else in /tmp. Rows are read by pread(2) on its descriptor, so that a reader moves no writer. Another thread may
+read during an append. A forked process continues in a file of its own.
 """
 
 from __future__ import annotations
@@ -24,17 +24,25 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 MEMORY_BYTES = 4 << 20
-"""What one spool holds in memory: 5 s of a small scene's contacts, 10 s of one channel at 48 kHz touch no disk."""
+"""Memory of one spool: 5 s of a small scene's contacts, 10 s of one channel at 48 kHz touch no disk."""
 BLOCK_BYTES = 1 << 18
-"""What is written at once: a write call costs microseconds, so one in 1000 steps is none."""
+"""Bytes written at once: a write call costs microseconds, negligible once in 1000 steps."""
 READ_FRAMES = 1 << 18
 
 
 class Spool:
     """Rows of one dtype and shape, appended in order and read back by [start:stop], read-only.
 
-    dtype, tail: of a row. what: the thing, in words, for the message of a full disk ("contact log"); instead: what its
-    user can do without a larger disk ("attach with keep_log=False"). memory_bytes: what is held in memory.
+    Parameters
+    ----------
+    dtype, tail
+        Dtype and shape of a row.
+    what
+        Name of the content for the message of a full disk ("contact log").
+    instead
+        What the user can do without a larger disk ("attach with keep_log=False").
+    memory_bytes
+        Limit of the memory.
     """
 
     def __init__(
@@ -57,6 +65,7 @@ class Spool:
         self._lock, self._process = threading.RLock(), os.getpid()
 
     def __len__(self) -> int:
+        """Return the number of rows."""
         return self._count
 
     @property
@@ -65,9 +74,7 @@ class Spool:
         return self._file is not None
 
     def append(self, rows: Array) -> None:
-        """Take in rows (k, *tail) of the dtype, C-contiguous, which nobody writes to any more; no disk is touched
-        before `spill`.
-        """
+        """Append rows (k, *tail) of the dtype, C-contiguous and no longer modified; `spill` writes them to disk."""
         with self._lock:
             self._fresh.append(rows)
             self._count += len(rows)
@@ -75,7 +82,10 @@ class Spool:
     def spill(self) -> None:
         """Pack the fresh rows, once they are many.
 
-        Raises FileError where the disk takes no more: then they stay in memory, and all rows can still be read.
+        Raises
+        ------
+        FileError
+            The disk takes no more; the rows stay in memory and can still be read.
         """
         if self._count - self._packed >= self._block:
             with self._lock:
@@ -102,7 +112,7 @@ class Spool:
         return np.frombuffer(raw, self.dtype).reshape(len(raw) // max(self.row_bytes, 1), *self.tail)
 
     def _refused(self, error: OSError) -> FileError:
-        """Why the disk took nothing, with what can be done."""
+        """Make the error of a refused write, with a remedy."""
         if self._file is not None:
             os.ftruncate(self._file.fileno(), self._packed * self.row_bytes)  # what was written in part is room
         said = cannot("keep more of the", self.what, error)
@@ -111,7 +121,7 @@ class Spool:
         return FileError(f"{said.what} ({place})", f"{larger}, or {self.instead}" if self.instead else larger)
 
     def __getitem__(self, rows: slice) -> Array:
-        """Rows start … stop-1 as one array of its own. Raises FileError."""
+        """Read rows start … stop-1 as a new array; raises FileError."""
         with self._lock:
             start, stop, _ = rows.indices(self._count)
             stop = max(start, stop)
@@ -134,7 +144,7 @@ class Spool:
 
 
 def _write(file: IO[bytes], data: bytes | bytearray, at: int = 0) -> None:
-    """All of ``data`` at byte ``at``. Raises OSError."""
+    """Write all of ``data`` at byte ``at``; raises OSError."""
     file.seek(at)
     left = memoryview(data)
     while left:
@@ -142,7 +152,7 @@ def _write(file: IO[bytes], data: bytes | bytearray, at: int = 0) -> None:
 
 
 def read_at(fd: int, count: int, at: int, what: object) -> bytes:
-    """``count`` bytes from byte ``at`` of an open file. Raises FileError where it has them no more."""
+    """Read ``count`` bytes from byte ``at`` of an open file; FileError where it was cut."""
     parts = []
     try:
         while count:
@@ -157,26 +167,33 @@ def read_at(fd: int, count: int, at: int, what: object) -> bytes:
 
 
 class SoundSpool(Spool):
-    """Frames of so many channels, float64; `Spool` says the rest."""
+    """A `Spool` of frames of so many channels, float64."""
 
     def __init__(self, channels: int, instead: str = "") -> None:
         super().__init__(float, (channels,), what="sound", instead=instead)
 
     def add(self, block: Array) -> None:
-        """Take in (channels, n). Raises FileError where the disk takes no more; it can be read all the same."""
+        """Append (channels, n); FileError where the disk takes no more, after which all can still be read."""
         self.append(np.ascontiguousarray(block.T))
         self.spill()
 
     def kept(self) -> KeptSound:
-        """What is in it by now."""
+        """Return the sound appended so far."""
         return KeptSound(self, len(self), np.zeros((*self.tail, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptSound:
-    """Sound as long as it likes: (channels, n) float64, the first ``count`` frames in a spool of rows (channels,), the
-    ``rest`` (channels, ·) in memory. What is appended to the spool later is not of it. curve: a factor a frame, which
-    `read` applies; None: ones.
+    """Sound of any length, (channels, n) float64.
+
+    Parameters
+    ----------
+    spool, count
+        The first ``count`` frames, in rows (channels,); frames appended later do not belong to the sound.
+    rest : Array, shape (channels, ·)
+        The frames after them, in memory.
+    curve
+        Factor per frame, which `read` applies; None: ones.
     """
 
     spool: SoundSpool
@@ -186,7 +203,7 @@ class KeptSound:
 
     @classmethod
     def of(cls, samples: Array) -> KeptSound:
-        """Samples (channels, n) that are in memory anyway."""
+        """Wrap samples (channels, n) that are in memory."""
         return cls(SoundSpool(len(samples)), 0, samples)
 
     @property
@@ -195,19 +212,19 @@ class KeptSound:
         return len(self.rest), self.count + self.rest.shape[1]
 
     def shaped(self, curve: GainCurve | None) -> KeptSound:
-        """The same sound with another curve."""
+        """Return the same sound with another curve."""
         return replace(self, curve=curve)
 
     def limited(self, factor: Array) -> KeptSound:
-        """The same sound with factors (frames,) besides its fades."""
+        """Return the same sound with factors (frames,) in addition to its fades."""
         return self.shaped(replace(self.curve or GainCurve(self.shape[1]), limiter=factor))
 
     def scaled(self, gain: float) -> KeptSound:
-        """The same sound, times a gain."""
+        """Return the same sound times a gain."""
         return self.shaped(replace(self.curve or GainCurve(self.shape[1]), gain=gain))
 
     def read(self, start: int, stop: int) -> Array:
-        """(channels, stop - start) of the frames start … stop-1, fewer at the end. Raises FileError."""
+        """Read (channels, stop - start) of the frames start … stop-1, fewer at the end; raises FileError."""
         block = self._read(start, stop)
         return block if self.curve is None else block * self.curve.read(start, stop)
 
@@ -219,12 +236,12 @@ class KeptSound:
         return rest if start >= self.count else np.concatenate([first, rest], axis=1)
 
     def blocks(self, frames: int = READ_FRAMES) -> Iterator[Array]:
-        """All of it, in pieces (channels, ≤ frames)."""
+        """Iterate over the sound in blocks (channels, ≤ frames)."""
         for start in range(0, self.shape[1], frames):
             yield self.read(start, start + frames)
 
     def samples(self) -> Array:
-        """All of it at once, (channels, n)."""
+        """Read the whole sound (channels, n)."""
         made = np.empty(self.shape)
         at = 0
         for block in self.blocks():
@@ -233,7 +250,7 @@ class KeptSound:
         return made
 
     def peaks(self) -> Array:
-        """(channels,) largest magnitude of each channel; NaN where one is none."""
+        """Return the largest magnitude (channels,) of each channel; NaN where a sample is NaN."""
         peak = np.zeros(self.shape[0])
         for block in self.blocks():
             peak = np.maximum(peak, np.abs(block).max(axis=1))

@@ -1,4 +1,4 @@
-"""The steps of a contact log as entries of an npz: written block by block, read where they lie.
+"""Steps of a contact log as entries of an npz: written block by block, read from the file on request.
 
 LogSteps -> a Column for each field                                    -> npz
 npz      -> entries, large ones left in the file -> checked by blocks  -> LogSteps
@@ -30,19 +30,21 @@ LAZY = (*(f"pose_{name}" for name in POSE_FIELDS), *(f"contact_{name}" for name 
 """Entries that may stay in the file."""
 Fieldwise = Mapping[str, tuple[type, tuple[int, ...]]]
 ROWS_MOST = 2**40
-"""Poses or contacts of one step at most; that all their sums fit into 64 bits is asked too."""
+"""Most poses or contacts of one step; that all their sums fit into 64 bits is checked too."""
 
 
 class Fields:
-    """Rows of one dtype whose fields lie apart: arrays, or entries of a file."""
+    """Rows of one dtype whose fields are separate arrays or entries of a file."""
 
     def __init__(self, dtype: np.dtype[Any], count: int, fields: Mapping[str, Array | RowsOfEntry]) -> None:
         self._dtype, self._count, self._fields = dtype, count, fields
 
     def __len__(self) -> int:
+        """Return the number of rows."""
         return self._count
 
     def __getitem__(self, rows: slice) -> Array:
+        """Read rows start … stop-1."""
         start, stop, _ = rows.indices(self._count)
         made = np.zeros(max(stop - start, 0), self._dtype)
         for name, field in self._fields.items():
@@ -52,9 +54,7 @@ class Fields:
 
 
 def step_entries(steps: LogSteps) -> dict[str, Column]:
-    """What `write_container` is to write of the steps; each entry's rows are read when it comes to them, from the table
-    that has them alone.
-    """
+    """Return the columns that `write_container` writes of the steps, each read when it is written."""
     (p0, k0), (p, k), s = steps.rows_before, steps.row_counts, len(steps)
 
     def of_steps(name: str) -> Iterator[Array]:
@@ -85,9 +85,14 @@ def step_entries(steps: LogSteps) -> dict[str, Column]:
 
 
 def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSteps:
-    """The steps of a log of so many bodies, every number checked, by blocks.
+    """Read the steps of a log of so many bodies, every number checked, by blocks.
 
-    Raises LogError, or RecordError for numbers that are none.
+    Raises
+    ------
+    LogError
+        The entries are inconsistent.
+    RecordError
+        A number is NaN or infinite.
     """
     dt = take(arrays, "step_dt_s", float, (None,), path)
     step = np.zeros(len(dt), STEP)
@@ -115,9 +120,7 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
 
 
 def _check(block: StepBlock, bodies: int, path: object) -> None:
-    """Raise RecordError where a number is none, LogError where a step's bodies do not ascend or a contact is of none of
-    them.
-    """
+    """Raise RecordError for a wrong number, LogError where bodies do not ascend or a contact's body is absent."""
     for what, table, fields in (("step: ", block.pose, POSE_FIELDS), ("contact ", block.contact, ROW_FIELDS)):
         for name, (dtype, tail) in fields.items():
             if dtype is float:

@@ -1,1 +1,1 @@
-"""Universal files of experimental modal analysis, in and out, by pyuff: `pip install "sonic_bullet[uff]"`."""
+"""Universal files of experimental modal analysis, read and written by pyuff: `pip install "sonic_bullet[uff]"`."""

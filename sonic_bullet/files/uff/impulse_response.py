@@ -1,13 +1,13 @@
-"""Responses to a force as a recording of one impulse: velocity of a surface, or pressure.
+"""Convert responses to a force to recordings of one impulse: velocity of a surface, or pressure.
 
     H(f) of acceleration, velocity, displacement  ->  V = H/(iω), H, iωH          [Ewins 2000, ch. 2.2, mobility]
     h(t) = ∫ V e^{iωt} df  ->  irfft(V·W)·sr, response in m/s (or Pa) to 1 N·s
 
-W falls to nothing over the top tenth of what was measured and below the band: a sharp edge rings. Steps of Δf give a
-period 1/Δf; a mode that rings on beyond it wraps around as A e^{pt}/(1 − e^{p/Δf}), with the same pole p.
+W falls to zero over the top tenth of the measured band and below the band: a sharp edge rings. Steps of Δf give a
+period 1/Δf; a mode that decays beyond it wraps around as A e^{pt}/(1 − e^{p/Δf}), with the same pole p.
 
-h jumps at the impulse, and of a jump no band is exact: half of it stands in the first sample, the rest rings about it.
-Those samples are predicted from those that follow, x_n = Σ a_k x_{n+k}.        [linear prediction: Makhoul 1975, eq. 2]
+h jumps at the impulse, and no band represents a jump exactly: half of it is in the first sample, the rest rings around
+it. Those samples are predicted from later ones, x_n = Σ a_k x_{n+k}.        [linear prediction: Makhoul 1975, eq. 2]
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MOTION = {"acceleration": -1, "velocity": 0, "displacement": 1}
 
 
 def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
-    """A response as a recording.
+    """Convert a response to a recording.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     Raises
     ------
     FileError
-        No whole number of Hz is its rate, or it unpacks to more than memory is for.
+        Its rate is not a whole number of Hz, or it unpacks to too many samples.
     """
     power = MOTION.get(response.quantity, 0)
     if not response.spectral:
@@ -75,7 +75,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
 
 
 def _predicted_back(sound: Array, jump: int) -> Array:
-    """A recording (n,) whose first samples are predicted from those that follow; itself where it is too short."""
+    """Predict the first samples of a recording (n,) from later ones; unchanged where it is too short."""
     order = min(ORDER, (len(sound) - jump) // 8)
     if order < 2:
         return sound
@@ -90,7 +90,7 @@ def _predicted_back(sound: Array, jump: int) -> Array:
 
 
 def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float, float]]:
-    """A time record as velocity or pressure."""
+    """Convert a time record to velocity or pressure."""
     sr = round(1 / response.step)
     if not sr or abs(sr * response.step - 1) > OFF_RATE:
         raise FileError(f"a time record has {1 / response.step:g} samples a second", "export it at a whole number")
@@ -103,21 +103,22 @@ def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float,
 
 
 def _derived(value: Array, freq_hz: Array, power: int) -> Array:
-    """(iω)^power times a spectrum, nothing at zero."""
+    """Multiply a spectrum by (iω)^power; zero at zero frequency."""
     omega = np.where(freq_hz > 0, 2j * np.pi * freq_hz, 1.0)
     return np.asarray(np.where(freq_hz > 0, value * omega**power, 0.0))
 
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
-    """One between two frequencies; raised cosines to zero at half the one and, above the other, at the last."""
+    """Return one between two frequencies; raised cosines to zero at half the first and at the last frequency."""
     below = np.clip((freq_hz - low_hz / 2) / (low_hz / 2), 0, 1)
     above = np.clip((freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9), 0, 1)
     return np.asarray(np.sin(np.pi / 2 * below) ** 2 * np.sin(np.pi / 2 * above) ** 2)
 
 
 def _length(least: int, step_hz: float) -> tuple[int, int]:
-    """An even number of samples, no fewer than ``least``, whose rate in steps of ``step_hz`` is a whole number of Hz,
-    and that rate. Raises FileError.
+    """Find an even number of samples, at least ``least``, with a whole rate in Hz at ``step_hz``, and that rate.
+
+    Raises FileError where there is none.
     """
     count = least + least % 2 + 2 * np.arange(LENGTHS)
     if count[0] > MOST_SAMPLES:

@@ -1,4 +1,4 @@
-"""UFF files: measured functions at points of a structure, in SI units.
+"""Read UFF files: measured functions at points of a structure, in SI units.
 
     bytes -> whole? -> pyuff -> 58 functions -> Response      15, 2411 nodes -> places     164 units -> factors to SI
                              -> what is not understood -> one line each, by kind, with a count
@@ -50,8 +50,14 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """Where and along what a function is measured: a node with a direction. position_m, direction: None where the file
-    does not say. axis: ±1 to ±3, 0 for a scalar.
+    """Degree of freedom of a function: a node with a direction.
+
+    Parameters
+    ----------
+    axis
+        ±1 to ±3, 0 for a scalar.
+    position_m
+        None where the file does not give it.
     """
 
     node: int
@@ -60,7 +66,7 @@ class Freedom:
 
     @property
     def direction(self) -> Point | None:
-        """The unit vector of its axis."""
+        """Unit vector of its axis, or None."""
         if not 1 <= abs(self.axis) <= 3:
             return None
         unit = [0.0, 0.0, 0.0]
@@ -72,7 +78,12 @@ class Freedom:
 class Response:
     """One function: value (n,) from ``start`` by ``step``, complex over Hz (spectral) or real over s.
 
-    quantity: of `QUANTITIES`, SI; per_force: divided by a force, per N over frequency, per N·s over time.
+    Parameters
+    ----------
+    quantity
+        Of `QUANTITIES`, SI.
+    per_force
+        Divided by a force: per N over frequency, per N·s over time.
     """
 
     quantity: str
@@ -87,14 +98,14 @@ class Response:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UffFile:
-    """The functions of a file, and a line for each kind of thing that was not understood."""
+    """The functions of a file, and a line for each kind of content that was not understood."""
 
     responses: tuple[Response, ...]
     notes: tuple[str, ...]
 
 
 def pyuff_module() -> Any:
-    """The package that reads and writes UFF. Raises FileError where it is not installed."""
+    """Import the package that reads and writes UFF; FileError where it is not installed."""
     try:
         import pyuff
     except ImportError as error:
@@ -118,7 +129,7 @@ def read_uff(path: str | os.PathLike[str]) -> UffFile:
     Raises
     ------
     FileError
-        pyuff is not installed; the file is missing, cut or no UFF; none of its functions is understood.
+        pyuff is not installed; the file is missing, cut or not UFF; none of its functions is understood.
     """
     pyuff = pyuff_module()
     with reading(path, "UFF file", FileError, "export it again"):
@@ -130,7 +141,7 @@ def read_uff(path: str | os.PathLike[str]) -> UffFile:
 
 
 def _understood(sets: list[tuple[int, dict[str, Any]]], kinds: list[int], path: str | os.PathLike[str]) -> UffFile:
-    """What the datasets of a file hold. Raises FileError where that is no response."""
+    """Convert the datasets of a file; FileError where none is a response."""
     metre, newton = _factors([one for kind, one in sets if kind == 164])
     nodes = _nodes([one for kind, one in sets if kind in (15, 2411)], metre)
     found: list[Response] = []
@@ -150,7 +161,7 @@ def _understood(sets: list[tuple[int, dict[str, Any]]], kinds: list[int], path: 
 
 
 def _dataset(file: Any, number: int, kind: int) -> dict[str, Any]:
-    """A dataset as pyuff reads it. Raises FileError."""
+    """Read a dataset by pyuff; raises FileError."""
     try:
         with np.errstate(all="ignore"):  # of values that are none: they are refused below
             found: dict[str, Any] = file.read_sets(number)
@@ -162,7 +173,7 @@ def _dataset(file: Any, number: int, kind: int) -> dict[str, Any]:
 
 
 def _refuse_cut(path: Path) -> None:
-    """Raise FileError where a file is no UFF, or ends inside a dataset: pyuff leaves out what is cut."""
+    """Raise FileError where a file is not UFF, or ends inside a dataset, which pyuff would omit."""
     if path.is_file() and path.stat().st_size > BYTES_MAX:
         raise FileError(f"{path} is over 1 GiB", "export fewer responses")
     tags = len(re.findall(rb"(?: {4}-1)(?=[\r\n]| {74}|$)", path.read_bytes()))
@@ -173,7 +184,7 @@ def _refuse_cut(path: Path) -> None:
 
 
 def _factors(units: list[dict[str, Any]]) -> tuple[float, float]:
-    """Metres and newtons of a unit of length and of force in the file, by dataset 164. Raises FileError."""
+    """Return metres and newtons per unit of length and force in the file, by dataset 164; raises FileError."""
     if not units:
         return 1.0, 1.0
     length, force = float(units[0]["length"]), float(units[0]["force"])
@@ -183,7 +194,7 @@ def _factors(units: list[dict[str, Any]]) -> tuple[float, float]:
 
 
 def _nodes(sets: list[dict[str, Any]], metre: float) -> dict[int, Point]:
-    """Places in m by node. Raises FileError where one is nowhere."""
+    """Return positions in m by node; FileError where one is not finite or too large."""
     found = {
         int(node): (float(x) * metre, float(y) * metre, float(z) * metre)
         for one in sets
@@ -198,7 +209,7 @@ def _nodes(sets: list[dict[str, Any]], metre: float) -> dict[int, Point]:
 def _response(
     one: dict[str, Any], nodes: dict[int, Point], units: tuple[float, float], path: str | os.PathLike[str]
 ) -> Response | str:
-    """A dataset 58, or what it is in words where that is not understood. Raises FileError where it is cut."""
+    """Convert a dataset 58, or describe it where it is not understood; FileError where it is cut."""
     kind, quantity = int(one["func_type"]), QUANTITIES.get(int(one["ordinate_spec_data_type"]))
     if kind not in (1, 4):
         return FUNCTIONS.get(kind, f"functions of type {kind}")
@@ -239,7 +250,7 @@ def _counted(unread: Counter[str]) -> list[str]:
 
 
 def _notes(found: list[Response], unread: Counter[str], kinds: list[int], assumed: int) -> list[str]:
-    """What was not understood, and what was taken for granted, one line each."""
+    """List what was not understood and what was assumed, one line each."""
     lines = [f"not used: {', '.join(_counted(unread))}"] if unread else []
     others = Counter(kind for kind in kinds if kind not in (*READ, *QUIET, *SYSTEMS))
     if others:

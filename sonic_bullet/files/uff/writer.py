@@ -1,4 +1,4 @@
-"""UFF files out: modal shapes at points, and responses that they make, for programs of experimental modal analysis.
+"""Write UFF files, modal shapes at points and their responses, for programs of experimental modal analysis.
 
 nodes -> dataset 15     shapes, f, ζ -> dataset 55, one a mode     responses per N -> dataset 58     SI -> dataset 164
 ζ = d/√(ω² + d²) of e^{−dt} cos ωt; dataset 55 has six figures of each number, as single precision has   [SDRL]
@@ -25,10 +25,19 @@ TITLE = 80
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalShapes:
-    """Modes at points: point_m (k, 3), shape (k, 3, m) real, freq_hz and decay_per_s (m,), damped; decay NaN where it
-    is not known.
+    """Modes at points.
 
-    modal_mass_kg: of every mode, 0 where shapes have no scale. words: one a mode, or none at all.
+    Parameters
+    ----------
+    point_m : Array, shape (k, 3)
+    shape : Array, shape (k, 3, m)
+        Real.
+    freq_hz, decay_per_s : Array, shape (m,)
+        Damped frequency; decay NaN where it is not known.
+    modal_mass_kg
+        Of every mode; 0 where shapes have no scale.
+    words
+        One text a mode, or none at all.
     """
 
     point_m: Array
@@ -42,7 +51,7 @@ class ModalShapes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mobility:
-    """Velocity per force (n,) at 0, step_hz, … between two freedoms, both with places."""
+    """Velocity per force (n,) at 0, step_hz, … between two freedoms that have positions."""
 
     value: Array
     step_hz: float
@@ -51,7 +60,13 @@ class Mobility:
 
 
 def uff_name(path: str | None) -> str | None:
-    """A name for a UFF file as it is, or None. Raises FileError where it does not end as one, or pyuff is missing."""
+    """Return a valid name for a UFF file unchanged, or None.
+
+    Raises
+    ------
+    FileError
+        It has another extension, or pyuff is missing.
+    """
     if path is None:
         return None
     if not path.lower().endswith((".uff", ".unv")):
@@ -102,7 +117,7 @@ def _units() -> dict[str, Any]:
 
 
 def _nodes(shapes: ModalShapes, mobilities: tuple[Mobility, ...]) -> dict[str, Any]:
-    """Dataset 15: the shapes' points, then whatever places the responses have besides."""
+    """Make dataset 15: the shapes' points, then other positions of the responses."""
     place = {k + 1: tuple(point) for k, point in enumerate(shapes.point_m)}
     for freedom in (f for one in mobilities for f in (one.strike, one.sensor)):
         if freedom.position_m is not None:
@@ -112,7 +127,7 @@ def _nodes(shapes: ModalShapes, mobilities: tuple[Mobility, ...]) -> dict[str, A
 
 
 def _mode(shapes: ModalShapes, k: int, title: str) -> dict[str, Any]:
-    """Dataset 55 of a mode."""
+    """Make dataset 55 of a mode."""
     omega, d = 2 * np.pi * float(shapes.freq_hz[k]), float(np.nan_to_num(shapes.decay_per_s[k]))
     words = shapes.words[k] if shapes.words else "NONE"
     return {
@@ -136,7 +151,7 @@ def _mode(shapes: ModalShapes, k: int, title: str) -> dict[str, Any]:
 
 
 def _function(one: Mobility, title: str) -> dict[str, Any]:
-    """Dataset 58 of a response."""
+    """Make dataset 58 of a response."""
     return {
         "type": 58,
         "func_type": 4,
