@@ -1,9 +1,9 @@
-"""Values that prove themselves when built: read-only arrays of a stated shape, units in the names.
+"""Values that are checked when built: read-only arrays of a stated shape, units in the names.
 
-bodies, simulated, contacts, residual, modal_options: what one room hands another;
+bodies, simulated, contacts, residual, modal_options: what one package hands another;
 arrays: what records are built of;  units; errors
 
-Names are imported when first used: errors and units need no numpy, and neither does who prints a help text.
+Names are imported when first used: errors and units need no numpy, and neither does a help text.
 """
 
 from __future__ import annotations

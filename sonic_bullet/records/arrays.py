@@ -1,4 +1,4 @@
-"""What records are built of: read-only arrays of a stated shape, and conditions that name what is wrong."""
+"""Elements of records: read-only arrays of a stated shape, and conditions whose errors name the fault."""
 
 from __future__ import annotations
 
@@ -14,16 +14,24 @@ from sonic_bullet.records.errors import RecordError
 
 Array = NDArray[Any]
 LARGEST = 1e30
-"""No length, force, stiffness or frequency in SI units is larger, and fourth powers of such numbers are still finite.
+"""Largest length, force, stiffness or frequency in SI units; fourth powers of such numbers are still finite.
 """
 
 
 def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
-    """Read-only C-contiguous copy of ``value`` with ``dtype`` and ``shape`` (None: any length); the same array where it
-    is one already.
+    """Return a read-only C-contiguous copy of ``value``, or the same array where it is one already.
 
-    Raises RecordError where it holds no numbers, or none that ``dtype`` can hold (1.5 is no index), where the shape
-    differs or, with ``finite``, a number is NaN, infinite or beyond `LARGEST`.
+    Parameters
+    ----------
+    dtype, shape
+        Of the result; None in shape: any length.
+    finite
+        Whether to refuse NaN, infinite numbers and numbers beyond `LARGEST`.
+
+    Raises
+    ------
+    RecordError
+        It holds no numbers, or none that ``dtype`` can hold (1.5 as an index), or the shape differs.
     """
     # a record's own: read-only and nobody's view
     kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None
@@ -58,7 +66,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
 
 
 def joined(parts: Sequence[Array], dtype: Any, tail: tuple[int, ...] = ()) -> Array:
-    """Read-only (n, *tail): the numbers of C-contiguous arrays of one dtype, one array after the other.
+    """Join C-contiguous arrays of one dtype to a read-only array (n, *tail).
 
     np.concatenate promotes structured dtypes field by field, pair by pair: 40 µs a part of CONTACT rows, where joining
     bytes takes 0.1 µs.
@@ -69,10 +77,7 @@ def joined(parts: Sequence[Array], dtype: Any, tail: tuple[int, ...] = ()) -> Ar
 
 
 def _converted(given: Array, dtype: Any) -> Array:
-    """A C-contiguous copy with ``dtype``.
-
-    Raises ValueError where integers are asked for and that would change a number.
-    """
+    """Return a C-contiguous copy with ``dtype``; ValueError where conversion to integers would change a number."""
     with np.errstate(invalid="ignore", over="ignore"):
         array: Array = np.array(given, dtype=dtype, order="C")
     if array.dtype.kind == "i" and not (array == given).all():

@@ -1,10 +1,10 @@
-"""The values that travel between rooms: what a thing is, proven when it is built.
+"""Materials, shapes and modal models as values, checked when built.
 
     shapes (listener) + Material (presets) -> ModalModel (modal) -> Body -> Step, ContactLog -> sound
 
-Every record is frozen, its arrays are read-only copies, units stand in the names and shapes in the comments: b bodies,
-m modes, v vertices, f faces. A record that exists is sound: inner code never asks again. Body frame always means the
-frame PyBullet calls inertial: origin at the centre of mass, axes as `getBasePositionAndOrientation` gives them.
+Every record is frozen, its arrays are read-only copies, units are in the names and shapes in the comments: b bodies,
+m modes, v vertices, f faces. A record that exists is valid: inner code does not check again. Body frame always means
+the frame PyBullet calls inertial: origin at the centre of mass, axes as `getBasePositionAndOrientation` gives them.
 """
 
 from __future__ import annotations
@@ -42,9 +42,11 @@ __all__ = [
 
 
 def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
-    """Voigt stiffness (6, 6) in Pa, order xx yy zz yz xz xy with engineering shear strains.
+    """Return the Voigt stiffness (6, 6) in Pa, order xx yy zz yz xz xy with engineering shear strains.
 
-    Source: Lamé constants, e.g. Slaughter, The Linearized Theory of Elasticity (2002), ch. 5.
+    References
+    ----------
+    Lamé constants, e.g. Slaughter, The Linearized Theory of Elasticity (2002), ch. 5.
     """
     lame = youngs_pa * poisson / ((1 + poisson) * (1 - 2 * poisson))
     shear = youngs_pa / (2 * (1 + poisson))
@@ -56,21 +58,34 @@ def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
 
 
 ORTHOTROPIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
-"""Places in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes
+"""Indices in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes
 leave.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """What a body is made of.
+    """Material of a body.
 
-    stiffness_pa (6, 6): Voigt tensor, positive definite. alpha_per_s, beta_s: Rayleigh damping d = (alpha +
-    beta·lambda)/2 [Ren, Yeh, Lin 2013, eq. 6], None where unknown. includes_radiation: they, and laws among the
-    effects, are a body's total damping as it was recorded, so the run time adds no radiation to it; else the material's
-    own, to which it does. roughness_m: rms height of the surface profile; hurst: its Hurst exponent (profile spectrum ∝
-    k^-(1+2·hurst)). restitution: of an impact against a rigid wall, for pulses only. residual: what sounds beside the
-    modes, None: nothing. effects: what else belongs to it (sonic_bullet.effects), in the order in which they act.
+    Parameters
+    ----------
+    stiffness_pa : Array, shape (6, 6)
+        Voigt tensor, positive definite.
+    alpha_per_s, beta_s
+        Rayleigh damping d = (alpha + beta·lambda)/2 [Ren, Yeh, Lin 2013, eq. 6], None where unknown.
+    roughness_m
+        rms height of the surface profile.
+    hurst
+        Hurst exponent of the profile (spectrum ∝ k^-(1+2·hurst)).
+    restitution
+        Of an impact against a rigid wall, for pulses only.
+    residual
+        Non-modal part of the sound; None: none.
+    effects
+        Further effects (sonic_bullet.effects), in the order in which they act.
+    includes_radiation
+        Whether its damping, and that of its effects, is a body's total damping as recorded, to which the run time adds
+        no radiation; else it is the material's own.
     """
 
     name: str
@@ -87,6 +102,7 @@ class Material:
     includes_radiation: bool = False
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         as_text(self.name, "the name of a material", "give a text")
         where = f"material {shown(self.name)}"
         stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"{where}: stiffness_pa")
@@ -140,7 +156,13 @@ class Material:
 
     @classmethod
     def isotropic(cls, name: str, *, youngs_pa: float, poisson: float, density_kg_m3: float, **rest: Any) -> Material:
-        """Material with the same stiffness in every direction. Raises RecordError on unphysical constants."""
+        """Build a material with the same stiffness in every direction.
+
+        Raises
+        ------
+        RecordError
+            The constants are unphysical.
+        """
         where = f"material {shown(name)}"
         modulus = as_number(youngs_pa, f"{where}: youngs_pa", "give a Young's modulus above zero", above=0)
         ratio = as_number(poisson, f"{where}: poisson", "Poisson's ratio lies between -1 and 0.5", above=-1, below=0.5)
@@ -164,15 +186,17 @@ class Material:
 
     @property
     def youngs_pa(self) -> float:
+        """Young's modulus of the averaged moduli."""
         return 9 * self.bulk_pa * self.shear_pa / (3 * self.bulk_pa + self.shear_pa)
 
     @property
     def poisson(self) -> float:
+        """Poisson's ratio of the averaged moduli."""
         return (3 * self.bulk_pa - 2 * self.shear_pa) / (2 * (3 * self.bulk_pa + self.shear_pa))
 
     @property
     def plane_strain_pa(self) -> float:
-        """E/(1-ν²), the modulus that enters Hertz' law."""
+        """Plane strain modulus E/(1-ν²) of Hertz' law."""
         return self.youngs_pa / (1 - self.poisson**2)
 
 
@@ -183,9 +207,15 @@ ShapeKind = Literal["sphere", "box", "capsule", "cylinder", "mesh", "plane"]
 class Shape:
     """One piece of a body's geometry, placed in the body frame.
 
-    size_m (3,): sphere (r, 0, 0); box full edge lengths; capsule and cylinder (r, length along z without caps, 0);
-    plane: normal is +z, unused; mesh: unused. position_m (3,), quaternion_xyzw (4,): placement. vertex_m (v, 3), face
-    (f, 3): meshes only, already scaled, counter-clockwise seen from outside.
+    Parameters
+    ----------
+    size_m : Array, shape (3,)
+        Sphere (r, 0, 0); box full edge lengths; capsule and cylinder (r, length along z without caps, 0); unused of a
+        mesh, and of a plane, whose normal is +z.
+    position_m, quaternion_xyzw : Array, shapes (3,), (4,)
+        Placement.
+    vertex_m, face : Array, shapes (v, 3), (f, 3)
+        Meshes only, already scaled, counter-clockwise seen from outside.
     """
 
     kind: ShapeKind
@@ -196,6 +226,7 @@ class Shape:
     face: Array = field(default_factory=lambda: np.zeros((0, 3), np.int32))
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         kinds = get_args(ShapeKind)
         if as_text(self.kind, "kind of a shape", f"one of {', '.join(kinds)}") not in kinds:
             raise RecordError(f"kind of a shape is {shown(self.kind)}", nearest(self.kind, kinds))
@@ -221,17 +252,33 @@ class Shape:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ModalModel:
-    """A body's vibration modes on its surface, and the surface they live on.
+    """Vibration modes of a body on its surface, and that surface.
 
-    freq_hz, decay_per_s (m,): of the damped modes, ascending; decay NaN where the material states no damping. shape (v,
-    3, m) float32: mass-normalised displacement at the surface vertices, in 1/√kg (UᵀMU = I), body frame. vertex_m (v,
-    3), face (f, 3): the surface, body frame, outward. curvature_per_m (f,): mean of the principal curvatures of the
-    smooth surface (0 flat, 1/r sphere, negative inside a bowl). volume_m3, mass_kg: of the meshed solid at the
-    material's density. dropped: modes left out as overdamped. note: how it was made (element size, order, choices).
-    bend_s2_m2, damping_growth_s_m (m,): relative rise of a mode's frequency per square of its peak velocity at the
-    surface, of its decay (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear body.
-    includes_radiation: of decay_per_s, as the material (see `Material`). A body without audible modes has m = 0; a
-    plane has v = f = 0 besides.
+    A body without audible modes has m = 0; a plane also has v = f = 0.
+
+    Parameters
+    ----------
+    freq_hz, decay_per_s : Array, shape (m,)
+        Of the damped modes, ascending; decay NaN where the material states no damping.
+    shape : Array of float32, shape (v, 3, m)
+        Mass-normalised displacement at the surface vertices, in 1/√kg (UᵀMU = I), body frame.
+    vertex_m, face : Array, shapes (v, 3), (f, 3)
+        The surface, body frame, outward.
+    curvature_per_m : Array, shape (f,)
+        Mean of the principal curvatures of the smooth surface (0 flat, 1/r sphere, negative inside a bowl).
+    volume_m3, mass_kg
+        Of the meshed solid at the material's density.
+    dropped
+        Number of modes left out as overdamped.
+    note
+        How it was made (element size, order, choices).
+    bend_s2_m2 : Array, shape (m,)
+        Relative rise of a mode's frequency per square of its peak velocity at the surface; None: a linear body.
+    damping_growth_s_m : Array, shape (m,)
+        Relative rise of its decay is (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear
+        body.
+    includes_radiation
+        Of decay_per_s (see `Material`).
     """
 
     freq_hz: Array
@@ -250,6 +297,7 @@ class ModalModel:
     includes_radiation: bool = False
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         freq = frozen_array(self.freq_hz, float, (None,), "freq_hz")
         m = len(freq)
         vertex = frozen_array(self.vertex_m, float, (None, 3), "vertex_m")
@@ -289,6 +337,7 @@ class ModalModel:
 
     @property
     def mode_count(self) -> int:
+        """Number of modes."""
         return len(self.freq_hz)
 
     @property

@@ -1,11 +1,10 @@
-"""Arguments at the public doors: whatever a user passes becomes the one type that inner code takes, or one line that
-names it.
+"""Checks of public arguments: a value becomes the one type that inner code takes, or an error of one line names it.
 
     as_number(3, "to_hz", …) -> 3.0
         as_number("x", "to_hz", …) -> "to_hz is 'x'; give a frequency in Hz, above zero"
 
-Each function takes the argument's name, the remedy, and the kind of error that belongs to it. bool is no number here:
-True is no body.
+Each function takes the argument's name, the remedy, and the class of the error. bool is not a number here: True is not
+a body.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ _SHORT.maxlevel = 3
 LONGEST_NAME = 255
 """Bytes of a file's name that file systems take."""
 LISTED = 8
-"""Names that a message lists at most."""
+"""Most names that a message lists."""
 
 
 def shown(value: object) -> str:
-    """The value as a message quotes it: 80 characters at most, whatever it is."""
+    """Quote a value for a message, in at most 80 characters."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of shape {value.shape}"
     try:
@@ -48,7 +47,7 @@ def shown(value: object) -> str:
 
 
 def brief(text: object) -> str:
-    """A name as a message repeats it: its first 117 characters where it has over 120."""
+    """Return a name for a message: its first 117 characters where it has over 120."""
     name = str(text)
     return name if len(name) <= 120 else f"{name[:117]}..."
 
@@ -64,7 +63,7 @@ def as_number(
     most: float = math.inf,
     error: Error = RecordError,
 ) -> float:
-    """A finite number with above < number < below and least <= number <= most. Raises ``error``."""
+    """Return a finite number with above < number < below and least <= number <= most, or raise ``error``."""
     value = _scalar(value)
     if isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_)):
         try:
@@ -79,7 +78,7 @@ def as_number(
 def as_whole(
     value: object, name: str, remedy: str, *, least: int = -(2**63), most: int = 2**63 - 1, error: Error = RecordError
 ) -> int:
-    """A whole number of at most 64 bits between ``least`` and ``most``, of any numeric type. Raises ``error``."""
+    """Return a whole number of at most 64 bits between ``least`` and ``most``, of any type, or raise ``error``."""
     value = _scalar(value)
     if isinstance(value, numbers.Integral) and not isinstance(value, (bool, np.bool_)):
         whole = int(value)
@@ -98,24 +97,21 @@ def _scalar(value: object) -> object:
 
 
 def as_flag(value: object, name: str) -> bool:
-    """True or False, and nothing that is merely true. Raises RecordError."""
+    """Return True or False; RecordError for any other value, also one that is merely true."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     raise RecordError(f"{name} is {shown(value)}", "give True or False")
 
 
 def as_text(value: object, name: str, remedy: str, *, error: Error = RecordError) -> str:
-    """A text. Raises ``error``."""
+    """Return a text, or raise ``error``."""
     if isinstance(value, str):
         return value
     raise error(f"{name} is {shown(value)}", remedy)
 
 
 def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) -> str:
-    """The name of a file, as a text or as what has one (os.PathLike).
-
-    Raises ``error``, also for names that no file can have.
-    """
+    """Return the name of a file, given as a text or os.PathLike, or raise ``error``, also for invalid names."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     if not isinstance(text, str):
         raise error(f"{name} is {shown(value)}", remedy)
@@ -129,21 +125,21 @@ def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) 
 
 
 def as_call(value: Call | None, name: str) -> Call | None:
-    """A function, or None. Raises RecordError."""
+    """Return a function, or None; raise RecordError for anything else."""
     if value is None or callable(value):
         return value
     raise RecordError(f"{name} is {shown(value)}", "give a function, or leave it out")
 
 
 def as_kind(value: object, kind: type[Kind], name: str, remedy: str, *, error: Error = RecordError) -> Kind:
-    """The value, which is of that type. Raises ``error``."""
+    """Return the value if it is of that type, or raise ``error``."""
     if isinstance(value, kind):
         return value
     raise error(f"{name} is {shown(value)}", remedy)
 
 
 def as_kinds(value: object, kind: Any, name: str, remedy: str, *, error: Error = RecordError) -> tuple[Any, ...]:
-    """Several values, all of that type (a class, or a union of some). Raises ``error``."""
+    """Return several values, all of that type (a class, or a union of some), or raise ``error``."""
     items = as_items(value, name, remedy, error=error)
     for number, item in enumerate(items):
         if not isinstance(item, kind):
@@ -152,7 +148,7 @@ def as_kinds(value: object, kind: Any, name: str, remedy: str, *, error: Error =
 
 
 def as_items(value: Any, name: str, remedy: str, *, error: Error = RecordError) -> tuple[Any, ...]:
-    """The items of a list, tuple, array or iterator; a text or a mapping is none. Raises ``error``."""
+    """Return the items of a list, tuple, array or iterator, not of a text or mapping, or raise ``error``."""
     if (
         isinstance(value, Iterable)
         and not isinstance(value, (str, bytes, dict))
@@ -165,7 +161,7 @@ def as_items(value: Any, name: str, remedy: str, *, error: Error = RecordError) 
 def as_rows(
     value: Any, name: str, columns: int, remedy: str, *, error: Error = RecordError
 ) -> tuple[tuple[float, ...], ...]:
-    """Rows of ``columns`` finite numbers each. Raises ``error`` naming the row."""
+    """Return rows of ``columns`` finite numbers each, or raise ``error`` naming the row."""
     rows = as_items(value, name, remedy, error=error)
     made = []
     for number, row in enumerate(rows):
@@ -177,9 +173,7 @@ def as_rows(
 
 
 def nearest(word: str, known: Collection[str], otherwise: str = "") -> str:
-    """A remedy for a word that is none of ``known``: the nearest of them, or all where nothing is near, ``otherwise``
-    behind them.
-    """
+    """Make a remedy for an unknown word: the nearest of ``known``, or all where none is near, then ``otherwise``."""
     lower = {one.lower(): one for one in reversed(list(known))}
     near = difflib.get_close_matches(word.lower()[:100], lower, n=3, cutoff=0.5)
     if near:
@@ -189,7 +183,7 @@ def nearest(word: str, known: Collection[str], otherwise: str = "") -> str:
 
 
 def check_options(given: Iterable[str], known: Collection[str], name: str, *, error: Error = RecordError) -> None:
-    """Raise ``error`` where a keyword is none of ``known``, with the nearest that is."""
+    """Raise ``error`` where a keyword is not in ``known``, with the nearest that is."""
     for word in given:
         if word not in known:
             raise error(f"{name} has no option {shown(word)}", nearest(word, known))

@@ -1,9 +1,9 @@
-"""What a simulation reports, step by step:
+r"""Contacts, steps and events of a simulation as values.
 
 `Contacts` (rows of one step), `Step`, `Event`, and the `ContactLog` they add up to.
 
     getContactPoints -> Contacts -> Step -> synthesizer (live)      -> frame
-                                      \\-> ContactLog -> npz -> Step -> the same synthesizer (replay) -> the same bits
+                                      \-> ContactLog -> npz -> Step -> the same synthesizer (replay) -> the same bits
 
 k rows, s steps, b bodies. A row's a and b are indices into the log's `bodies`; its impulse acts on a, its negative on
 b.
@@ -57,13 +57,26 @@ ROW_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Contacts:
-    """The loaded contacts of one step, one row each: `row` (k,) of CONTACT, read-only, whose fields are
+    """The loaded contacts of one step, one row each: `row` (k,) of CONTACT, read-only.
 
-    a, b (k,): indices of bodies. point_a_m, point_b_m (k, 3): the contact in either body's frame, by the pose before
-    the step. normal (k, 3): unit, world frame, from b to a. impulse_n_s (k, 3): world frame, on a, friction included.
-    slip_m_s (k, 3): tangential velocity of a's material relative to b's, world frame, before the step. sweep_m_s (k,
-    2): speed at which the contact moves over a's and over b's surface. approach_m_s (k,): closing speed before the
-    step, positive when nearing. gap_m (k,): distance before the step, negative when overlapping.
+    Parameters
+    ----------
+    a, b : Array, shape (k,)
+        Indices of bodies.
+    point_a_m, point_b_m : Array, shape (k, 3)
+        The contact in either body's frame, by the pose before the step.
+    normal : Array, shape (k, 3)
+        Unit, world frame, from b to a.
+    impulse_n_s : Array, shape (k, 3)
+        World frame, on a, friction included.
+    slip_m_s : Array, shape (k, 3)
+        Tangential velocity of a's material relative to b's, world frame, before the step.
+    sweep_m_s : Array, shape (k, 2)
+        Speed at which the contact moves over a's and over b's surface.
+    approach_m_s : Array, shape (k,)
+        Closing speed before the step, positive when nearing.
+    gap_m : Array, shape (k,)
+        Distance before the step, negative when overlapping.
     """
 
     row: Array
@@ -91,51 +104,68 @@ class Contacts:
         object.__setattr__(self, "row", row)
 
     def __len__(self) -> int:
+        """Return the number of rows."""
         return len(self.row)
 
     @property
     def a(self) -> Array:
+        """Indices of the first bodies (k,)."""
         return self.row["a"]
 
     @property
     def b(self) -> Array:
+        """Indices of the second bodies (k,)."""
         return self.row["b"]
 
     @property
     def point_a_m(self) -> Array:
+        """Contact points in a's frame (k, 3)."""
         return self.row["point_a_m"]
 
     @property
     def point_b_m(self) -> Array:
+        """Contact points in b's frame (k, 3)."""
         return self.row["point_b_m"]
 
     @property
     def normal(self) -> Array:
+        """Unit normals from b to a (k, 3), world frame."""
         return self.row["normal"]
 
     @property
     def impulse_n_s(self) -> Array:
+        """Impulses on a (k, 3), world frame."""
         return self.row["impulse_n_s"]
 
     @property
     def slip_m_s(self) -> Array:
+        """Slip velocities (k, 3), world frame."""
         return self.row["slip_m_s"]
 
     @property
     def sweep_m_s(self) -> Array:
+        """Speeds of the contact over a's and b's surfaces (k, 2)."""
         return self.row["sweep_m_s"]
 
     @property
     def approach_m_s(self) -> Array:
+        """Closing speeds (k,)."""
         return self.row["approach_m_s"]
 
     @property
     def gap_m(self) -> Array:
+        """Distances (k,), negative when overlapping."""
         return self.row["gap_m"]
 
     @classmethod
     def of(cls, row: Array) -> Contacts:
-        """Rows (k,) of CONTACT. Raises RecordError where they are none, or a number is none or beyond `LARGEST`."""
+        """Build contacts of rows (k,) of CONTACT.
+
+        Raises
+        ------
+        RecordError
+            They are not such rows, or a number is NaN or beyond `LARGEST`.
+        """
         if not isinstance(row, np.ndarray) or row.dtype != CONTACT or row.ndim != 1:
             raise RecordError(f"contacts: row is {shown(row)}", "pass an array (k,) of dtype CONTACT")
         kept = not row.flags.writeable and row.base is None and row.flags.c_contiguous
@@ -149,25 +179,23 @@ class Contacts:
 
     @classmethod
     def trusted(cls, row: Array) -> Contacts:
-        """Rows whose numbers are known to be numbers, of an array that nobody writes to any more; nothing is checked
-        or copied.
-        """
+        """Wrap rows that were checked before and are no longer modified, without checks or copies."""
         made = object.__new__(cls)
         object.__setattr__(made, "row", row)
         return made
 
     @classmethod
     def none(cls) -> Contacts:
-        """No contacts at all."""
+        """Return contacts without rows."""
         return _NONE
 
     @classmethod
     def joined(cls, parts: Sequence[Contacts]) -> Contacts:
-        """The rows of all parts, in order."""
+        """Join the rows of all parts, in order."""
         return cls.trusted(joined([part.row for part in parts], CONTACT))
 
     def rows(self, start: int, stop: int) -> Contacts:
-        """Rows start … stop-1."""
+        """Return rows start … stop-1."""
         return Contacts.trusted(self.row[start:stop])
 
 
@@ -182,7 +210,7 @@ _NONE = _no_rows()
 
 @lru_cache(maxsize=256)
 def first_bodies(count: int) -> Array:
-    """Indices 0 … count-1: who is in a step while nobody has gone; the same array each time."""
+    """Return indices 0 … count-1, those of a step while no body was removed; the same array each time."""
     made = np.arange(count, dtype=np.int64)
     made.setflags(write=False)
     return made
@@ -195,10 +223,16 @@ _FIRST = np.zeros(0, np.int64)
 class Step:
     """One physics step: its length, the poses at its start of all bodies known by then, and its loaded contacts.
 
-    position_m (b, 3), quaternion_xyzw (b, 4): body frames in the world. teleported (b,): True where the body was moved
-    by hand since the previous step. gravity_m_s2 (3,): world frame; what falls for one step gains that speed, which is
-    no impact (see synth.strikes). body (b,): ascending indices into the log's `bodies` of those whose poses these are,
-    the first b of them unless said otherwise; who has gone is not among them, and never comes back.
+    Parameters
+    ----------
+    position_m, quaternion_xyzw : Array, shapes (b, 3), (b, 4)
+        Body frames in the world.
+    teleported : Array of bool, shape (b,)
+        True where the body was moved by hand since the previous step.
+    gravity_m_s2 : Array, shape (3,)
+        World frame; a body that falls for one step gains that speed, which is no impact (see synth.strikes).
+    body : Array, shape (b,)
+        Ascending indices of these bodies into the log's `bodies`, by default the first b; a removed body never returns.
     """
 
     dt_s: float
@@ -210,6 +244,7 @@ class Step:
     body: Array = field(default_factory=lambda: _FIRST)
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         object.__setattr__(self, "position_m", frozen_array(self.position_m, float, (None, 3), "step: position_m"))
         b = len(self.position_m)
         object.__setattr__(
@@ -244,8 +279,9 @@ class Step:
         gravity_m_s2: Array,
         body: Array | None = None,
     ) -> Step:
-        """A step of numbers that are known to be numbers, in arrays that nobody writes to any more; nothing is checked
-        or copied, except that the arrays can no longer be written to. body None: the first b.
+        """Build a step of numbers checked before, in arrays that are no longer modified, without checks or copies.
+
+        The arrays become read-only. body None: the first b.
         """
         made = object.__new__(cls)
         for array in (position_m, quaternion_xyzw, teleported, gravity_m_s2):
@@ -263,19 +299,29 @@ class Step:
 
 EVENT_KINDS = ("quench", "reset", "moved")
 OF_ONE_BODY = ("moved",)
-"""Kinds of event that concern one body and name it; the others concern all."""
+"""Kinds of event that concern one body; the others concern all."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What happened between two physics steps without being a contact.
+    """An event between two physics steps that is not a contact.
 
-    kind: "quench", all that rings stops; "reset", the world was emptied (resetSimulation); "moved", a body was set
-    elsewhere by hand, and had not been before the step before. A quench changes the sound; the others say why contacts
-    differ: what they do is in the poses of the steps. step: the number of the step before which it happened; it acts
-    at that step's first sample, whatever the rate. body: index into the log's `bodies` of the one that was moved, None:
-    it is of all. Raises LogError for a kind that this version does not know: passed over, it would make another sound
-    of the log.
+    A quench changes the sound; the others explain why contacts differ, and act by the poses of the steps.
+
+    Parameters
+    ----------
+    kind
+        "quench", all vibration stops; "reset", the world was emptied (resetSimulation); "moved", a body was set
+        elsewhere by hand, and had not been before the step before.
+    step
+        Number of the step before which it happened; it acts at that step's first sample, whatever the rate.
+    body
+        Index into the log's `bodies` of the body moved; None: all bodies.
+
+    Raises
+    ------
+    LogError
+        This version does not know the kind; ignoring it would change the sound of the log.
     """
 
     kind: str
@@ -283,6 +329,7 @@ class Event:
     body: int | None = None
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         if self.kind not in EVENT_KINDS:
             raise LogError(f"an event of the unknown kind '{self.kind[:40]}'", "use the version that wrote the log")
         if self.step < 0:

@@ -1,7 +1,7 @@
-"""Errors a user can act on: each message names the thing and the remedy in one line.
+"""Errors that a user can act on: each message states the fault and the remedy in one line.
 
-The command line prints ``str(error)`` behind the program's name and exits with 2; a library user catches
-`SonicBulletError` or one of its kinds. Nothing else is raised on purpose.
+The command line prints ``str(error)`` after the program's name and exits with 2; a library user catches
+`SonicBulletError` or one of its subclasses. Nothing else is raised on purpose.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ REMEDY_BYTES = 350  # of those, where both parts are long
 class SonicBulletError(Exception):
     """Base of all errors raised on purpose: ``what`` is wrong, and the ``remedy``.
 
-    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most `TEXT_BYTES` in UTF-8: what is longer loses its
+    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most `TEXT_BYTES` in UTF-8: a longer text loses its
     middle.
     """
 
@@ -29,13 +29,13 @@ class SonicBulletError(Exception):
 
 
 def exception_words(error: BaseException) -> str:
-    """Kind and message of any exception, without a full stop at its end: the remedy follows."""
+    """Return class and message of any exception without a full stop, as the remedy follows."""
     words = f"{type(error).__name__}: {error}".rstrip()
     return words if words.endswith("..") else words.removesuffix(".")
 
 
 def excerpt(text: str, most: int) -> str:
-    """``text``, or its start and end where it has more than ``most`` characters."""
+    """Return ``text``, or its start and end where it has more than ``most`` characters."""
     return text if len(text) <= most else f"{text[: 2 * most // 3]} … {text[len(text) - (most // 3 - 3) :]}"
 
 
@@ -71,11 +71,11 @@ class SceneError(SonicBulletError):
 
 
 class SceneWarning(UserWarning):
-    """Part of a world is left out of its sound, and the rest goes on; said once for each thing left out."""
+    """Part of a world is left out of its sound; issued once for each part."""
 
 
 class AnimationError(SonicBulletError):
-    """An animation cannot be read, or there is nothing in it that could sound."""
+    """An animation cannot be read, or nothing in it could sound."""
 
 
 class LogError(SonicBulletError):
@@ -83,15 +83,15 @@ class LogError(SonicBulletError):
 
 
 class CompareError(SonicBulletError):
-    """Two things cannot be compared, or there is nothing to compare them with."""
+    """Two objects cannot be compared, or there is nothing to compare them with."""
 
 
 class AudioError(SonicBulletError):
-    """Sample rate, samples, level or sound card with which nothing can be synthesised, written or played."""
+    """Sample rate, samples, level or sound card cannot be used for synthesis, writing or playback."""
 
 
 class PlaybackWarning(UserWarning):
-    """The sound card is gone: physics and log go on unheard; said once."""
+    """The sound card is gone: physics and log go on without playback; issued once."""
 
 
 class SizeWarning(UserWarning):
@@ -104,9 +104,7 @@ class FileError(SonicBulletError):
 
 @contextmanager
 def interrupts() -> Iterator[None]:
-    """An interrupt that meets compiled code on its way out arrives as SystemError, caused by it: here it is a
-    KeyboardInterrupt again, with whatever was noted.
-    """
+    """Restore a KeyboardInterrupt that compiled code turned into a SystemError, with its notes."""
     try:
         yield
     except SystemError as error:

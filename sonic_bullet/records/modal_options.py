@@ -1,4 +1,4 @@
-"""What is asked of the modes of a body, proven when it is built: how many, held where, and how thick the walls are."""
+"""Options of a body's modes, checked when built: how many, where clamped, and the wall thickness."""
 
 from __future__ import annotations
 
@@ -16,10 +16,25 @@ THICKEST_M = 1e4
 
 @dataclass(frozen=True, slots=True)
 class ModalOptions:
-    """to_hz, or the lowest ``count``: which modes. fixed: clamped where (x, y, z, radius) in m, body frame, reach.
-    thickness_m: wall of open surfaces. accuracy: relative, of the highest frequency.
+    """Options of a body's modes.
 
-    Raises ModalError (to_hz, count, fixed, accuracy) and MeshError (thickness_m), naming the argument.
+    Parameters
+    ----------
+    to_hz, count
+        Modes up to that frequency, or the lowest ``count``.
+    fixed
+        Clamped spheres (x, y, z, radius) in m, body frame.
+    thickness_m
+        Wall of open surfaces.
+    accuracy
+        Relative, of the highest frequency.
+
+    Raises
+    ------
+    ModalError
+        to_hz, count, fixed or accuracy is wrong.
+    MeshError
+        thickness_m is wrong.
     """
 
     to_hz: float = 20_000.0
@@ -29,6 +44,7 @@ class ModalOptions:
     accuracy: float = 0.01
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         remedy = "give clamps as [(x, y, z, radius), …] in metres, body frame"
         fixed = as_rows(self.fixed, "fixed", 4, remedy, error=ModalError)
         for number, row in enumerate(fixed):

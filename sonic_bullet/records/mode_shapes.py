@@ -1,13 +1,13 @@
-"""Mode shapes as whole multiples of a power of two, one for each mode: what a file holds of them is small and exact.
+"""Mode shapes as whole multiples of a power of two, one for each mode, so that files hold them small and exact.
 
     q = round(φ / 2^e),   2^e = 2^(E − B),   2^(E−1) <= max |φ| < 2^E over the mode;     φ := q·2^e
 
 |q| <= 2^B is a whole number, and q·2^e a float32, to the last bit. The error is at most half a multiple: 2^−B of the
-mode's largest component. It is made once, when the modes are: whatever is derived from them later, live or from a file,
-has the same numbers. `BITS` is what keeps the sound of every scene within −60 dB of its peak, and a margin:
+mode's largest component. Modes are rounded once, when they are computed: all that is derived from them later, live or
+from a file, has the same numbers. `BITS` keeps the sound of every scene within −60 dB of its peak, with a margin:
 benchmarks/shape_rounding.py.
 
-In a file stand differences, which are smaller: of each vertex from the first of its neighbours that comes before it,
+A file holds differences, which are smaller: of each vertex from the first of its neighbours that precedes it,
 d_i = q_i − q_parent(i) modulo 2^16, as 2d for d >= 0 and −2d − 1 else.
 """
 
@@ -23,15 +23,16 @@ TINIEST = -126  # exponent of the smallest normal float32
 
 
 def rounded(shape: Array, bits: int = BITS) -> Array:
-    """Shapes (v, 3, m) as float32, each mode's as whole multiples of its power of two."""
+    """Round shapes (v, 3, m) to whole multiples of each mode's power of two, as float32."""
     exponent = np.maximum(_exponent(shape) - bits, TINIEST)
     whole = np.rint(np.ldexp(shape.astype(np.float32), -exponent))
     return np.asarray(np.ldexp(whole + np.float32(0), exponent))  # + 0: a zero without a sign
 
 
 def whole_multiples(shape: Array) -> tuple[Array, Array] | None:
-    """q (v, 3, m) int16 and e (m,) int16 of shapes (v, 3, m) float32, e as large as can be; None where they are no such
-    multiples. `from_multiples` gives the same bytes back.
+    """Return q (v, 3, m) int16 and the largest e (m,) int16 of shapes (v, 3, m) float32, or None.
+
+    None where they are not such multiples; else `from_multiples` restores the same bytes.
     """
     exponent = np.maximum(_exponent(shape) - MOST_BITS, TINIEST)
     scaled = np.ldexp(shape, -exponent)
@@ -45,22 +46,22 @@ def whole_multiples(shape: Array) -> tuple[Array, Array] | None:
 
 
 def from_multiples(whole: Array, exponent: Array) -> Array:
-    """The shapes (v, 3, m) float32 of q and e."""
+    """Return the shapes (v, 3, m) float32 of q and e."""
     with np.errstate(over="ignore"):  # of a forged file: the record refuses what is infinite
         return np.asarray(np.ldexp(whole.astype(np.float32), exponent.astype(np.int32)))
 
 
 def differences(whole: Array, face: Array) -> Array:
-    """(v, 3, m) uint16 of q (v, 3, m) int16 on a surface of faces (f, 3); `summed` gives q back."""
+    """Return (v, 3, m) uint16 of q (v, 3, m) int16 on a surface of faces (f, 3); `summed` restores q."""
     parent = _parents(len(whole), face)
     step = whole - np.concatenate([whole, np.zeros((1, *whole.shape[1:]), np.int16)])[parent]
     return np.asarray((step << 1) ^ (step >> 15)).view(np.uint16)
 
 
 def summed(step: Array, face: Array) -> Array:
-    """q (v, 3, m) int16 of its `differences`; faces must name vertices that there are.
+    """Return q (v, 3, m) int16 of its `differences`; faces must name existing vertices.
 
-    Of a vertex and its first 1, 2, 4 … ancestors at a time [Hillis & Steele 1986]: a chain of n takes log n rounds.
+    Sums a vertex and its first 1, 2, 4 … ancestors at a time [Hillis & Steele 1986]: a chain of n takes log n rounds.
     """
     parent = np.append(_parents(len(step), face), len(step))  # the last: beyond the first ancestor
     signed = ((step >> 1) ^ -(step & 1)).view(np.int16)
@@ -72,7 +73,7 @@ def summed(step: Array, face: Array) -> Array:
 
 
 def _parents(count: int, face: Array) -> Array:
-    """(count,) the first of each vertex's neighbours, where that comes before it, else ``count``."""
+    """Return (count,) the first of each vertex's neighbours, where it precedes the vertex, else ``count``."""
     parent = np.arange(count)
     for a, b in ((0, 1), (1, 2), (2, 0)):
         np.minimum.at(parent, face[:, a], face[:, b])
@@ -81,5 +82,5 @@ def _parents(count: int, face: Array) -> Array:
 
 
 def _exponent(shape: Array) -> Array:
-    """E (m,) of the largest component of each mode, 0 where there is none."""
+    """Return E (m,) of the largest component of each mode, 0 without one."""
     return np.asarray(np.frexp(np.abs(shape).max(axis=(0, 1), initial=0).astype(float))[1])

@@ -1,13 +1,13 @@
-"""How a body that is part of the world is held, as far as its modes go; clamped points are `fixed=` of its modes.
+"""Mounting of a body, as it affects its modes; clamped points are `fixed=` of its modes.
 
-    "free"      by nothing: its material and the air take its energy. What moves is so by default
-    "placed"    set down in a building: its own modes, η = IN_PLACE more, both sides radiate. Mass 0 is so by default
-    "on floor"  the same, with one side against something that neither moves nor radiates: half the power
+    "free"      not held: its material and the air take its energy. The default of moving bodies
+    "placed"    set down in a building: its own modes, η = IN_PLACE more, both sides radiate. The default of mass 0
+    "on floor"  the same, with one side against a body that neither moves nor radiates: half the power
     a number    a loss factor η in place of IN_PLACE, both sides radiate
 
-    d += η ω/2    [Cremer, Heckl, Petersson 2005, eq. 3.6: what a loss factor takes of a mode]
+    d += η ω/2    [Cremer, Heckl, Petersson 2005, eq. 3.6: decay of a mode by a loss factor]
 
-The loss of built-up structures is the thinnest source of this project: 0.01 to 0.05 after Cremer and Heckl, the middle
+The loss of built-up structures is the weakest source of this project: 0.01 to 0.05 after Cremer and Heckl, the middle
 of it here. The edge term of EN 12354-1 gives a light board 1e-3, so it does not say more. Measure yours, and give it.
 """
 
@@ -17,16 +17,16 @@ from sonic_bullet.records.coerce import as_number, shown
 from sonic_bullet.records.errors import RecordError, SonicBulletError
 
 IN_PLACE = 0.03
-"""Loss factor of what stands in place, beside its material's own."""
+"""Loss factor of a placed body, in addition to its material's own."""
 MOUNTINGS = ("free", "placed", "on floor")
 MOST_LOSS = 1.0
-"""Beyond, a mode is no mode."""
+"""Largest loss factor of a mode."""
 Mounting = str | float
 REMEDY = f"give 'free', 'placed', 'on floor' or a loss factor, 0 … {MOST_LOSS:g}"
 
 
 def as_mounting(value: object, name: str = "mounting", error: type[SonicBulletError] = RecordError) -> Mounting:
-    """One of MOUNTINGS, or a loss factor. Raises ``error``."""
+    """Return one of MOUNTINGS, or a loss factor, or raise ``error``."""
     if isinstance(value, str):
         if value not in MOUNTINGS:
             raise error(f"{name} is {shown(value)}", REMEDY)
@@ -35,17 +35,17 @@ def as_mounting(value: object, name: str = "mounting", error: type[SonicBulletEr
 
 
 def usual_mounting(mass_kg: float) -> Mounting:
-    """Of a body of whom nobody said how it is held: what never moves (mass 0) is placed."""
+    """Return the default mounting: "placed" of mass 0, which never moves, else "free"."""
     return "placed" if mass_kg == 0 else "free"
 
 
 def loss_factor(mounting: Mounting) -> float:
-    """η that it adds to a body's own losses."""
+    """Return η that the mounting adds to a body's own losses."""
     if isinstance(mounting, str):
         return 0.0 if mounting == "free" else IN_PLACE
     return mounting
 
 
 def radiating_share(mounting: Mounting) -> float:
-    """Share of its power that a body radiates as it is held."""
+    """Return the fraction of its power that a body radiates in this mounting."""
     return 0.5 if mounting == "on floor" else 1.0

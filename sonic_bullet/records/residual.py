@@ -1,4 +1,4 @@
-"""What the modal sound of recorded strikes lacks, as a value: the room `residual` makes it, moves it and plays it."""
+"""Non-modal part of recorded strikes, as a value; the package `residual` makes, transfers and plays it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 
 MOST = {"freq_hz": 1e6, "decay_per_s": 1e6, "amplitude": 1e6, "time_s": 1e4, "power_per_hz": 1e9}
-"""Beyond these no number is of a sound, and products of them overflow."""
+"""Largest numbers of a sound; products of larger ones overflow."""
 SLOWEST_HZ = 0.01
 LOUDER = 1.1
 """A preset's levels are kept to a quarter of a decibel."""
@@ -18,15 +18,29 @@ FAINTEST = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residual:
-    """What the modal sound of recorded strikes lacks, beside that sound [Ren, Yeh, Lin 2013, sec. 6]: all
-    levels are relative to its modes.
+    """Non-modal part of recorded strikes [Ren, Yeh, Lin 2013, sec. 6]; all levels are relative to its modes.
 
-    mode_* (m,), ascending: the source's modes, amplitudes at the onset, mean square over the strikes. line_* (l,): what
-    features add that modes do not. freq_hz (b,), time_s (n,) ascending from the onset on: centres of the cells of
-    power_per_hz (b, n), noise power per Hz (two-sided), bilinear between them. clip_energy: of the recordings, in
-    amplitude² · s: what is left of them is no more. source: what it was taken from. No unit but Hz and s is left in it.
-    Raises RecordError where that cannot be: arrays that do not fit, NaN, no modes, modes 60 dB below the recordings,
-    more left than there was.
+    No unit but Hz and s is left in it.
+
+    Parameters
+    ----------
+    mode_freq_hz, mode_decay_per_s, mode_amplitude : Array, shape (m,)
+        The source's modes, ascending; amplitudes at the onset, mean square over the strikes.
+    line_freq_hz, line_decay_per_s, line_amplitude : Array, shape (l,)
+        Lines of the recording that modes lack.
+    freq_hz, time_s : Array, shapes (b,), (n,)
+        Centres of the cells of power_per_hz, ascending, time from the onset.
+    power_per_hz : Array, shape (b, n)
+        Noise power per Hz (two-sided), bilinear between the centres.
+    clip_energy
+        Of the recordings, in amplitude² · s, which the residual does not exceed.
+    source
+        What it was taken from.
+
+    Raises
+    ------
+    RecordError
+        Arrays do not fit, hold NaN or no modes, modes are 60 dB below the recordings, or the residual exceeds them.
     """
 
     mode_freq_hz: Array
@@ -42,6 +56,7 @@ class Residual:
     source: str = ""
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         m, count = len(np.atleast_1d(self.mode_freq_hz)), len(np.atleast_1d(self.line_freq_hz))
         b, n = len(np.atleast_1d(self.freq_hz)), len(np.atleast_1d(self.time_s))
         shapes: dict[str, tuple[int, ...]] = {"freq_hz": (b,), "time_s": (n,), "power_per_hz": (b, n)}
@@ -105,6 +120,6 @@ class Residual:
 
     @property
     def energy(self) -> float:
-        """∫ p² dt of lines and noise of the source, in amplitude² · s: a²/4d a line, 2∬S df dt for the noise."""
+        """Energy ∫ p² dt of lines and noise of the source, in amplitude² · s: a²/4d a line, 2∬S df dt for the noise."""
         noise = np.trapezoid(np.trapezoid(self.power_per_hz, self.time_s, axis=1), self.freq_hz)
         return float(2 * noise + (self.line_amplitude**2 / (4 * np.maximum(self.line_decay_per_s, 0.1))).sum())

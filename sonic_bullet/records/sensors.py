@@ -1,4 +1,4 @@
-"""What listens, and the medium between: microphones, vibrometers, the plain sum of modes; air."""
+"""Sensors and their medium: microphones, vibrometers, the plain sum of modes; air."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from sonic_bullet.records.coerce import as_number, as_whole
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Microphone:
-    """A point that hears pressure in Pa. position_m (3,): world frame, fixed."""
+    """A point that records pressure in Pa. position_m (3,): world frame, fixed."""
 
     position_m: Array
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone: position_m"))
 
 
@@ -30,6 +31,7 @@ class Vibrometer:
     link: int = -1
 
     def __post_init__(self) -> None:
+        """Check the fields and normalise the direction."""
         direction = frozen_array(self.direction, float, (3,), "vibrometer: direction")
         with np.errstate(over="ignore"):
             length = float(np.linalg.norm(direction))
@@ -45,13 +47,17 @@ class Vibrometer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalSum:
-    """The seed's observation: the plain sum Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s [Ren
-    et al. 2013, eq. 11, 13].
+    """The plain sum of modes Σ a·e^{-dt}·sin(2πft), a = scale·Uᵀj for an impulse j in N·s.
+
+    References
+    ----------
+    Ren et al. 2013, eq. 11, 13.
     """
 
     scale: float = 1.0
 
     def __post_init__(self) -> None:
+        """Check the scale."""
         store(self, scale=as_number(self.scale, "modal sum: scale", "give a number"))
 
 
@@ -66,6 +72,7 @@ class Air:
     sound_speed_m_s: float = 343.0
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         store(
             self,
             density_kg_m3=as_number(

@@ -1,9 +1,8 @@
-"""What a simulator says of its bodies and of itself, by value.
+"""Properties that a simulator reports of its bodies and of itself, by value.
 
-    its own answers, and what hooks see being set -> Values -> Body.dynamics, Simulator -> ContactLog
+    its own answers, and values that hooks see being set -> Values -> Body.dynamics, Simulator -> ContactLog
 
-Values are numbers under the simulator's own names, in SI units. A name that is not among them is not known: nobody said
-it, and it is not zero.
+Values are numbers under the simulator's own names, in SI units. A missing value is not known; it is not zero.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
 
 Values = Mapping[str, float]
-"""Numbers by the simulator's own names for them; what is not there is not known."""
+"""Numbers by the simulator's own names for them; a missing number is not known."""
 
 
 class ReadOnlyDict(dict[str, Any]):
-    """A dict that is as it was made; it can be copied and pickled, which types.MappingProxyType cannot."""
+    """A read-only dict that can be copied and pickled, which types.MappingProxyType cannot."""
 
     def _refuse(self, *_: object, **__: object) -> NoReturn:
         raise TypeError("these values are read-only")
@@ -33,16 +32,17 @@ class ReadOnlyDict(dict[str, Any]):
     __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the dict by value."""
         return ReadOnlyDict, (dict(self),)
 
 
 def frozen_values(values: object, name: str) -> Values:
-    """Finite numbers by name, read-only and in the order of their names. Raises RecordError."""
+    """Return finite numbers by name, read-only and sorted by name; raises RecordError."""
     return _frozen(values, name, "give a dict of names to numbers", as_number)
 
 
 def frozen_texts(values: object, name: str) -> Mapping[str, str]:
-    """Texts by name, read-only and in the order of their names. Raises RecordError."""
+    """Return texts by name, read-only and sorted by name; raises RecordError."""
     return _frozen(values, name, "give a dict of names to texts", as_text)
 
 
@@ -57,17 +57,40 @@ def _frozen(values: object, name: str, remedy: str, checked: Callable[[object, s
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """One link of one PyBullet body as the sound needs it, by value, so that a log renders without PyBullet.
+    """One link of a simulated body, by value, so that a log renders without a simulator.
 
-    body_id, link: as the user knows them (base is link -1). epoch: grows whenever ids may have been given anew. name:
-    that link's alone within a log, and all records of it have it. mass_kg: the simulator's, 0 for what does not move.
-    inertia_kg_m2 (3, 3): body frame, centre of mass. volume_m3: of the displaced air. curvature_per_m: of a shape that
-    has one everywhere (sphere 1/r), else NaN: then the model's surface tells. material None: a silent, smooth and rigid
-    partner. model None: nothing of it vibrates. since_step: the first step in which it exists for the sound;
-    until_step: the first in which it does not any more, or -1. dynamics: friction, restitution, damping, mass, as the
-    simulator has them when the record begins (see `Change`). options: what was asked of its modes; None where nothing
-    was, or the model was given. mounting: how it is held (`records.mounting`). silent: no sensor hears it; it vibrates
-    and touches as it does otherwise. gain_db: how much louder sensors hear it than it is.
+    Parameters
+    ----------
+    body_id, link
+        As the user knows them (base is link -1).
+    epoch
+        Increases whenever ids may have been reused.
+    name
+        Unique to that link within a log; all its records have it.
+    mass_kg
+        The simulator's, 0 for a static body.
+    inertia_kg_m2 : Array, shape (3, 3)
+        Body frame, centre of mass.
+    volume_m3
+        Of the displaced air.
+    curvature_per_m
+        Of a shape with one curvature everywhere (sphere 1/r), else NaN: the model's surface has it.
+    material
+        None: a silent, smooth and rigid partner.
+    model
+        None: it does not vibrate.
+    since_step, until_step
+        First step in which it exists for the sound, and first in which it no longer does, or -1.
+    dynamics
+        Friction, restitution, damping, mass, as the simulator has them when the record begins (see `Change`).
+    options
+        Modal options asked for; None without any, or where the model was given.
+    mounting
+        How it is held (`records.mounting`).
+    silent
+        No sensor receives it; it vibrates and touches as before.
+    gain_db
+        Gain of its sound at all sensors.
     """
 
     body_id: int
@@ -89,6 +112,7 @@ class Body:
     gain_db: float = 0.0
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         where = f"body {shown(self.body_id)} link {shown(self.link)}"
         store(
             self,
@@ -107,16 +131,27 @@ class Body:
 
     @property
     def gain(self) -> float:
-        """The factor that gain_db is."""
+        """Factor of gain_db."""
         return float(10 ** (self.gain_db / 20))
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What was set otherwise between two physics steps: values that hold from a step on.
+    """Values set differently between two physics steps, which hold from a step on.
 
-    step: the number of the step before which it happened. body: index into the log's `bodies`; None: the engine.
-    values: those that are others than before; None: no longer known. Raises LogError, RecordError.
+    Parameters
+    ----------
+    step
+        Number of the step before which it happened.
+    body
+        Index into the log's `bodies`; None: the engine.
+    values
+        Those that changed; None: no longer known.
+
+    Raises
+    ------
+    LogError, RecordError
+        A field is not valid.
     """
 
     step: int
@@ -124,6 +159,7 @@ class Change:
     values: Mapping[str, float | None]
 
     def __post_init__(self) -> None:
+        """Check the fields."""
         remedy = "use an unbroken contact log"
         for name in ("step", "body"):
             if getattr(self, name) is not None or name == "step":
@@ -134,14 +170,22 @@ class Change:
 
 
 def with_body_id(name: str, body: int) -> str:
-    """A body's or link's name in a message, with the body's id: "cube (body 3)"; "body 3" is plain enough."""
+    """Format a body's or link's name with the body's id: "cube (body 3)"; "body 3" stays."""
     return name if name.split("/", maxsplit=1)[0] == f"body {body}" else f"{name} (body {body})"
 
 
 @dataclass(frozen=True, slots=True)
 class Simulator:
-    """What a simulator says of itself. engine: its settings at the first step; versions: of it, by name; changes: what
-    was set otherwise later, of engine and bodies, in order.
+    """Properties that a simulator reports of itself.
+
+    Parameters
+    ----------
+    engine
+        Settings at the first step.
+    versions
+        Of the simulator, by name.
+    changes
+        Later changes of engine and bodies, in order.
     """
 
     engine: Values = field(default_factory=dict)
@@ -150,7 +194,7 @@ class Simulator:
 
 
 def finite(values: Mapping[str, object]) -> dict[str, float]:
-    """Those values that are finite numbers."""
+    """Select the values that are finite numbers."""
     return {
         name: float(x)
         for name, x in values.items()

@@ -12,10 +12,10 @@ HEARING_LIMIT_HZ = 20_000.0
 
 
 def decibel(ratio: float) -> float:
-    """Level of an amplitude ratio in dB; ``-inf`` for zero."""
+    """Convert an amplitude ratio to a level in dB; ``-inf`` for zero."""
     return 20.0 * math.log10(ratio) if ratio > 0 else -math.inf
 
 
 def amplitude(level_db: float) -> float:
-    """Amplitude ratio of a level in dB."""
+    """Convert a level in dB to an amplitude ratio."""
     return float(10.0 ** (level_db / 20.0))
