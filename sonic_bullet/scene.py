@@ -1,12 +1,12 @@
-"""Scenes from files: run one with ears, or look at what would spoil its sound.
+"""Scenes from files: render one, or find what would spoil its sound.
 
     scenes/NAME.py -> (build(client) -> cast | plain script) -> Listener -> RenderResult
 
-A scene is an ordinary Python file of one of two kinds; nothing is inherited from. `build(client)` sets a world up and
+A scene is an ordinary Python file of one of two kinds, without base classes. `build(client)` sets a world up and
 returns its cast, a dictionary from a body (or (body, link), or (body, "all")) to its material, or to the keywords of
-`Listener.add`. Beside it there may be `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step. A
+`Listener.add`. The file may also hold `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step. A
 plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped. Where it
-attaches a listener of its own (kept in a top-level name), that one is heard; otherwise every body that it loads sounds
+attaches a listener of its own (kept in a top-level name), that one is used; otherwise every body that it loads sounds
 as ``material``.
 """
 
@@ -56,9 +56,7 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderResult:
-    """sound (channels, n) in pascals, which need not lie in memory, the log it comes from, and notes a user should
-    read. lifted: see `Listener.lifted`.
-    """
+    """Sound (channels, n) in pascals, in memory or on disk, its log, and notes. lifted: see `Listener.lifted`."""
 
     sound: KeptSound
     log: ContactLog
@@ -68,7 +66,7 @@ class RenderResult:
 
     @property
     def samples(self) -> Array:
-        """All of the sound at once, (channels, n)."""
+        """The whole sound (channels, n)."""
         return self.sound.samples()
 
 
@@ -93,12 +91,12 @@ def render_scene(
     """Run a scene for ``seconds`` of physics time and return its sound.
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of all
-    that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those whom
-    no sensor hears, though they touch and vibrate. residual: whether what materials sound beside their modes is
-    sounded. supports: whether what a body stands on takes of its modes, as `attach` has it. progress is given the share
-    done, say what is being computed. at_end: is shown the listener while its world is still there. tail_db: how far
-    below the peak what rings after the last step ends, -60 say, at most 10 s; None, 0: not. Raises SonicBulletError;
-    where the scene broke or was interrupted under way, the exception carries what was rendered so far as ``partial``.
+    that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those that
+    no sensor receives, though they touch and vibrate. residual: whether the non-modal sound of materials is added.
+    supports: whether resting contacts damp and transmit, as in `attach`. progress gets the fraction done, say the
+    current task. at_end: called with the listener while its world exists. tail_db: level below the peak at which the
+    decay after the last step ends, -60 say, at most 10 s; None, 0: no decay. Raises SonicBulletError; where the scene
+    fails or is interrupted, the exception carries the sound so far as ``partial``.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -138,10 +136,10 @@ def run_scene(
     progress: Progress | None = None,
     say: Say | None = None,
 ) -> tuple[str, ...]:
-    """Run a scene whose listener is handed to ``begin`` before its first step; notes a user should read.
+    """Run a scene whose listener is passed to ``begin`` before its first step; return notes for the user.
 
-    Arguments as `render_scene` has them. Raises SonicBulletError, SceneError also for microphones that a script's own
-    listener has not.
+    Arguments as of `render_scene`. Raises SonicBulletError, SceneError also for microphones where a script's own
+    listener has its own.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
@@ -155,14 +153,12 @@ def run_scene(
 
 
 def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
-    """What in a scene would spoil its sound, and how to mend it.
+    """Find what in a scene would spoil its sound, and the remedies.
 
-    Runs it for ``seconds`` of physics time; say is given what is being computed.
-
-    Raises SonicBulletError.
+    Runs it for ``seconds`` of physics time; say gets the current task. Raises SonicBulletError.
     """
     as_call(say, "say")
-    quiet = _stage(path, sr=8_000, seed=0, microphones=())  # nobody hears it: contacts alone
+    quiet = _stage(path, sr=8_000, seed=0, microphones=())  # no sensor: contacts alone
     with quiet as stage, seen_settings() as seen:
         stage.run(as_seconds(seconds, "seconds"), None, say)
         listener = stage.need_listener()
@@ -170,13 +166,13 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
 
 
 def as_seconds(seconds: object, name: str) -> float:
-    """A length of physics time. Raises SceneError."""
+    """Return a length of physics time; raises SceneError."""
     return as_number(seconds, name, "give seconds of physics time, above 0", above=0, most=1e6, error=SceneError)
 
 
 @dataclass(slots=True)
 class _Stage:
-    """A scene being run: its file, and the listener once there is one. adds: a script chose whom its own listens to."""
+    """A scene being run: its file, and its listener. adds: the script chose the bodies of its own listener."""
 
     path: Path
     sr: int
@@ -199,7 +195,7 @@ class _Stage:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.folder is not None:  # a scene may change it; what follows means the one that it began in
+        if self.folder is not None:  # a scene may change it
             with suppress(OSError):
                 os.chdir(self.folder)
         if self.listener is not None:
@@ -214,12 +210,12 @@ class _Stage:
                 return run(self, seconds, progress, say)
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
-        """A listener that keeps its run, unless somebody hears it at once."""
+        """Attach a listener that keeps log and sound, unless it is played at once."""
         how: dict[str, Any] = dict.fromkeys(("keep_log", "keep_sound"), self.begin is None)
         return attach(client, sr=self.sr, seed=self.seed, microphone=microphones, **how, supports=self.supports)
 
     def ready(self) -> None:
-        """The listener knows its bodies: say so, once."""
+        """Call `begin`, once, with the listener that has its bodies."""
         begin, self.begin = self.begin, None
         if begin is not None:
             begin(self.need_listener())
@@ -230,7 +226,7 @@ class _Stage:
         return self.listener
 
     def check_names(self) -> tuple[str, ...]:
-        """Lines on who is silenced and silent anyway. Raises SceneError where a name of the choice is nobody's."""
+        """Return lines on silenced bodies that are silent anyway; SceneError where a chosen name is of no body."""
         world = self.need_listener().world
         if self.choice:
             here = world.record_names([(*who, None) for who in world.all_links()])
@@ -314,7 +310,7 @@ def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, 
 
         try:
             run_script(stage.path, (look, None), total, names=names, progress=progress)
-        finally:  # where it breaks, what was heard so far is kept too
+        finally:  # where it fails, the sound so far is kept too
             stage.listener = _listener_in(names)
         stage.adds = True
         if stage.listener is None:

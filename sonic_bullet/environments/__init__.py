@@ -1,8 +1,8 @@
-"""environments: sound as an observation of a gymnasium environment whose world is PyBullet's.
+"""Sound as an observation of a gymnasium environment whose world is PyBullet's.
 
 env.step -> the same run time -> an observation -> log-mel features
 
-gymnasium is an extra: `pip install "sonic_bullet[environments]"`. Everything is imported when first used.
+gymnasium is an extra: `pip install "sonic_bullet[environments]"`. Names are imported when first used.
 """
 
 from __future__ import annotations

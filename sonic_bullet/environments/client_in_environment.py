@@ -1,8 +1,8 @@
-"""The PyBullet client that an environment keeps somewhere among its attributes.
+"""Find the PyBullet client among an environment's attributes.
 
-A BulletClient is looked for level by level, so that the one nearest to the environment is found; where there is none,
-an attribute whose name speaks of a client and holds the number of one that is connected, then the pybullet module.
-Attributes are read as they are kept; no property is called.
+A BulletClient is searched for level by level, so that the one nearest to the environment is found; without one, an
+attribute whose name contains "client" and that holds the id of a connected one, then the pybullet module. Attributes
+are read as stored; no property is called.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ from sonic_bullet.listener import is_bullet_client, is_connected
 from sonic_bullet.records.errors import SceneError
 
 DEPTH = 3
-"""Attributes of attributes that are looked at: env.robot.sim.physics_client is the third."""
+"""Levels of attributes that are searched: env.robot.sim.physics_client is the third."""
 REMEDY = "give client=, a BulletClient, the pybullet module or a client id"
 
 
 def client_in(env: Any) -> Any:
-    """The BulletClient, client id or pybullet module of a gymnasium environment, None where it has none (yet).
+    """Return the BulletClient, client id or pybullet module of a gymnasium environment, None where it has none (yet).
 
-    Raises SceneError where several are equally near.
+    Raises
+    ------
+    SceneError
+        Several are equally near.
     """
     level, seen = [env.unwrapped], {id(env.unwrapped)}
     numbers: dict[int, None] = {}
@@ -54,7 +57,7 @@ def _only(found: list[Any], what: str) -> Any:
 
 
 def _parts(thing: Any) -> Iterator[tuple[str, Any]]:
-    """What a thing is made of, by name."""
+    """Yield the parts of an object by name."""
     if isinstance(thing, Mapping):
         yield from ((str(name), value) for name, value in thing.items())
     elif isinstance(thing, list | tuple):

@@ -1,4 +1,4 @@
-"""A PyBullet world that keeps the records of the steps hidden in one env.step, and how long these are."""
+"""A PyBullet world that stores the records of the steps hidden in one env.step, and their lengths."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sonic_bullet.synth.clock import exact_step
 
 
 class EpisodeWorld(PyBulletWorld):
-    """The world of a client. steps: what was made since the list was last emptied."""
+    """The world of a client. steps: those made since the list was last emptied."""
 
     def __init__(self, client: Any) -> None:
         super().__init__(client, client_id_of(client))
@@ -27,29 +27,38 @@ class EpisodeWorld(PyBulletWorld):
         self.hooked = False
 
     def listen(self, after: Callable[[], object]) -> bool:
-        """Call ``after`` after every step of a BulletClient; whether it is one."""
+        """Call ``after`` after every step of a BulletClient; return whether it is one."""
         self.hooked = super().listen(after)
         return self.hooked
 
     def after_step(self) -> Step:
-        """The record of the step just made, which is kept. Raises SceneError."""
+        """Return the record of the step just made, and store it; raises SceneError."""
         step = super().after_step()
         if self.stepped:
             self.steps.append(step)
         return step
 
     def hearing(self, after: Callable[[], object]) -> AbstractContextManager[None]:
-        """Within the block ``after`` is called after every step, also where the client has no instance to hook."""
+        """Call ``after`` after every step within the block, also where the client has no instance to hook."""
         return nullcontext() if self.hooked else module_steps(self.client_id, after)
 
 
 def step_length(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
-    """Simulated time of one env.step in s: the steps that it holds, each as long as the client says.
+    """Measure the simulated time of one env.step in s, by the steps that it holds.
 
     It is measured on another environment made by the same spec, so that this one stays as it was: PyBullet keeps
-    contacts over a reset, and one step more would change an episode. Where there is no spec, where the client was given
-    or is a bare number, that others may use as well, this one is reset and stepped once. client: given by the user, or
-    None. Raises SceneError: no PyBullet, or no step.
+    contacts over a reset, and one step more would change an episode. Without a spec, or where the client was given or
+    is a bare id, which others may use as well, this one is reset and stepped once.
+
+    Parameters
+    ----------
+    client
+        Given by the user, or None.
+
+    Raises
+    ------
+    SceneError
+        There is no PyBullet client, or env.step makes no physics step.
     """
     found = client_in(env) if client is None else client
     other = _another(env) if client is None and (found is None or hasattr(found, "_client")) else None
@@ -62,7 +71,7 @@ def step_length(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
 
 
 def connected_client(env: gymnasium.Env[Any, Any], client: Any) -> Any:
-    """The client that was given, or the environment's own. Raises SceneError where it has none."""
+    """Return the client given, or the environment's own; SceneError where it has none."""
     found = client_in(env) if client is None else client
     if found is None:
         raise SceneError(f"the environment {env.unwrapped} has no PyBullet client", REMEDY)
@@ -70,7 +79,7 @@ def connected_client(env: gymnasium.Env[Any, Any], client: Any) -> Any:
 
 
 def _another(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any] | None:
-    """An environment like this one without a window, or None where no other can be made, whatever hinders it."""
+    """Make an environment like this one without a window, or return None where that fails."""
     try:
         spec = deepcopy(env.spec)
         if spec is None:
@@ -79,7 +88,7 @@ def _another(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any] | None:
             del spec.kwargs["render_mode"]
         with quiet_stdout():
             return gymnasium.make(spec)
-    except Exception:  # a constructor may raise anything, and there is the first one still
+    except Exception:  # a constructor may raise anything; the first environment is used then
         return None
 
 

@@ -1,10 +1,9 @@
-"""Log-mel features as policies that listen take them: X = log(max(|STFT|² F, floor)).
+"""Log-mel features for audio policies: X = log(max(|STFT|² F, floor)).
 
 Frames of 400 samples at 16 kHz (25 ms), 160 apart (10 ms), a periodic Hann window, the power of each bin, 64 triangular
-filters on the HTK mel scale, m = 2595 log10(1 + f/700), from 0 Hz to half the rate, each of peak 1 (norm None): what
-torchaudio's MelSpectrogram(16000, n_fft=400, hop_length=160, n_mels=64, center=False) gives, and what See, Hear, and
-Feel (Li et al. 2022) learns from. The floor is a limit, so that silence is exactly log(floor) and nothing above it is
-changed.
+filters on the HTK mel scale, m = 2595 log10(1 + f/700), from 0 Hz to half the rate, each of peak 1 (norm None): equal
+to torchaudio's MelSpectrogram(16000, n_fft=400, hop_length=160, n_mels=64, center=False), and the input of See, Hear,
+and Feel (Li et al. 2022). The floor is a limit, so that silence is exactly log(floor) and no value above it is changed.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from sonic_bullet.records.errors import AudioError
 
 RATE_HZ, N_FFT, HOP, MELS = 16_000, 400, 160, 64
 FLOOR_PA2 = 1e-12
-"""Of a band's power: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there, far
+"""Least power of a band: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there, far
 below hearing (2e-5 Pa)."""
 
 
@@ -36,12 +35,29 @@ def log_mel(
     center: bool = False,
     floor: float = FLOOR_PA2,
 ) -> Array:
-    """Natural logarithm of the power in mel bands, float32 (channels, mels, frames), of audio (channels, n) or (n,).
+    """Compute the natural logarithm of the power in mel bands.
 
-    sr: the audio's rate; it is resampled to rate_hz (scipy.signal.resample_poly: what lies above the lower half rate is
-    filtered out). center: frames are centred on every hop-th sample and the audio is mirrored past its ends, 1 + n//hop
-    of them; else they lie within it, 1 + (n - n_fft)//hop. floor: the least power. Raises AudioError: a rate that is
-    none, samples that are no numbers, audio shorter than a frame (join the observations of several steps).
+    Parameters
+    ----------
+    audio : Array, shape (channels, n) or (n,)
+    sr
+        Its rate; it is resampled to rate_hz by scipy.signal.resample_poly, which filters out frequencies above the
+        lower half rate.
+    center
+        Frames are centred on every hop-th sample and the audio is mirrored past its ends, 1 + n//hop of them; else they
+        are within it, 1 + (n - n_fft)//hop.
+    floor
+        The least power.
+
+    Returns
+    -------
+    Array of float32, shape (channels, mels, frames)
+
+    Raises
+    ------
+    AudioError
+        A rate is not valid, samples are not finite numbers, or audio is shorter than a frame (join the observations of
+        several steps).
     """
     from scipy.signal import get_window, resample_poly
 
@@ -71,10 +87,15 @@ def log_mel(
 
 @lru_cache(maxsize=8)
 def mel_filters(rate_hz: int = RATE_HZ, n_fft: int = N_FFT, mels: int = MELS) -> Array:
-    """Weights (n_fft//2 + 1, mels) of a power spectrum's bins in the mel bands, read-only.
+    """Return weights (n_fft//2 + 1, mels) of a power spectrum's bins in the mel bands, read-only.
 
-    Band i rises from 0 at edge i to 1 at edge i+1 and falls to 0 at edge i+2; mels + 2 edges lie evenly in mel from 0
-    to rate_hz / 2. From the first band's peak to the last's the weights of a bin sum to 1. Raises AudioError.
+    Band i rises from 0 at edge i to 1 at edge i+1 and falls to 0 at edge i+2; mels + 2 edges are even in mel from 0 to
+    rate_hz / 2. From the first band's peak to the last's the weights of a bin sum to 1.
+
+    Raises
+    ------
+    AudioError
+        An argument is out of range.
     """
     rate_hz = check_sr(rate_hz)
     mels = as_whole(mels, "mels", "give the number of bands, 1 or more", least=1, most=4096, error=AudioError)
@@ -90,7 +111,7 @@ def mel_filters(rate_hz: int = RATE_HZ, n_fft: int = N_FFT, mels: int = MELS) ->
 
 
 def _samples(audio: Array) -> Array:
-    """(channels, n) float64 of finite numbers. Raises AudioError."""
+    """Return (channels, n) float64 of finite numbers; raises AudioError."""
     remedy = "give samples in pascals, (channels, n) or (n,)"
     try:
         samples = np.atleast_2d(np.asarray(audio, np.float64))

@@ -1,7 +1,7 @@
-"""Whether an episode that begins from a seed and is given the same actions as one before meets the same contacts.
+"""Check whether episodes of the same seed and actions have the same contacts.
 
-PyBullet keeps contact points over a reset, and the order in which it looks at pairs, so the same seed can lead to other
-contacts. Then the sound is another too, and nobody but the simulator is to blame.
+PyBullet keeps contact points over a reset, and the order of its pairs, so the same seed can lead to other contacts.
+Then the sound differs too, by the simulator alone.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from hashlib import blake2b
 from sonic_bullet.records.contacts import Step
 
 MOST_REMEMBERED = 16_384
-"""env.steps of seeded episodes, 2.5 MB; the oldest go first."""
+"""Most env.steps of seeded episodes that are stored, 2.5 MB; the oldest are dropped first."""
 
 
 class RepeatedEpisodes:
-    """What the steps of seeded episodes held, by seed and by the actions so far: the first to come counts.
+    """Hashes of the steps of seeded episodes, by seed and by the actions so far; the first episode is the reference.
 
-    seeded: whether the present episode began from a seed; else it is compared with none.
+    seeded: whether the present episode began from a seed; else it is not compared.
     """
 
     def __init__(self) -> None:
@@ -27,14 +27,12 @@ class RepeatedEpisodes:
         self.seeded = self._differ = False
 
     def begin(self, seed: int | None) -> None:
-        """An episode begins."""
+        """Begin an episode."""
         self._actions, self._steps = blake2b(str(seed).encode(), digest_size=8), blake2b(digest_size=8)
         self.seeded, self._differ = seed is not None, False
 
     def differ(self, action: bytes, steps: Sequence[Step]) -> bool:
-        """Whether this env.step, or one before it in this seeded episode, held other poses or contacts than in the
-        first episode of this seed and these actions.
-        """
+        """Tell whether poses or contacts of this episode differ so far from the first of its seed and actions."""
         self._actions.update(action)
         for step in steps:
             self._steps.update(step.contacts.row.tobytes() + step.position_m.tobytes() + step.quaternion_xyzw.tobytes())

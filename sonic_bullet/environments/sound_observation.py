@@ -1,8 +1,8 @@
-"""What an environment sounds like, as a part of its observation.
+"""The sound of an environment as a part of its observation.
 
     env.step -> stepSimulation, hooked, some times -> Listener -> the frames of these steps -> observation["audio"]
 
-An episode begins in silence when `reset` returns; what `reset` itself steps is not listened to.
+An episode begins in silence when `reset` returns; steps made by `reset` itself are not part of it.
 """
 
 from __future__ import annotations
@@ -33,22 +33,35 @@ AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
 
 
 class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """A gymnasium environment whose observation has "audio": what its PyBullet world sounds like.
+    """A gymnasium environment whose observation has "audio", the sound of its PyBullet world.
 
-    The observation space is a Dict: the keys of the environment's own, or "observation" where that is no Dict, and
-    "audio", float32 (channels, ceil(sr·T)) in pascals, T the simulated time of one env.step: the newest samples last,
-    before them zeros. How many are new is info["audio_count"], not part of the observation, for a policy learns nothing
-    from it; these counts sum to floor(sr·time since reset). As a listener's frames, audio lags physics by three physics
-    steps. info["contacts_differ"] is there, and True, from the env.step on in which the simulator gave other poses or
-    contacts than in the first episode of the same seed and actions.
+    The observation space is a Dict: the keys of the environment's own, or "observation" where that is not a Dict, and
+    "audio". That is float32 (channels, ceil(sr·T)) in pascals, T the simulated time of one env.step: the newest samples
+    last, before them zeros. The number of new ones is info["audio_count"], not part of the observation, as a policy
+    learns nothing from it; these counts sum to floor(sr·time since reset). As a listener's frames, audio lags physics by three
+    physics steps. info["contacts_differ"] is present, and True, from the env.step on in which the simulator gave other
+    poses or contacts than in the first episode of the same seed and actions.
 
-    microphones, seed, air: as `attach` has them. materials: what sounds, found anew after every reset. A material:
-    every link with a collision shape; those that cannot be filled are named in a SceneWarning and stay silent. A
-    mapping from a body's name or id, or (either, link), to a material or keywords of `Listener.add`. A function of the
-    client that returns one. client: of PyBullet; None: found among the environment's attributes. step_s: T; None:
-    measured, on another environment of the same spec where one can be made, else by a reset and a step of this one.
-    Raises SceneError: no PyBullet, no step, an observation that has "audio" already; AudioError, MaterialError,
-    RecordError for arguments that are none.
+    Parameters
+    ----------
+    microphones, seed, air
+        As of `attach`.
+    materials
+        What sounds, found anew after every reset. A material: every link with a collision shape; those that cannot be
+        meshed are named in a SceneWarning and stay silent. A mapping from a body's name or id, or (either, link), to a
+        material or keywords of `Listener.add`. A function of the client that returns one.
+    client
+        Of PyBullet; None: found among the environment's attributes.
+    step_s
+        T; None: measured, on another environment of the same spec where one can be made, else by a reset and a step of
+        this one.
+
+    Raises
+    ------
+    SceneError
+        There is no PyBullet client or step, or the observation has "audio" already.
+    AudioError, MaterialError, RecordError
+        An argument is not valid.
     """
 
     def __init__(
@@ -93,31 +106,40 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
 
     @property
     def step_s(self) -> Fraction:
-        """T, the simulated time of one env.step, exactly."""
+        """Simulated time T of one env.step, exactly."""
         return self._step_s
 
     @property
     def listener(self) -> Listener | None:
-        """What listens in this episode; None before the first."""
+        """Listener of this episode; None before the first."""
         return self._listener
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], Any]:
-        """Begin an episode: its audio is silent, its count 0. Raises SceneError and what `Listener.add` raises."""
+        """Begin an episode: its audio is silent, its count 0.
+
+        Raises
+        ------
+        SceneError
+            There is no client; and what `Listener.add` raises.
+        """
         observation, info = self.env.reset(seed=seed, options=options)
         self._listen()
         self._episodes.begin(None if options else seed)
         return self._with_audio(observation, np.zeros(self._shape, np.float32)), {**info, COUNT: 0}
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
-        """A step of the environment with what it sounded like.
+        """Step the environment and observe its sound.
 
-        Raises SceneError where it takes longer than T, or physics steps of another length.
+        Raises
+        ------
+        SceneError
+            It takes longer than T, or physics steps have another length.
         """
         if self._listener is None:
             raise SceneError("no episode has begun", "call reset first")
         world = self._world
         world.steps.clear()
-        self._listener.read()  # steps that somebody made outside of env.step are heard, and observed by nobody
+        self._listener.read()  # the sound of steps outside of env.step is part of no observation
         with world.hearing(self._listener.step):
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
@@ -130,12 +152,12 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         return self._with_audio(observation, audio), reward, terminated, truncated, info
 
     def close(self) -> None:
-        """Leave the client as it was, then close the environment."""
+        """Remove the hooks from the client, then close the environment."""
         self._detach()
         self.env.close()
 
     def _listen(self) -> None:
-        """Listen from here on, as who has heard nothing yet."""
+        """Start to listen from here on, without earlier sound."""
         client = connected_client(self.env, self._client)
         cast = cast_of(self._materials, client)
         if self._begun_anew(client, cast):
@@ -154,9 +176,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         self._listener, self._cast, self._added = listener, cast, len(self._world.bodies)
 
     def _begun_anew(self, client: Any, cast: Cast) -> bool:
-        """Whether the listener that there is could begin anew: its bodies are those of the cast, and all still there.
+        """Reset the present listener, if its bodies are those of the cast and all still there; return whether they are.
 
-        A client that is not hooked does not tell who was removed.
+        Without hooks removals are not observed.
         """
         if self._listener is None or not self._world.hooked or self._world.client is not client:
             return False
@@ -168,7 +190,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         return len(self._world.bodies) == self._added
 
     def _action_bytes(self, action: Any) -> bytes:
-        """An action as numbers; one that cannot be flattened is as good as any other, and contacts then may differ."""
+        """Return an action as bytes; all that cannot be flattened are equal, and contacts then may differ."""
         space = self.action_space
         return np.asarray(flatten(space, action)).tobytes() if space.is_np_flattenable else b""
 
@@ -178,7 +200,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             self._listener = None
 
     def _check_steps(self) -> None:
-        """Raise SceneError unless the steps made have the length that they always had, and fit into T."""
+        """Raise SceneError unless the steps have the same length as before, and fit into T."""
         steps = self._world.steps
         if steps and not self._dt_s:
             self._dt_s, self._most = steps[0].dt_s, int(self._step_s / exact_step(steps[0].dt_s))
@@ -199,5 +221,5 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
 
 
 def as_length(step_s: object) -> float:
-    """T as given. Raises SceneError."""
+    """Return T as given; raises SceneError."""
     return as_number(step_s, "step_s", "give seconds of physics an env.step takes", above=0, most=1e3, error=SceneError)

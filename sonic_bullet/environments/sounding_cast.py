@@ -1,4 +1,4 @@
-"""Which bodies of an environment sound, and as what: said once, found anew in every episode, for ids change."""
+"""Bodies of an environment that sound, with their materials; found anew in every episode, as ids change."""
 
 from __future__ import annotations
 
@@ -19,16 +19,23 @@ MaterialsLike = str | Path | Material | Mapping[Any, Any] | Callable[[Any], Mapp
 
 
 def as_materials(materials: MaterialsLike) -> MaterialsLike:
-    """A material's name or file as the material, all else as it is. Raises MaterialError."""
+    """Convert a material's name or file to the material, leave all else as it is; raises MaterialError."""
     return materials if callable(materials) or isinstance(materials, Mapping) else as_material(materials)
 
 
 def cast_of(materials: MaterialsLike, client: Any) -> Cast:
-    """From (body, link) to a material or the keywords of `Listener.add`.
+    """Return a mapping from (body, link) to a material or the keywords of `Listener.add`.
 
-    materials: one for every link with a collision shape; or from a body, a name, or (either, link) to one or to
-    keywords; or a function of the client that returns such a mapping. A name means all bodies that the simulator calls
-    so. Raises SceneError: no body of that name, or a function that returns no mapping.
+    Parameters
+    ----------
+    materials
+        One for every link with a collision shape; or a mapping from a body, a name, or (either, link) to one or to
+        keywords; or a function of the client that returns such a mapping. A name means all bodies of that name.
+
+    Raises
+    ------
+    SceneError
+        No body has that name, or a function returns no mapping.
     """
     client_id = client_id_of(client)
     if isinstance(materials, Material):
@@ -45,18 +52,16 @@ def cast_of(materials: MaterialsLike, client: Any) -> Cast:
 
 
 def same_cast(one: Any, other: Any) -> bool:
-    """Whether two casts, or parts of them, say the same in the same order: numbers and texts that are equal, all else
-    one thing.
-    """
+    """Tell whether two casts, or parts of them, are the same in order: equal numbers and texts, else one object."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         return list(one) == list(other) and all(same_cast(one[name], other[name]) for name in one)
     return one is other or (isinstance(one, str | int | float) and type(one) is type(other) and one == other)
 
 
 def add_fillable(listener: Listener, world: PyBulletWorld, cast: Cast, silent: set[Hashable]) -> Cast:
-    """Let all of a cast sound that nobody chose, except links that cannot be filled or solved; those that are left out.
+    """Add all links of a default cast except those that cannot be meshed or solved; return these.
 
-    Each of them is named once, as a SceneWarning, and what it is like put among the ``silent``, which are passed over.
+    Each of them is named once, as a SceneWarning, and its likeness is added to ``silent``, whose links are skipped.
     """
     left_out = {who: how for who, how in cast.items() if world.likeness(*who) in silent}
     wanted = {who: how for who, how in cast.items() if who not in left_out}

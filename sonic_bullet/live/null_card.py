@@ -1,8 +1,7 @@
-"""A sound card that sounds nowhere, clocked in real time: block j is asked for at start + j·B/sr and sounds two blocks
-later.
+"""Sound card without a device, clocked in real time.
 
-It is as strict as a card with a ring of three blocks: what is handed over after its block's time has come is counted as
-late, and all that follows sounds that much later.
+Block j is called for at start + j·B/sr and sounds two blocks later. The card is as strict as one with a ring of three
+blocks: a block delivered after its time is counted as late, and all later ones sound that much later.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ HELD = 2  # blocks between the call and the sound
 
 
 class NullCard:
-    """See the head of this file."""
+    """A sound card without a device; see the module."""
 
     name = "null"
 
@@ -30,7 +29,7 @@ class NullCard:
         self._thread: threading.Thread | None = None
 
     def start(self, fill: Fill, ended: Callable[[], None]) -> None:
-        """Ask for blocks from now on, in a thread of its own."""
+        """Call for blocks from now on, in a thread of its own."""
         self._thread = threading.Thread(target=self._run, args=(fill,), name="null sound card", daemon=True)
         self._thread.start()
 
@@ -45,7 +44,7 @@ class NullCard:
             asked_s += block_s + max(over_s, 0.0)
 
     def stop(self, *, abort: bool) -> None:
-        """Ask no more; return when what was taken would have sounded, or at once."""
+        """Call for no more; return when the blocks taken would have sounded, or at once."""
         self._stop.set()
         if not abort:
             threading.Event().wait((HELD + 1) * BLOCK / self.sr)

@@ -1,18 +1,18 @@
-"""From frames to a sound card: pushed by the thread that steps, taken by the card's own.
+"""Pass frames to a sound card: pushed by the thread that steps, taken by the card's own.
 
     push(frame) -> SampleQueue -> fill(block), called by the card
 
-A step's sound, pushed when `lag_steps` more steps were taken in, sounds at
+A step's sound, pushed after `lag_steps` more steps, sounds at
 
-    t = returned + lag_steps·dt + (samples waiting + one block) / sr + what the card holds itself
+    t = returned + lag_steps·dt + (samples waiting + one block) / sr + latency of the card
 
-`push` returns when no more than `ahead_s` waits beyond the block that the card takes next: whoever steps faster than
-real time is paced by the card's clock, and there is no second one that could drift. Sound starts, and starts again
-after an underrun, when that much is there. Between two blocks what the card has taken is interpolated in time: the pace
-is even, however large the blocks are.
+`push` returns when no more than `ahead_s` waits beyond the block that the card takes next: a loop that steps faster
+than real time is paced by the card's clock, and no second clock can drift. Sound starts, and starts again after an
+underrun, when that much is waiting. Between two blocks the number of samples taken is interpolated in time: the pace is
+even for any block size.
 
-The callback takes no lock and never waits for the thread that steps, but for Python's own lock, which that thread gives
-up while it waits here and in compiled stages of the run time.
+The callback takes no lock and never waits for the thread that steps, except for Python's own lock, which that thread
+releases while it waits here and in compiled stages of the run time.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ FULL_SCALE_PA = 20.0
 softest, peaks 46 dB below.
 """
 AHEAD_S = 0.018
-"""How late a step may be before sound stops. With three steps of 1/240 s, a block of 5 ms and a card that holds 12 ms a
+"""Delay of a step before sound stops. With three steps of 1/240 s, a block of 5 ms and a card that holds 12 ms a
 step sounds after 48 ms.
 """
 LONGEST_AHEAD_S = 2.0
 QUEUE_S = 3.0  # room for that and a step of a second
 SHORTEST_WAIT_S = 2e-4
 STALLED_S = 2.0
-"""A card that asks for nothing so long is gone: Bluetooth takes up to a second to wake."""
+"""Time without a call after which a card is gone: Bluetooth takes up to a second to wake."""
 
 Fill = Callable[[Array, float, bool], None]
 """(block (n, channels) float32 to fill, `time.perf_counter` at which its first sample sounds, whether the card had to
@@ -56,27 +56,36 @@ sound nothing before it) -> None. Never raises.
 
 
 class Card(Protocol):
-    """What takes samples in real time. sr in Hz; channels: those of its blocks."""
+    """A device that takes samples in real time. sr in Hz; channels: those of its blocks."""
 
     name: str
     sr: int
     channels: int
 
     def start(self, fill: Fill, ended: Callable[[], None]) -> None:
-        """Call fill from a thread of its own from now on, and ended when no call will follow. Raises AudioError."""
+        """Call fill from a thread of its own from now on, and ended after the last call; raises AudioError."""
 
     def stop(self, *, abort: bool) -> None:
-        """Call no more; return when all that was taken has sounded, or at once. Raises nothing."""
+        """End the calls; return when all samples taken have sounded, or at once. Raises nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaybackReport:
-    """What was played.
+    """Report of a playback.
 
-    seconds: of frames that sounded. latency_median_s, latency_worst_s: from the return of a physics step to the time at
-    which the card says its sound begins, the listener's lag included, of all steps since the first sound; NaN and 0
-    where there were none. underruns: how often there was nothing to sound or the card was served too late. silent_s:
-    how long there was nothing, in all, before the last frame. clipped: samples beyond full scale.
+    Parameters
+    ----------
+    seconds
+        Of frames that sounded.
+    latency_median_s, latency_worst_s
+        From the return of a physics step to the start of its sound as the card states it, the listener's lag included,
+        of all steps since the first sound; NaN and 0 without any.
+    underruns
+        How often the queue was empty or the card was served too late.
+    silent_s
+        Total time without samples before the last frame.
+    clipped
+        Samples beyond full scale.
     """
 
     card: str
@@ -88,6 +97,7 @@ class PlaybackReport:
     clipped: int
 
     def __str__(self) -> str:
+        """Return the report in words."""
         runs = format_count(self.underruns, "underrun")
         silent = f" ({self.silent_s:.2f} s silent)" if self.underruns else ""
         late = f"latency {self.latency_median_s * 1e3:.1f} ms (worst {self.latency_worst_s * 1e3:.1f}), "
@@ -98,7 +108,7 @@ class PlaybackReport:
 class Playback:
     """Sound on its way to a card; made by `start_playback`. Usable as a context manager: leaving it closes.
 
-    report: what was played so far. failure: why nothing is played any more, None while it is.
+    report: of what was played so far. failure: why playback ended, None while it runs.
     """
 
     def __init__(self, card: Card, *, full_scale_pa: float, ahead_s: float, lag_steps: int) -> None:
@@ -116,10 +126,10 @@ class Playback:
         card.start(self._fill, self._ended)
 
     def push(self, frame: Array, returned_s: float) -> None:
-        """Play a frame (channels, n) in Pa; returns when there is room for the next.
+        """Play a frame (channels, n) in Pa; return when there is space for the next.
 
         returned_s: `time.perf_counter` when the physics step that it came with returned. Does nothing once closed. A
-        card that is gone is said once, as a `PlaybackWarning`, and nothing waits any more.
+        card that is gone causes one `PlaybackWarning`, and later calls do not wait.
         """
         if self.closed or not frame.shape[1]:
             return
@@ -145,7 +155,7 @@ class Playback:
             warnings.warn(f"{self.failure}; physics and log go on, silent and unpaced", PlaybackWarning, stacklevel=4)
 
     def _wait(self, most: int) -> None:
-        """Until no more than so many samples wait, or nothing takes them any more."""
+        """Wait until at most so many samples are queued, or the card is gone."""
         while self.failure is None:
             now = time.perf_counter()
             when, taken, block = self._last
@@ -159,7 +169,7 @@ class Playback:
                 self._wake.wait(max(early / self._sr, SHORTEST_WAIT_S))
 
     def _fill(self, out: Array, sounds_s: float, late: bool) -> None:
-        """What the card calls for a block; see `Fill`."""
+        """Fill a block for the card; see `Fill`."""
         queue = self._queue
         first = queue.taken
         waiting = queue.written - first
@@ -171,7 +181,7 @@ class Playback:
             self._underruns += 1
         if count < len(out) and first + count and not self._draining:
             self._filling, self._pause = True, self._pause + len(out) - count
-        elif self._pause and count:  # it goes on: what was silent was no end
+        elif self._pause and count:  # sound continues: the silence was an underrun, not the end
             self._underruns, self._silent, self._pause = self._underruns + 1, self._silent + self._pause, 0
         starts = self._starts
         while starts and starts[0][0] < first + count:
@@ -179,7 +189,7 @@ class Playback:
             self._latencies.add(sounds_s + (at - first) / self._sr - returned_s)
 
     def _ended(self) -> None:
-        """What the card calls when it takes no more."""
+        """Note that the card takes no more."""
         if not self.closed:
             self._fail()
 
@@ -192,7 +202,7 @@ class Playback:
 
     @property
     def report(self) -> PlaybackReport:
-        """What was played so far."""
+        """Report of what was played so far."""
         return PlaybackReport(
             self._card.name,
             self._queue.taken / self._sr,
@@ -204,7 +214,7 @@ class Playback:
         )
 
     def close(self, *, abort: bool = False) -> PlaybackReport:
-        """Play what is on its way, or nothing more (abort), and let the card go; the report. Twice is once."""
+        """Play the queued samples, or none (abort), and release the card; return the report. Can be repeated."""
         if not self.closed:
             self._draining = not abort
             try:
@@ -216,11 +226,13 @@ class Playback:
         return self.report
 
     def __enter__(self) -> Playback:
+        """Return the playback."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Close the playback; abort after an error."""
         self.close(abort=kind is not None)
 
 
@@ -233,12 +245,24 @@ def start_playback(
     full_scale_pa: float = FULL_SCALE_PA,
     ahead_s: float = AHEAD_S,
 ) -> Playback:
-    """A card that plays what is pushed from now on.
+    """Open a card that plays what is pushed from now on.
 
-    device: a name or number of `sounddevice.query_devices`, None for the system's own, "null" for none: samples are
-    taken in real time and sound nowhere. One channel sounds on two where the card has two. lag_steps: how many steps a
-    frame's sound lags. full_scale_pa: the pressure that is 1.0 to the card. ahead_s: how much sound may wait. Raises
-    AudioError where there is no such card, or it takes no such rate or so many channels.
+    Parameters
+    ----------
+    device
+        A name or number of `sounddevice.query_devices`, None for the system's own, "null" for none: samples are taken
+        in real time without sound. One channel sounds on two where the card has two.
+    lag_steps
+        Steps by which a frame's sound lags.
+    full_scale_pa
+        The pressure that is 1.0 to the card.
+    ahead_s
+        How much sound may wait.
+
+    Raises
+    ------
+    AudioError
+        There is no such card, or it does not take that rate or so many channels.
     """
     scale = as_number(full_scale_pa, "full_scale_pa", "give a pressure in Pa, above 0", above=0, error=AudioError)
     ahead = as_number(

@@ -1,9 +1,9 @@
-"""A ring of samples between one thread that writes and one that takes, without a lock.
+"""Lock-free ring of samples between one thread that writes and one that takes.
 
     0 <= written − taken <= capacity
 
-Each count has one thread that changes it, after its samples are copied, so that what the other thread reads may be too
-low but never too high (L. Lamport, "Specifying concurrent program modules", 1983).
+Each count is changed by one thread alone, after its samples are copied, so that the other thread may read it too low
+but never too high (L. Lamport, "Specifying concurrent program modules", 1983).
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from sonic_bullet.records import Array
 
 
 class SampleQueue:
-    """float32 samples (n, channels) on their way. written, taken: samples so far, of the writer and of the taker."""
+    """Queue of float32 samples (n, channels). written, taken: samples so far, of the writer and of the taker."""
 
     def __init__(self, channels: int, capacity: int) -> None:
         self._ring = np.zeros((capacity, channels), np.float32)
         self.written = self.taken = 0
 
     def write(self, samples: Array) -> int:
-        """Append of samples (n, channels), or (n, 1) for all channels, what there is room for; how many."""
+        """Append as many of samples (n, channels), or (n, 1) for all channels, as fit; return how many."""
         size = len(self._ring)
         count = min(len(samples), size - (self.written - self.taken))
         at = self.written % size
@@ -32,7 +32,7 @@ class SampleQueue:
         return count
 
     def take(self, out: Array) -> int:
-        """Fill the first of out (n, channels) with what there is; how many."""
+        """Fill the first of out (n, channels) with the queued samples; return how many."""
         size = len(self._ring)
         count = min(len(out), self.written - self.taken)
         at = self.taken % size

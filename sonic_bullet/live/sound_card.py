@@ -1,7 +1,7 @@
 """The system's sound cards, through PortAudio (the library sounddevice).
 
-PortAudio says for each block when its first sample sounds, by the stream's own clock; here that is carried over to
-`time.perf_counter` by what both clocks say when the block is asked for.
+PortAudio states for each block when its first sample sounds, by the stream's own clock. It is converted to
+`time.perf_counter` by the readings of both clocks when the block is called for.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AudioError
 
 CARD_S = 0.012
-"""What the card is asked to hold itself: a callback may be that late. Half of what PortAudio calls a high latency."""
+"""Latency requested of the card: a callback may be that late. Half of what PortAudio calls a high latency."""
 CLOSE_S = 1.0
-"""So long a stream may take to close: a hundred times what it plays then."""
+"""Longest time to close a stream: a hundred times what it plays then."""
 INSTALL = "pip install 'sonic_bullet[live]'"
 
 
 class SoundCard:
     """An output stream of one of the system's cards.
 
-    device: its name or number, None for the system's own. Raises AudioError where there is none, or it takes no such
-    rate or so many channels.
+    device: its name or number, None for the system's own. Raises AudioError where there is none, or it does not take
+    that rate or so many channels.
     """
 
     def __init__(self, device: str | int | None, sr: int, channels: int) -> None:
@@ -54,7 +54,7 @@ class SoundCard:
         self._stream: Any = None
 
     def start(self, fill: Fill, ended: Callable[[], None]) -> None:
-        """Open the stream. Raises AudioError where the card does not."""
+        """Open the stream; AudioError where the card refuses."""
 
         def callback(out: Array, frames: int, times: Any, status: Any) -> None:
             held_s = times.outputBufferDacTime - times.currentTime
@@ -69,9 +69,9 @@ class SoundCard:
             raise AudioError(f"{self.name} cannot be opened: {error}", "close what uses it, or name another") from error
 
     def stop(self, *, abort: bool) -> None:
-        """Close the stream, after what was taken has sounded or at once.
+        """Close the stream, after the samples taken have sounded or at once.
 
-        PortAudio may wait minutes for a card that is gone: here nobody does, nor when Python ends.
+        PortAudio may wait minutes for a card that is gone: neither this call nor Python's exit waits for it.
         """
 
         def close() -> None:
@@ -84,12 +84,12 @@ class SoundCard:
         closing.start()
         closing.join(CLOSE_S)
         if closing.is_alive():
-            with suppress(AttributeError):  # what sounddevice calls then would wait as well
+            with suppress(AttributeError):  # sounddevice's own exit handler would wait as well
                 atexit.unregister(self._library._exit_handler)
 
 
 def portaudio() -> Any:
-    """The library sounddevice. Raises AudioError where it, or PortAudio under it, is not installed."""
+    """Import the library sounddevice; AudioError where it, or PortAudio under it, is not installed."""
     try:
         import sounddevice
     except ImportError as error:
@@ -101,7 +101,7 @@ def portaudio() -> Any:
 
 
 def found_card(library: Any, device: str | int | None) -> Any:
-    """What PortAudio knows of a card that sounds. Raises AudioError where there is none of that name or number."""
+    """Return PortAudio's data of an output card; AudioError where there is none of that name or number."""
     cards = [one for one in library.query_devices() if one["max_output_channels"] > 0]
     if not cards:
         raise AudioError("this machine has no sound card", "connect one, or play to 'null'")

@@ -1,7 +1,7 @@
 """`attach`: a listener on a PyBullet client that turns each physics step into a frame of sound.
 
-listening: the `Listener` | wanted_bodies: what `add` was asked for, and its modes | arguments: what people give
-keeping: what is kept of a run | scene_file: kinds of scene files, their code run | directed: runs made otherwise
+listening: the `Listener` | wanted_bodies: bodies to add, and their modes | arguments: checks of arguments
+keeping: log and unread frames | scene_file: kinds of scene files, their code run | directed: runs with substitutions
 """
 
 from __future__ import annotations
@@ -27,19 +27,38 @@ def attach(
     keep_log: bool = True,
     keep_sound: bool = True,
 ) -> Listener:
-    """Listen to a PyBullet world.
+    """Attach a listener to a PyBullet world.
 
-    client: a `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or
-    a client id (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another
-    simulator. sr: sample rate in Hz, 8000 … 384000. microphone: a point in the world in m, several points (one channel
-    each), or sensors (`Microphone`, `Vibrometer`, `ModalSum`); none at all: contacts alone, no sound. seed: of the
-    surfaces' roughness. air: the medium, 1.2 kg/m³ and 343 m/s by default. supports: whether what a body stands on
-    takes of its ringing and passes some on; without, it rings as if it hung in the air, and costs less.
-    keep_log, keep_sound: whether `contacts`, and `sound` and `write`, will be asked for; what is kept of a long run
-    lies in a nameless temporary file (where TMPDIR says, else in /tmp), gone with the listener.
+    Parameters
+    ----------
+    client
+        A `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a
+        client id (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another
+        simulator.
+    sr
+        Sample rate in Hz, 8000 … 384000.
+    microphone
+        A point in the world in m, several points (one channel each), or sensors (`Microphone`, `Vibrometer`,
+        `ModalSum`); an empty sequence: contacts alone, no sound.
+    seed
+        Of the surfaces' roughness.
+    air
+        The medium, 1.2 kg/m³ and 343 m/s by default.
+    supports
+        Whether resting contacts damp a body and transmit vibration; without, it vibrates as a free body, and costs
+        less.
+    keep_log, keep_sound
+        Whether `contacts`, and `sound` and `write`, will be used. Data of a long run are in a nameless temporary file
+        (in TMPDIR, else in /tmp), removed with the listener.
 
-    Raises SceneError for a client that is not connected, AudioError for a bad rate, RecordError for a microphone or a
-    seed that is none.
+    Raises
+    ------
+    SceneError
+        The client is not connected.
+    AudioError
+        The rate is out of range.
+    RecordError
+        A microphone or the seed is not valid.
     """
     how: dict[str, Any] = {"sensors": as_sensors(microphone), "seed": seed, "air": Air() if air is None else air}
     director = direction()

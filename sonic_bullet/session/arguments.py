@@ -1,4 +1,4 @@
-"""What a user may give for a sensor, a material or a shape, made into the record of it."""
+"""Convert what a user may give for a sensor, a material or a shape to its record."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence
 
 
 def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Sensor, ...]:
-    """Sensors of anything that names them: a point, several points, a sensor or several.
+    """Return the sensors given as a point, several points, a sensor or several.
 
-    Raises RecordError where a point is not three finite numbers.
+    Raises
+    ------
+    RecordError
+        A point is not three finite numbers.
     """
     if isinstance(microphone, Sensor):
         return (microphone,)
@@ -33,7 +36,7 @@ def as_sensors(microphone: MicrophoneLike, name: str = "microphone") -> tuple[Se
 
 
 def as_name(name: object) -> str:
-    """What a body shall be called: a text of one line. Raises SceneError."""
+    """Return a body's name, a text of one line; raise SceneError for anything else."""
     remedy = "give a text of one line"
     if not as_text(name, "name", remedy, error=SceneError).isprintable() or not str(name).strip():
         raise SceneError(f"name is {shown(name)}", remedy)
@@ -41,9 +44,12 @@ def as_name(name: object) -> str:
 
 
 def as_material(material: str | Path | Material) -> Material:
-    """The material itself, or the preset of that name or path.
+    """Return the material itself, or the preset of that name or path.
 
-    Raises MaterialError where it has no damping, so that it would ring for ever, or an effect that no scene plays.
+    Raises
+    ------
+    MaterialError
+        It has no damping, so that it would never decay, or an effect that no scene plays.
     """
     from sonic_bullet.presets import load_material
 
@@ -60,7 +66,7 @@ def as_material(material: str | Path | Material) -> Material:
 
 
 def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
-    """A mesh file, a shape or several as shapes in the body frame. Raises MeshError and FileError."""
+    """Return a mesh file, a shape or several as shapes in the body frame; raises MeshError and FileError."""
     from sonic_bullet.modal import read_mesh
 
     if isinstance(mesh, Shape):
@@ -71,5 +77,5 @@ def as_shapes(mesh: str | Path | Shape | Sequence[Shape]) -> tuple[Shape, ...]:
 
 
 def keywords(call: Callable[..., Any]) -> list[str]:
-    """Names of the arguments that are given by name alone."""
+    """List a function's keyword-only arguments."""
     return [one.name for one in inspect.signature(call).parameters.values() if one.kind is one.KEYWORD_ONLY]

@@ -1,7 +1,7 @@
-"""A material and shapes become a body's modes, with all that the material's effects say: the one way there is.
+"""Compute a body's modes from a material and shapes, with all effects of the material.
 
 Material -> with_material (effects on stiffness)
-    -> analyse_body: modes of the elasticity -> effects on modes -> effects as they ring
+    -> analyse_body: modes of the elasticity -> effects on modes -> effects on their decay
 """
 
 from __future__ import annotations
@@ -16,9 +16,19 @@ from sonic_bullet.records.mode_shapes import rounded
 
 
 def analyse_body(shapes: Sequence[Shape], material: Material, **options: Any) -> ModalModel:
-    """Compute the modes of shapes, and how they ring.
+    """Compute the modes of shapes, and their decay.
 
-    material: as `with_material` gives it. options: of `modal.analyse`. Raises MeshError and ModalError as that does.
+    Parameters
+    ----------
+    material
+        As `with_material` returns it.
+    options
+        Of `modal.analyse`.
+
+    Raises
+    ------
+    MeshError, ModalError
+        As `modal.analyse` does.
     """
     from sonic_bullet import modal
 

@@ -1,6 +1,6 @@
-"""A log with other materials: how its bodies moved and touched stays as recorded, how they ring is computed anew.
+"""A log with other materials: motion and contacts stay as recorded, modes are computed anew.
 
-ContactLog + MaterialChoice -> each body's surface, as its model in the log keeps it -> modes of the other material
+ContactLog + MaterialChoice -> each body's surface, from its model in the log -> modes of the other material
     -> ContactLog
 """
 
@@ -23,11 +23,23 @@ AS_RECORDED = "motion, masses and contact forces stay as the log recorded them"
 def with_choice(
     log: ContactLog, choice: MaterialChoice, where: str, say: Callable[[str], None] | None = None
 ) -> tuple[ContactLog, tuple[str, ...]]:
-    """The log with its bodies made of what was chosen, and silent where that was, and what a user should read of it.
+    """Return the log with its bodies made of the chosen materials, and silent where chosen, and notes for the user.
 
-    Modes are those of the body's surface in the log, clamped and counted as they were. where: what errors call the log.
-    Raises SceneError for a name that no body has, LogError where the log does not hold the shape of a body that is to
-    sound, and what `modal.analyse` raises, naming the body.
+    Modes are those of the body's surface in the log, clamped and counted as before.
+
+    Parameters
+    ----------
+    where
+        Name of the log in errors.
+
+    Raises
+    ------
+    SceneError
+        No body has one of the names.
+    LogError
+        The log does not hold the shape of a body that is to sound.
+    MeshError, ModalError
+        As `modal.analyse` does, naming the body.
     """
     if not choice:
         return log, ()
@@ -60,7 +72,7 @@ def _made_of(
             f"{where} does not hold the shape of {body.name}, which was no sounding body when it was recorded",
             f"render the scene with --material {body.name}=… instead",
         )
-    if body.model is None or not len(body.model.face):  # ground: what it is made of is felt in contacts alone
+    if body.model is None or not len(body.model.face):  # ground: its material acts in contacts alone
         return replace(body, material=material)
     key = id(body.model), id(chosen), repr(body.options)
     if key not in solved:

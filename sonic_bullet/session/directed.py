@@ -1,4 +1,4 @@
-"""Somebody who watches what a listener is made with, and may have it made with something else.
+"""Hook that sees what a listener is made with, and may substitute it.
 
 attach(options) -> Direction.attached -> options          Listener.add(…) -> Direction.added -> what is added
 """
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
 
 
 class Direction(Protocol):
-    """Who watches."""
+    """A hook on `attach` and `Listener.add`."""
 
     def attached(self, options: dict[str, Any]) -> dict[str, Any]:
-        """What a listener is to be attached with: sensors, seed, air."""
+        """Return the options to attach a listener with: sensors, seed, air."""
         ...
 
     def listens(self, listener: Listener) -> None:
-        """A listener was made of it."""
+        """Receive the listener that was made."""
         ...
 
     def absent(self, body: Any) -> bool:
-        """Whether that id is of a body that was not made after all."""
+        """Tell whether that id is of a body that was left out."""
         ...
 
     def added(self, world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
-        """Who is to sound, and as what."""
+        """Return the bodies to add, and their materials."""
         ...
 
 
@@ -41,7 +41,7 @@ _DIRECTION: ContextVar[Direction | None] = ContextVar("direction", default=None)
 
 @contextmanager
 def directed(direction: Direction) -> Iterator[None]:
-    """Listeners are made and added to as that one says while this lasts."""
+    """Use a hook for listeners that are made, and bodies that are added, within the block."""
     before = _DIRECTION.set(direction)
     try:
         yield
@@ -50,11 +50,11 @@ def directed(direction: Direction) -> Iterator[None]:
 
 
 def absent(who: Any) -> bool:
-    """Whether a body, or (body, link), was not made after all, because somebody had it so."""
+    """Tell whether the hook left out a body, or (body, link)."""
     director = _DIRECTION.get()
     return director is not None and director.absent(who[0] if isinstance(who, tuple) else who)
 
 
 def direction() -> Direction | None:
-    """Who watches, where somebody does."""
+    """Return the hook in use, or None."""
     return _DIRECTION.get()

@@ -1,9 +1,9 @@
-"""What a listener keeps of a run: the contact log, and the frames that nobody has read yet.
+"""Store the contact log of a run, and the frames not read yet.
 
     Step  -> StepLog -> LogSteps             frame -> unread frames -> read
 
-Both lie in spools, in memory only while they are short. Where the disk is full the run goes on: nothing more of that
-kind is kept, a warning and a note say so, and what was kept stays.
+Both are spools, in memory only while they are short. Where the disk is full the run continues: a warning and a note say
+that no more is stored, and what was stored stays.
 """
 
 from __future__ import annotations
@@ -23,7 +23,12 @@ from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
 class KeptRun:
     """The log, its events, and unread frames of so many channels.
 
-    notes: what is no longer kept, and why; unsaid: those that nobody was warned of yet.
+    Attributes
+    ----------
+    notes
+        What is no longer stored, and why.
+    unsaid
+        Those notes without a warning yet.
     """
 
     def __init__(self, channels: int, *, keep_log: bool) -> None:
@@ -38,7 +43,7 @@ class KeptRun:
         self._given_up: set[str] = set()
 
     def step(self, step: Step) -> None:
-        """Keep a step, and as events who was set elsewhere by hand before it and not before the last one."""
+        """Store a step, and an event for each body moved by hand before it and not before the last one."""
         if self._log is not None and (self._moved or np.count_nonzero(step.teleported)):
             moved = step.body[step.teleported].tolist()
             for body in moved:
@@ -53,12 +58,12 @@ class KeptRun:
                 self.give_up("contact log", error)
 
     def event(self, kind: str, body: int | None = None) -> None:
-        """Keep what happened before the next step; body: to whom, None: all."""
+        """Store an event before the next step; body: the one concerned, None: all."""
         if self._log is not None and "contact log" not in self._given_up:
             self.events.append(Event(kind, self._count, body))
 
     def frame(self, frame: Array) -> None:
-        """Keep a frame (channels, n) till it is read."""
+        """Store a frame (channels, n) until it is read."""
         if "unread frames" not in self._given_up:
             try:
                 self._unread.add(frame)
@@ -66,31 +71,31 @@ class KeptRun:
                 self.give_up("unread frames", error)
 
     def read(self) -> Array:
-        """(channels, n) all frames since the last time."""
+        """Return all frames (channels, n) since the last read."""
         unread, self._unread = self._unread, SoundSpool(self._channels, self._unread.instead)
         self._given_up.discard("unread frames")
         return unread.kept().samples()
 
     def steps(self) -> LogSteps:
-        """The steps so far. Raises SceneError where none are kept."""
+        """Return the steps so far; SceneError where the log is not kept."""
         if self._log is None:
             raise SceneError("the contact log is not kept", "attach with keep_log=True")
         return self._log.steps()
 
     def give_up(self, what: str, error: FileError) -> None:
-        """Note that no more is kept of it, once."""
+        """Note, once, that no more of it is stored."""
         if what not in self._given_up:
             self._given_up.add(what)
             note = f"from step {self._count} on the {what} {'are' if what.endswith('s') else 'is'} not kept: {error}"
             self.notes, self.unsaid = (*self.notes, note), (*self.unsaid, note)
 
     def say(self) -> None:
-        """Warn of what is no longer kept: at the end of a step, for a warning may be an error."""
+        """Warn of the new notes, at the end of a step, as a warning may be raised as an error."""
         notes, self.unsaid = self.unsaid, ()
         for note in notes:
             warnings.warn(note, SceneWarning, stacklevel=4)
 
 
 def package_versions() -> dict[str, str]:
-    """Of the packages that a render's numbers hang on."""
+    """Return the versions of the packages that a render's numbers depend on."""
     return {name: find_version(name) for name in ("sonic_bullet", "numpy", "numba")}

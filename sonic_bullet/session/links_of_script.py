@@ -1,7 +1,7 @@
-"""Links of a script that names no materials: who sounds, and who is a silent partner, and why.
+"""Links of a script that names no materials: which of them sound, and which are silent partners.
 
 link -> its shapes -> ground: a silent partner with concrete's contact
-                   -> not understood, or without modes: a silent partner that is named, with the remedy
+                   -> not understood, or without modes: a silent partner that a note names, with the remedy
                    -> else it sounds
 """
 
@@ -22,7 +22,7 @@ from sonic_bullet.session.material_choice import MaterialChoice, current_choice
 GROUND_M = 5.0
 """A static, flat body longer than this is ground: no board that is struck to sound is as long."""
 FLATTEST = 0.5
-"""Most of a flat body's thickness, as part of its second side: pybullet_data's planes are 200 x 200 x 10 m."""
+"""Largest thickness of a flat body over its second side: pybullet_data's planes are 200 x 200 x 10 m."""
 HOW_IT_SOUNDS = "it sounds where the script attaches a listener and adds it with mesh="
 
 
@@ -32,9 +32,9 @@ def add_links(
     static: Callable[[int, int], bool],
     progress: Callable[[str], None] | None = None,
 ) -> tuple[str, ...]:
-    """Let links sound, each as its material, those that can; notes on those that are silent partners.
+    """Add those links that can sound, each with its material; return notes on the silent partners.
 
-    static: whether a link can never move. One that fails stops none of the others.
+    A link that fails does not affect the others. static: tells whether a link can never move.
     """
     notes: list[str] = []
     sounding: dict[tuple[int, int], Material] = {}
@@ -64,7 +64,7 @@ def add_links(
 
 
 def named_links(world: World, choice: MaterialChoice) -> dict[tuple[int, int], Material]:
-    """Links that a choice gives a material by name, and that were not added yet."""
+    """Return the links, not added yet, to which a choice gives a material by name."""
     added = {(body.body_id, body.link) for body in world.living if body.material is not None}
     links = [who for who in world.all_links() if who not in added]
     found = zip(links, world.record_names([(*who, None) for who in links]), strict=True)
@@ -84,9 +84,7 @@ def _chosen_by_name(listener: Listener, who: tuple[int, int]) -> Material | None
 
 
 def is_ground(shapes: tuple[Shape, ...]) -> bool:
-    """Whether a static body of these shapes is what others stand on: a plane, flat and longer than GROUND_M, or larger
-    than anything that is struck to sound.
-    """
+    """Tell whether a static body is ground: a plane, flat and longer than GROUND_M, or larger than any struck body."""
     if any(shape.kind == "plane" for shape in shapes):
         return True
     thin, middle, long = sorted(_sides_m(shapes))
@@ -100,7 +98,7 @@ def _long(shapes: tuple[Shape, ...]) -> str:
 
 
 def _sides_m(shapes: tuple[Shape, ...]) -> Array:
-    """Sides (3,) of the box of all shapes, each in the axes of the body where it is not turned."""
+    """Return the sides (3,) of the bounding box of all shapes, each in its own axes."""
     corners = []
     for shape in shapes:
         if shape.kind == "mesh":

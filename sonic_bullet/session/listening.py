@@ -1,10 +1,9 @@
-"""The drop-in run time: a listener on a PyBullet client that turns each physics step into a frame of sound.
+r"""Run time: a listener on a PyBullet client that turns each physics step into a frame of sound.
 
     stepSimulation (hooked) -> World.after_step -> Step -> Synthesizer.feed -> frame
-                                                     \\-> ContactLog -> save / write
+                                                     \-> ContactLog -> save / write
 
-A frame lags physics by `latency_steps`, because a strike spans steps and loads are interpolated between them; files do
-not.
+A frame lags physics by `latency_steps`, as a strike spans steps and loads are interpolated between them; files do not.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ def _opened(client: Any) -> World:
 
 
 def _wanted(world: World, who: Any, how: Any) -> WantedBody:
-    """One entry of a cast."""
+    """Convert one entry of a cast."""
     body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
     given = how if isinstance(how, Mapping) else {"material": how}
     check_options(map(str, given), [name for name in keywords(Listener.add) if name != "progress"], "add_all")
@@ -84,18 +83,18 @@ class Listener:
         self.world.listen(self.step)
 
     def _begin(self) -> None:
-        """Nothing heard so far."""
+        """Start with an empty log."""
         self._kept = KeptRun(len(self.sensors), keep_log=self.world.logged)
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
-        """Begin anew: the same bytes as of a listener just attached, with the same bodies added in the same order.
+        """Restart: the same bytes as of a listener just attached, with the same bodies added in the same order.
 
-        What rings or travels, log, unread frames, sound and time so far are gone; who was never added is met anew; who
-        was removed is forgotten. Settings, and what was added, stay. A client that is not hooked does not tell who was
-        removed: after its resetSimulation, a body of the same id, name and shape counts as the one that was added.
-        Raises SceneError, having changed nothing: detached, called while a step is made, connection lost, or a `World`
-        that cannot begin anew.
+        Vibration and sound on its way, log, unread frames, sound and time are cleared; bodies never added are met anew;
+        removed bodies are dropped. Settings, and added bodies, stay. Without hooks removals are not observed: after a
+        resetSimulation, a body of the same id, name and shape counts as the one that was added. Raises SceneError,
+        having changed nothing: detached, called while a step is made, connection lost, or a `World` that cannot
+        restart.
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
@@ -106,10 +105,10 @@ class Listener:
 
     @property
     def frame(self) -> Array:
-        """The sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly. It lags
-        physics by `latency_steps` steps.
+        """Sound of the latest step, float64 pascals, (channels, n); n sums to floor(sr·time) exactly.
 
-        Raises SceneError where no step was made since `reset`, or since the world was emptied (resetSimulation).
+        It lags physics by `latency_steps` steps. Raises SceneError where no step was made since `reset`, or since the
+        world was emptied (resetSimulation).
         """
         if self._frame is None or self.world.emptied != self._emptied:
             raise SceneError("there is no frame: the world began anew", "make a step first")
@@ -133,19 +132,19 @@ class Listener:
         mounting: str | float | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
-        """Let a body sound; returns the modal models of its links.
+        """Let a body sound; return the modal models of its links.
 
         link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where
         one fails, none. material: a preset's name, a preset file or a `Material`. mesh: a file (in metres) or shapes in
-        the body frame, where the body's own collision shapes should not be used. model: modes computed before.
-        roughness_m: rms height of its surface in place of the material's. name: what log and messages call it, in place
-        of the simulator's name; "all" links get their own behind it ("panda/panda_link7"). fixed: clamped spheres (x,
+        the body frame, in place of the body's collision shapes. model: modes computed before.
+        roughness_m: rms height of its surface in place of the material's. name: in log and messages, in place
+        of the simulator's; "all" links append their own to it ("panda/panda_link7"). fixed: clamped spheres (x,
         y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
-        relative, of the highest frequency; the models' notes tell what is reached. mounting: "free", "placed" (in a
-        building; of mass 0 the default), "on floor" (one side radiates) or the loss factor that its place adds.
-        progress: called with which link's modes or radiation are computed and how far that is; without one, stderr
+        relative, of the highest frequency; the models' notes state what is reached. mounting: "free", "placed" (in a
+        building; of mass 0 the default), "on floor" (one side radiates) or the added loss factor.
+        progress: called with the link whose modes or radiation are computed; without one, stderr
         shows what takes over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
-        SceneError (unknown body or link, a name that another has), MaterialError, MeshError, ModalError, RecordError.
+        SceneError (unknown body or link, a name in use), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
@@ -157,10 +156,10 @@ class Listener:
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
     ) -> list[tuple[ModalModel, ...]]:
-        """Let several bodies sound, all of them or, where one fails, none; the modal models of each one's links.
+        """Let several bodies sound, all of them or, where one fails, none; return the modal models of each one's links.
 
-        cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What was never
-        computed before is computed side by side, on two cores. progress, warnings, errors: as `add` has them.
+        cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What the cache lacks
+        is computed side by side, on two cores. progress, warnings, errors: as of `add`.
         """
         if not isinstance(cast, Mapping):
             raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
@@ -169,7 +168,7 @@ class Listener:
     def _added(
         self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None
     ) -> list[tuple[ModalModel, ...]]:
-        """The models of bodies that are listened to from now on."""
+        """Add bodies and return their models."""
         as_call(progress, "progress")
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, asked)
@@ -185,9 +184,7 @@ class Listener:
         return solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, progress)
 
     def step(self) -> Array:
-        """Take in the physics step just made; returns `frame`.
-
-        Called by the hook of a `BulletClient`, by hand otherwise.
+        """Process the physics step just made; return `frame`. Without hooks, call it after each step.
 
         A second call without a physics step between gives a frame of no length. A body whose numbers cease to be
         numbers is left out from then on and named (`notes`). Raises SceneError for a lost connection.
@@ -216,13 +213,13 @@ class Listener:
     def play(
         self, device: str | int | None = None, *, full_scale_pa: float = FULL_SCALE_PA, ahead_s: float = AHEAD_S
     ) -> Playback:
-        """Sound out loud from now on: each step returns when the card has room for its frame, so that a loop faster
-        than real time is paced by it; leave `time.sleep` out. A slower one leaves gaps, which `Playback.report` counts.
+        """Play the sound from now on: each step returns when the card has space for its frame.
 
-        device: name or number of a sound card, None for the system's own, "null" for none, clocked in real time.
-        full_scale_pa: the pressure (m/s for vibrometers) that is full scale; what is beyond is clipped and counted.
-        ahead_s: how much sound may wait for the card: how late a step may be. A card that goes away is a
-        `PlaybackWarning`, and physics and log go on. Close what is returned, or leave it as a context manager. Raises
+        A loop faster than real time is paced by it; leave `time.sleep` out. A slower one leaves gaps, which
+        `Playback.report` counts. device: name or number of a sound card, None for the system's own, "null" for none,
+        clocked in real time. full_scale_pa: the pressure (m/s for vibrometers) of full scale; larger samples are
+        clipped and counted. ahead_s: how much sound may wait for the card: how late a step may be. A card that goes
+        away is a `PlaybackWarning`, and physics and log go on. Close the result, or use it as a context manager. Raises
         AudioError: no such card or rate, fewer channels than microphones, no microphone, detached, playing already.
         """
         if not self._attached:
@@ -232,7 +229,7 @@ class Listener:
                 raise AudioError("the listener plays already", "close what its play() returned first")
             self._playback.close()
         self.world.make_ready()
-        make_ready()  # else the first step would sound as late as it loads machine code
+        make_ready()  # else loading machine code would delay the first step
         self._playback = start_playback(
             device,
             sr=self.sr,
@@ -244,24 +241,22 @@ class Listener:
         return self._playback
 
     def read(self) -> Array:
-        """All frames since the last read, joined, (channels, n): for environments that hide many steps in one call."""
+        """Return all frames since the last read (channels, n), for environments that hide many steps in one call."""
         return self._kept.read()
 
     def quench(self) -> None:
-        """Stop everything that rings, as a hand would, now: where the last step taken in ends.
+        """Stop all vibration now, at the end of the last step, as a hand would; later strikes sound again.
 
-        What strikes from the next step on sounds again.
-
-        What was struck before is silent from then on, strikes that are still to sound included, and so is what travels
-        to the microphones; what rolls or slides goes on. `sound` and files fall silent at that very sample, `frame` as
-        much later as it lags. It is an event of the log, so that a replay stops there too, at any rate.
+        Earlier strikes are silent from then on, also those that have not sounded yet, and so is sound on its way to the
+        microphones; rolling and sliding continue. `sound` and files fall silent at that very sample, `frame` later by
+        its lag. It is an event of the log, so that a replay stops there too, at any rate.
         """
         self._kept.event("quench")
         self._synth.quench()
 
     @property
     def contacts(self) -> ContactLog:
-        """The contact log so far: all that a later render or comparison needs. Raises SceneError where none is kept."""
+        """Contact log so far, all that a later render or comparison needs; SceneError where it is not kept."""
         simulator = self.world.simulator
         return ContactLog(
             tuple(self.world.bodies),
@@ -280,18 +275,21 @@ class Listener:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """`left_out`, and who was touched by nobody, has no mode in the band, or radiates by a simpler law."""
+        """`left_out`, and bodies that touched nothing, have no mode in the band, or radiate by a simpler law."""
         return (*self.left_out, *(body_notes(self.contacts) if self.world.logged else ()))
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """What of the world is left out of the sound, or of what is kept, and why; each was a `SceneWarning`."""
+        """Messages on what of the world the sound or the log leaves out; each was a `SceneWarning`."""
         return (*self.world.notes, *self._kept.notes)
 
     @property
     def lifted(self) -> dict[str, tuple[int, int]]:
-        """By name of each body that rang on something: in how many steps, and in how many of them so loud that its
-        contacts would lift off and chatter, of which their law knows nothing."""
+        """Numbers of steps of each body with supports, by name: in all, and with contact separation.
+
+        In the latter the vibration is so large that contacts would lift off and chatter, which their law does not
+        describe.
+        """
         return self._synth.lifted
 
     @property
@@ -300,21 +298,21 @@ class Listener:
         return float(self._synth.time_s)
 
     def sound(self) -> Array:
-        """All sound so far without the lag, (channels, floor(sr·time)), float64 pascals (m/s for vibrometers).
+        """Return all sound so far without the lag, (channels, floor(sr·time)), float64 pascals (m/s for vibrometers).
 
         Raises AudioError where it is not kept.
         """
         return self._synth.sound()
 
     def kept_sound(self, *, tail_db: float | None = None) -> KeptSound:
-        """What `sound` gives where it lies, for runs longer than the memory. tail_db: as `write` has it."""
+        """Return the result of `sound` in its spool, for runs longer than the memory. tail_db: as for `write`."""
         return self._synth.kept_sound(as_tail_db(tail_db))
 
     def write(self, path: str | Path, *, tail_db: float | None = None, **options: Any) -> AudioReport:
         """Write the sound so far without the lag: 1.0 = 1 Pa, or scaled (options of `files.write_audio`).
 
-        tail_db: follow what rings after the last step until that far below the peak, -60 say, at most 10 s; None, 0:
-        not. By blocks, however long; lufs= alone needs all of it in memory. Raises FileError, AudioError.
+        tail_db: include the decay after the last step until that far below the peak, -60 say, at most 10 s; None, 0:
+        no decay. By blocks, however long; lufs= alone needs all of it in memory. Raises FileError, AudioError.
         """
         check_options(options, [*keywords(write_audio), "tail_db"], "write", error=AudioError)
         tail_db = as_tail_db(tail_db)
@@ -326,7 +324,7 @@ class Listener:
         return write_audio(place, self.kept_sound(tail_db=tail_db), self.sr, **options)
 
     def detach(self) -> None:
-        """Stop listening and leave the client as it was; sound and log stay. Twice is once."""
+        """Remove the hooks from the client; sound and log stay. A second call does nothing."""
         if self._attached:
             self.world.unhook()
             self._attached = False
@@ -334,9 +332,11 @@ class Listener:
                 self._playback.close()
 
     def __enter__(self) -> Listener:
+        """Return the listener."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Detach the listener."""
         self.detach()

@@ -1,4 +1,4 @@
-"""Who of a scene or a log is made of what, and who is silent, where a user says it beside them.
+"""Choice of materials and of silent bodies of a scene or a log, given by a user apart from it.
 
 material, materials by name, silent names -> MaterialChoice -> what is added (`choose_materials`)
                                                             -> bodies of a log (`session.chosen_in_log`)
@@ -27,13 +27,21 @@ if TYPE_CHECKING:
     from sonic_bullet.session.wanted_bodies import WantedBody
 
 LISTED_NAMES = 40
-"""As many names as a line lists."""
+"""Most names in a line."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialChoice:
-    """everyone: what all that sounds is made of, None: what the scene or log says; named: of links, or of all links of
-    bodies, by name, before it; silent: names of those whom no sensor hears.
+    """Materials and silent bodies that a user chose.
+
+    Parameters
+    ----------
+    everyone
+        Material of all that sounds; None: that of the scene or log.
+    named
+        Materials of links, or of all links of bodies, by name, which take precedence.
+    silent
+        Names of those that no sensor receives.
     """
 
     everyone: Material | None = None
@@ -41,23 +49,24 @@ class MaterialChoice:
     silent: frozenset[str] = frozenset()
 
     def __bool__(self) -> bool:
+        """Tell whether anything was chosen."""
         return self.everyone is not None or bool(self.named) or bool(self.silent)
 
     def material_of(self, name: str) -> Material | None:
-        """What a link of that name is made of, None where the choice says nothing of it."""
+        """Return the material of a link of that name, None without a choice."""
         found = matched(name, self.named)
         return self.everyone if found is None else self.named[found]
 
     def names(self, name: str) -> bool:
-        """Whether a material was chosen for a link of that name, or its body, by name."""
+        """Tell whether a material was chosen by name for a link of that name, or its body."""
         return matched(name, self.named) is not None
 
     def is_silent(self, name: str) -> bool:
-        """Whether a link of that name is to be silent."""
+        """Tell whether a link of that name is to be silent."""
         return matched(name, self.silent) is not None
 
     def check_names(self, names: Collection[str], where: str) -> None:
-        """Raise SceneError where a name of the choice is no link's, nor its body's; it lists the names there are."""
+        """Raise SceneError where a chosen name is of no link and no body; it lists the names there are."""
         for one in (*self.named, *sorted(self.silent)):
             if not any(matched(name, (one,)) for name in names):
                 known = list(dict.fromkeys(names))
@@ -67,7 +76,7 @@ class MaterialChoice:
                 raise SceneError(f"no body of {where} is called {shown(one)}", remedy)
 
     def _quoted(self, one: str, known: Sequence[str]) -> str:
-        """How the last name with a space is given in a shell, where there is one: "body 1=glass"."""
+        """Show how a name with a space is given in a shell, if there is one: "body 1=glass"."""
         spaced = [name for name in known if " " in name]
         if not spaced:
             return ""
@@ -75,7 +84,7 @@ class MaterialChoice:
         return f'; quotes hold a name with a space together: "{spaced[-1]}{rest}"'
 
     def silent_notes(self, bodies: Iterable[Body]) -> tuple[str, ...]:
-        """A line for each name that is silenced and of none of these bodies that sounds without it."""
+        """Return a line for each silenced name that is of none of these bodies that sound without it."""
         sounding = [body.name for body in bodies if body.material is not None and can_sound(body)]
         return tuple(
             f"{shown(one)} is silent anyway: silencing it changes nothing"
@@ -84,7 +93,7 @@ class MaterialChoice:
         )
 
     def check_added(self, added: Collection[str], scene: str) -> None:
-        """Raise SceneError where a name that was given a material is nobody's whom a scene's own listener added."""
+        """Raise SceneError where a name with a material was never added by a scene's own listener."""
         for one in self.named:
             if not any(matched(name, (one,)) for name in added):
                 what = f"{shown(one)} is given a material, but scene '{scene}' never adds it to its listener"
@@ -96,7 +105,15 @@ def as_choice(
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
 ) -> MaterialChoice:
-    """What a user gives, read. Raises MaterialError and FileError (a preset), SceneError (what is no name)."""
+    """Convert what a user gives to a choice.
+
+    Raises
+    ------
+    MaterialError, FileError
+        A preset cannot be read.
+    SceneError
+        A name is not valid.
+    """
     remedy = "give a dict from bodies' names to materials"
     named = {} if materials is None else materials
     if not isinstance(named, Mapping):
@@ -114,7 +131,7 @@ _CHOICE: ContextVar[MaterialChoice] = ContextVar("choice", default=MaterialChoic
 
 @contextmanager
 def choosing(choice: MaterialChoice) -> Iterator[None]:
-    """Listeners that are made, and what is added to them, follow that choice while this lasts."""
+    """Apply a choice to listeners that are made, and bodies that are added, within the block."""
     before = _CHOICE.set(choice)
     try:
         yield
@@ -123,13 +140,14 @@ def choosing(choice: MaterialChoice) -> Iterator[None]:
 
 
 def current_choice() -> MaterialChoice:
-    """What was chosen; an empty choice where nothing was."""
+    """Return the choice in use; an empty one by default."""
     return _CHOICE.get()
 
 
 def choose_materials(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
-    """Who is to be added, of the materials chosen: a body whose links become different ones is several here, its links
-    in the same order.
+    """Return the bodies to be added with the chosen materials.
+
+    A body whose links get different materials becomes several entries, its links in the same order.
     """
     choice = current_choice()
     if choice.everyone is None and not choice.named:

@@ -1,4 +1,4 @@
-"""A scene's file: of which kind it is, and its own code run: what breaks there is one line that names the place."""
+"""Scene files: their kind, and running their code; an error there is one line that names the place."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_
 
 
 def defines_build(path: Path) -> bool:
-    """Whether it has a function `build` at its top. Raises SceneError where it is no Python."""
+    """Tell whether a scene has a function `build` at its top; SceneError where it is not Python."""
     refuse_lfs_pointer(path, SceneError)
     try:
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -26,7 +26,7 @@ def defines_build(path: Path) -> bool:
 
 
 def uses_sonic_bullet(path: Path) -> bool:
-    """Whether it imports this package, and so may have a listener of its own."""
+    """Tell whether a scene imports this package, and so may have a listener of its own."""
     return any(
         (isinstance(node, ast.Import) and any(name.name.split(".")[0] == "sonic_bullet" for name in node.names))
         or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "sonic_bullet")
@@ -42,7 +42,7 @@ def user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
     except (SonicBulletError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        if stop_word():  # what an interrupt became on its way out
+        if stop_word():  # an interrupt that became another exception
             raise KeyboardInterrupt(stop_word()) from error
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
         where = f" line {lines[-1]}" if lines else ""
@@ -50,7 +50,7 @@ def user_code(path: Path, call: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def scene_module(path: Path) -> ModuleType:
-    """The file as a module, run. Raises SceneError naming the line where it breaks."""
+    """Run the file as a module; SceneError names the line where it fails."""
     spec = importlib.util.spec_from_file_location(f"sonic_bullet_scene_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise SceneError(f"'{path}' is not a Python file", "give a scene whose name ends in .py")

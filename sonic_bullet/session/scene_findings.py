@@ -1,4 +1,4 @@
-"""What spoils a scene's sound that only its listener knows: who was added, and whether they ring."""
+"""Findings that only a scene's listener knows: which bodies were added, and whether they have modes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sonic_bullet.session.listening import Listener
 
 
 def find_nothing_added(listener: Listener) -> tuple[Finding, ...]:
-    """Whether no body of a world that has some was given a material."""
+    """Report a world with bodies of which none has a material."""
     if not listener.world.has_bodies or any(body.material is not None for body in listener.world.bodies):
         return ()
     return (
@@ -22,7 +22,7 @@ def find_nothing_added(listener: Listener) -> tuple[Finding, ...]:
 
 
 def find_mute_bodies(listener: Listener) -> tuple[Finding, ...]:
-    """Bodies without a mode that can be heard."""
+    """Report bodies without an audible mode."""
     return tuple(
         Finding(
             "no-audible-mode",

@@ -1,18 +1,18 @@
-"""Takes of one log: what a simulation leaves open is drawn anew, what it says stays.
+"""Takes of one log: what a simulation does not determine is drawn anew, all else stays.
 
     ContactLog, seed, number of the take -> surfaces   another seed of all that is rough
                                          -> places     contacts moved within the footprint of their pair
                                          -> materials  each body's numbers within the spread of its material
-        -> ContactLog, and what was drawn
+        -> ContactLog, and the factors drawn
 
-Take 1 is the log itself. Every take draws from generators of its own, seeded by (seed, take, what, who): the same seed
-gives the same bytes, and what is not asked for changes nothing of the rest.
+Take 1 is the log itself. Every take draws from generators of its own, seeded by (seed, take, kind, body): the same seed
+gives the same bytes, and a kind that is not varied does not affect the others.
 
 Surfaces: a body's profile is one of many of its spectrum.
 Places: Bullet takes two points of a pair for one contact where they are nearer than 0.02 of the smaller body's bounding
-radius [btCollisionShape::getContactBreakingThreshold, gContactBreakingThreshold = 0.02]; where in it a contact lies is
-not known. A pair that comes into touch gets a vector d, |d| ≤ r, and keeps it until it parts; both points move by d -
-(d·n)n, n the normal, so that places glide where the normal turns.
+radius [btCollisionShape::getContactBreakingThreshold, gContactBreakingThreshold = 0.02]; the place of a contact within
+it is not known. A pair that comes into contact gets a vector d, |d| ≤ r, and keeps it until it separates; both points
+move by d - (d·n)n, n the normal, so that places move where the normal rotates.
 Materials: E, ρ, damping, roughness, Hurst exponent and restitution of a preset have spreads, standard deviations of the
 logarithm, and ranges (docs/reference/preset.md). With factors e of E, r of ρ: λ' = λ e/r, shapes u/√r [UᵀMU = I].
 Poisson's ratio and with it the shapes stay.
@@ -36,13 +36,13 @@ from sonic_bullet.session.material_choice import as_choice
 
 SURFACES, PLACES, MATERIALS = VARIED = ("surfaces", "places", "materials")
 FOOTPRINT = 0.02
-"""Radius within which a pair's points are one contact, of the smaller body's bounding radius: Bullet's own."""
+"""Radius within which a pair's points are one contact, over the smaller body's bounding radius: Bullet's own."""
 AS_SIMULATED = "motion, masses and contact forces of every take are those of the log"
 
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """varied: which of `VARIED`. footprint_m: radius in place of Bullet's; None: that."""
+    """Kinds to vary, of `VARIED`. footprint_m: radius of a footprint; None: Bullet's."""
 
     varied: frozenset[str] = frozenset(VARIED)
     footprint_m: float | None = None
@@ -50,7 +50,7 @@ class Variation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogTake:
-    """A take's log; drawn: what was, by body: factors of its material's numbers."""
+    """A take's log. drawn: factors of its material's numbers, by body."""
 
     number: int
     log: ContactLog
@@ -58,7 +58,7 @@ class LogTake:
 
 
 def make_take(log: ContactLog, number: int, variation: Variation | None = None) -> LogTake:
-    """Take ``number`` of a log, counted from 1, by its seed. Raises SceneError."""
+    """Make take ``number`` of a log, counted from 1, by its seed; raises SceneError."""
     variation = variation or Variation()
     if number < 1:
         raise SceneError(f"there is no take {number}", "count takes from 1")
@@ -79,7 +79,7 @@ def make_take(log: ContactLog, number: int, variation: Variation | None = None) 
 
 
 def _state(seed: int, number: int, what: str, *who: int) -> Array:
-    """Two 32-bit numbers for one thing of a take."""
+    """Derive two 32-bit numbers for one quantity of a take."""
     words = [seed & 0xFFFFFFFF, seed >> 32, number, VARIED.index(what), *(x & 0xFFFFFFFF for x in who)]
     return np.random.SeedSequence(words).generate_state(2)
 
@@ -93,7 +93,7 @@ def _identity(body: Body) -> tuple[int, int, int]:
 
 
 def footprints_m(bodies: Collection[Body]) -> Array:
-    """(b,) Bullet's radius for each body; infinite for planes and what has no size here."""
+    """Return Bullet's radius (b,) for each body; infinite for planes and bodies of unknown size."""
     radius = [_radius_m(body) for body in bodies]
     return np.array([FOOTPRINT * r if r > 0 else np.inf for r in radius])
 
@@ -105,7 +105,7 @@ def _radius_m(body: Body) -> float:
 
 
 def _moved_contacts(log: ContactLog, number: int, footprint_m: float | None) -> ContactLog:
-    """The log with each pair's contacts moved by its own vector, from its first step of touch to its last."""
+    """Move each pair's contacts by its own vector, from its first step of contact to its last."""
     own = footprints_m(log.bodies) if footprint_m is None else np.full(len(log.bodies), footprint_m)
     touching: dict[tuple[int, int], Array] = {}
     met: dict[tuple[int, int], int] = {}
@@ -130,13 +130,13 @@ def _moved_contacts(log: ContactLog, number: int, footprint_m: float | None) -> 
 
 
 def _in_ball(draw: np.random.Generator) -> Array:
-    """A vector (3,), even within the unit ball."""
+    """Draw a vector (3,), uniform within the unit ball."""
     direction = draw.normal(size=3)
     return np.asarray(direction / np.linalg.norm(direction) * np.cbrt(draw.random()))
 
 
 def _moved(step: Step, vector_m: Array) -> Step:
-    """The step with its rows' points moved by the vectors (k, 3), along the surfaces."""
+    """Move the points of a step's rows by the vectors (k, 3), along the surfaces."""
     row = step.contacts.row.copy()
     along = vector_m - (vector_m * row["normal"]).sum(axis=1, keepdims=True) * row["normal"]
     for side, point in (("a", "point_a_m"), ("b", "point_b_m")):
@@ -147,7 +147,7 @@ def _moved(step: Step, vector_m: Array) -> Step:
 
 
 def _to_body(quaternion_xyzw: Array, vector: Array) -> Array:
-    """World vectors (k, 3) in the frames of orientations (k, 4)."""
+    """Rotate world vectors (k, 3) to the frames of orientations (k, 4)."""
     q = quaternion_xyzw / np.linalg.norm(quaternion_xyzw, axis=1, keepdims=True)
     axis, w = -q[:, :3], q[:, 3:]
     twice = 2 * np.cross(axis, vector)
@@ -155,7 +155,7 @@ def _to_body(quaternion_xyzw: Array, vector: Array) -> Array:
 
 
 def _other_materials(log: ContactLog, number: int) -> tuple[ContactLog, dict[str, dict[str, float]]]:
-    """The log with each body's material drawn anew where a preset of that name says its spread; the factors."""
+    """Draw each body's material anew where a preset of that name states its spread; return the factors too."""
     bodies, drawn = [], {}
     for body in log.bodies:
         factors = {}
@@ -169,9 +169,7 @@ def _other_materials(log: ContactLog, number: int) -> tuple[ContactLog, dict[str
 
 
 def draw_factors(material: Material, draw: np.random.Generator) -> dict[str, float]:
-    """By field, the factor of a number of a preset: e^(s z), z normal, no further than its range; none of a material
-    that no table of the package's names.
-    """
+    """Draw a factor of each number of a preset, e^(s z), z normal, within its range; none of an unknown material."""
     from sonic_bullet.presets import FOLDER, read_preset, table_names
 
     if material.name not in table_names():
@@ -191,7 +189,7 @@ def draw_factors(material: Material, draw: np.random.Generator) -> dict[str, flo
 
 
 def vary_body(body: Body, factors: Mapping[str, float]) -> Body:
-    """A body whose material's numbers are multiplied; its modes follow by the laws of the module's head."""
+    """Multiply the numbers of a body's material; its modes follow by the module's equations."""
     material = body.material
     assert material is not None
     stiff, dense = factors.get("youngs_pa", 1.0), factors.get("density_kg_m3", 1.0)
@@ -212,7 +210,7 @@ def vary_body(body: Body, factors: Mapping[str, float]) -> Body:
 
 
 def _vary_model(model: ModalModel, old: Material, new: Material, ratio: float, dense: float) -> ModalModel:
-    """Modes at eigenvalues times ratio, of a density times dense; decays change by what Rayleigh's pair gives."""
+    """Scale modes to eigenvalues times ratio and density times dense; decays change as their Rayleigh damping does."""
     if not model.mode_count:
         return replace(model, mass_kg=model.mass_kg * dense)
     eigenvalue = model.omega0_squared_per_s2
@@ -237,8 +235,12 @@ def _vary_model(model: ModalModel, old: Material, new: Material, ratio: float, d
 
 
 def with_roughness(log: ContactLog, roughness_m: Mapping[str, float], where: str) -> ContactLog:
-    """The log with surfaces of other rms heights, by names of bodies or links; "": of all others. Raises SceneError for
-    a name that no body has.
+    """Return the log with other rms heights of surfaces, by names of bodies or links; "": of all others.
+
+    Raises
+    ------
+    SceneError
+        No body has that name.
     """
     named = {name: height for name, height in roughness_m.items() if name}
     _check_names(log, named, where)
@@ -255,8 +257,12 @@ def with_roughness(log: ContactLog, roughness_m: Mapping[str, float], where: str
 
 
 def with_gains(log: ContactLog, gain_db: Mapping[str, float], where: str) -> ContactLog:
-    """The log with bodies that sensors hear louder or fainter, by names of bodies or links. Raises SceneError for a
-    name that no body has.
+    """Return the log with gains of bodies at the sensors, by names of bodies or links.
+
+    Raises
+    ------
+    SceneError
+        No body has that name.
     """
     _check_names(log, gain_db, where)
     bodies = []

@@ -1,10 +1,10 @@
-"""Bodies that shall sound: what was asked for, checked, and their modes, computed side by side where there are several.
+"""Bodies that are to sound: arguments, checked, and their modes, computed side by side where there are several.
 
     add's arguments -> WantedBody, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
 
-What the cache lacks is worked on by two processes, each taking the next: modes and radiation of a link, and the machine
-code of run time and listener, which a first scene needs as well. They hand nothing over but cache entries; then all is
-gone through in order, one after another, as if there had been one process: the same models, the same errors.
+Two processes fill the cache, each taking the next job: modes and radiation of a link, and the machine code of run time
+and listener, which a first scene needs as well. They share nothing but cache entries. All bodies are then solved in
+order from the cache, as in one process: the same models, the same errors.
 """
 
 from __future__ import annotations
@@ -43,9 +43,20 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WantedBody:
-    """A body and the links of it that shall sound. parts: name and shapes of each; model: of all, where it is given.
-    names: what they shall be called, none: as the simulator calls them. own_shapes: the shapes were given, not asked
-    of the world. mounting: None: as is usual.
+    """A body and those links of it that are to sound.
+
+    Parameters
+    ----------
+    parts
+        Name and shapes of each link.
+    model
+        Of all links, where it is given.
+    names
+        Names given; empty: the simulator's.
+    own_shapes
+        The shapes were given, not taken from the world.
+    mounting
+        None: the usual one.
     """
 
     body: int
@@ -72,7 +83,7 @@ def wanted_body(
     mounting: str | float | None = None,
     **options: Any,
 ) -> WantedBody:
-    """What `Listener.add` was asked for. options: of modal.ModalOptions. Raises what add raises."""
+    """Check the arguments of `Listener.add`; raises what it raises. options: of modal.ModalOptions."""
     made = as_material(material)
     if roughness_m is not None:
         remedy = "give an rms height in m, zero or above"
@@ -93,14 +104,18 @@ def wanted_body(
 
 
 def _names(world: World, body: int, links: Sequence[int], name: str, every: bool) -> Iterator[str]:
-    """What links are called where a name is given: the name, and of every link of a body the link's own behind it."""
+    """Yield the links' names where a name is given; "all" links append their own to it."""
     for link in links:
         yield f"{name}/{world.link_name(body, link)}" if every and link >= 0 else name
 
 
 def checked(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
-    """Who is to be added: those, or whoever directs this run says instead. Raises SceneError where a name that is given
-    is another living link's, or given twice.
+    """Return the bodies to be added, as the run's hook has them.
+
+    Raises
+    ------
+    SceneError
+        A given name is another living link's, or given twice.
     """
     director = direction()
     if director is not None:
@@ -116,7 +131,7 @@ def checked(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
 
 @contextmanager
 def _naming(link: str, of: int) -> Iterator[None]:
-    """Errors of a link's mesh or modes name that link, one of ``of``, and what can be done about it here."""
+    """Let errors of a link's mesh or modes name that link, one of ``of``, and a remedy."""
     try:
         yield
     except (MeshError, ModalError) as error:
@@ -130,8 +145,14 @@ def _naming(link: str, of: int) -> Iterator[None]:
 def solved_bodies(
     world: World, wanted: Sequence[WantedBody], known: Iterable[ModalModel], air: Air | None, say: Say
 ) -> list[list[ModalModel]]:
-    """The models of each body's links. known: of bodies that are there already, shared by equal ones. air: in which
-    they radiate, None: nobody hears them.
+    """Return the models of each body's links.
+
+    Parameters
+    ----------
+    known
+        Models of bodies that are there already, shared by equal ones.
+    air
+        The medium; None: no sensor receives them.
     """
     with one_thread():
         _prepare(world, wanted, air, say)
@@ -154,7 +175,7 @@ def enter_bodies(
     models: Sequence[Sequence[ModalModel]],
     asked: Sequence[WantedBody],
 ) -> list[tuple[ModalModel, ...]]:
-    """Make links known to the world, with their models. asked: whose links these are, in turn; the models of each."""
+    """Add links with their models to the world; return the models of each body in ``asked``, in turn."""
     for one in wanted:  # all of them first: a number is given to who has no name of its own
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
             world.call(one.body, link, name)
@@ -170,7 +191,7 @@ def enter_bodies(
 
 
 def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
-    """A line for each link larger than anything that is struck to sound."""
+    """Yield a line for each link larger than anything that is struck to sound."""
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     for one, mine in zip(wanted, models, strict=True):
         for (name, _), model in zip(one.parts, mine, strict=True):
@@ -179,9 +200,7 @@ def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[Modal
 
 
 def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:
-    """The models of a body's links. What fails shall fail early: all are looked at first, and the most intricate is
-    filled first.
-    """
+    """Compute the models of a body's links; check all and mesh the most intricate first, to fail early."""
     from sonic_bullet import modal
 
     several = len(one.parts) > 1
@@ -206,9 +225,7 @@ def _analysed(shapes: tuple[Shape, ...], one: WantedBody, say: Say) -> ModalMode
 
 
 def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
-    """The model itself, or the same one that a body has already or is about to have: equal bodies then share memory
-    and what is derived from it.
-    """
+    """Return an equal model that a body has already, else the model: equal bodies share memory and derived data."""
     same = (
         other
         for other in known
@@ -222,7 +239,7 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
 
 
 def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
-    """Fill the cache with what it lacks of these bodies, side by side; what fails is left to whoever asks next."""
+    """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
     missing, say_here, say = _missing(wanted), say, said_here(say)
 
     def solve(number: int, name: str, shapes: tuple[Shape, ...], one: WantedBody) -> None:
@@ -237,7 +254,7 @@ def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: S
         ready()
 
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
-    if jobs and code_folder() is not None:  # else what one process makes the other never has
+    if jobs and code_folder() is not None:  # else the processes cannot share machine code
         if air is not None:
             jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
         jobs.insert(2, partial(make, "the listener", world.make_ready))
@@ -251,9 +268,7 @@ def _done(job: Callable[[], None]) -> None:
 
 
 def _missing(wanted: Sequence[WantedBody]) -> list[tuple[str, tuple[Shape, ...], WantedBody]]:
-    """Links whose modes are to be computed, each once, those of many triangles first: they take longest. None where
-    one of them cannot be filled: who asks for it in order says so before anything is solved.
-    """
+    """List links whose modes are not cached, each once, most triangles first; none where one cannot be meshed."""
     from sonic_bullet import modal
 
     found: dict[str, tuple[str, tuple[Shape, ...], WantedBody]] = {}
