@@ -38,9 +38,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     The observation space is a Dict: the keys of the environment's own, or "observation" where that is not a Dict, and
     "audio". That is float32 (channels, ceil(sr·T)) in pascals, T the simulated time of one env.step: the newest samples
     last, before them zeros. The number of new ones is info["audio_count"], not part of the observation, as a policy
-    learns nothing from it; these counts sum to floor(sr·time since reset). As a listener's frames, audio lags physics by three
-    physics steps. info["contacts_differ"] is present, and True, from the env.step on in which the simulator gave other
-    poses or contacts than in the first episode of the same seed and actions.
+    learns nothing from it; these counts sum to floor(sr·time since reset). As a listener's frames, audio lags physics
+    by three physics steps. info["contacts_differ"] is present, and True, from the env.step on in which the simulator
+    gave other poses or contacts than in the first episode of the same seed and actions.
 
     Parameters
     ----------
