@@ -1,10 +1,10 @@
 """Forces become sound: the synthesizer of live steps, and the replay of a contact log.
 
-silence: why there is none | presence: who is there, who has gone | resonator: a body as it is played
-tables, body_table: what the compiled stages work on | contact_rows, contact_place: contacts | strike_pulses: strikes
-friction: rolling and sliding | ringing_on: what sounds after the last step
-driver: the stages in one call | residual_voice: residuals, what happened in a step
-synthesis_state: all that goes on | presence: who is there, comes and goes | synthesizer: all together
+silence: reasons of silence | presence: bodies that come and go | resonator: a body for the bank
+tables, body_table: tables of the compiled stages | contact_rows, contact_place: contacts | strike_pulses: strikes
+friction: rolling and sliding | standing: resting contacts | ringing_on: tail after the last step
+driver: the stages in one call | residual_voice: residuals, strikes and drives of a step
+synthesis_state: the state | apart: stems per body | synthesizer: all together
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 AT_ONCE = 64
-"""Steps that a replay takes in at once, between two looks at how far it is."""
+"""Steps that a replay takes in at once, between two reports of progress."""
 
 
 @says_so(text="say", fraction="progress")
@@ -57,14 +57,23 @@ def render_log(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
-    """The sound of a contact log, (channels, floor(sr·time)) in pascals; with the log's own rate the same bits as live.
+    """Render a contact log: (channels, floor(sr·time)) in pascals; at the log's own rate the same bits as live.
 
     Its events act where they did: at the first sample of the same step, at any rate. All of it is in memory at once:
     `render_blocks` gives it in pieces.
 
-    residual: whether with what materials sound beside their modes, None: as the log says. progress is called with the
-    share done, say with what is being computed before the first step. Raises AudioError for a rate that cannot be,
-    LogError for what is no log.
+    Parameters
+    ----------
+    residual : whether materials' residuals sound, None: as the log says
+    progress : called with the fraction done
+    say : called with what is being computed before the first step
+
+    Raises
+    ------
+    AudioError
+        The rate is impossible.
+    LogError
+        ``log`` is no log.
     """
     blocks = [*render_blocks(log, sr=sr, residual=residual, progress=progress, say=say)]
     return np.ascontiguousarray(np.concatenate(blocks, axis=1))
@@ -78,16 +87,19 @@ def render_blocks(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[Array]:
-    """What `render_log` gives, in pieces (channels, n) of some steps each, for logs longer than the memory.
+    """Render a contact log in pieces (channels, n) of some steps each, for logs longer than the memory.
 
-    Arguments and errors: as `render_log` has them; arguments are checked at once.
+    Arguments and errors: as of `render_log`; arguments are checked at once.
     """
     log, residual = _checked(log, sr, residual, progress, say)
     return _blocks(log, _synthesizer(log, residual), progress, say)
 
 
 def _checked(log: ContactLog, sr: object, residual: object, progress: Any, say: Any) -> tuple[ContactLog, bool]:
-    """A log at the rate asked for, and whether it is rendered with residuals. Raises AudioError, LogError."""
+    """Check the arguments; return a log at the rate asked for, and whether residuals sound.
+
+    Raises AudioError, LogError.
+    """
     from sonic_bullet.files import check_sr
 
     as_kind(log, ContactLog, "log", "give listener.contacts, or read_log(path)", error=LogError)
@@ -106,12 +118,16 @@ def render_kept(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> KeptSound:
-    """What `render_log` gives, beyond a few seconds in a nameless temporary file. Arguments: as `render_log` has them.
+    """Render a contact log, beyond a few seconds into a nameless temporary file.
 
-    tail_db: ring on after the last step until that far below the peak, -60 say, at most 10 s; None, 0: end with it.
+    Arguments: as of `render_log`, and tail_db: ring on after the last step until that far below the peak, -60 say, at
+    most 10 s; None, 0: end with it.
 
-    Raises what `render_log` does, and FileError where the disk is full; the exception, Ctrl-C too, carries what was
-    rendered so far as ``kept``.
+    Raises
+    ------
+    AudioError, LogError, FileError
+        As `render_log`, FileError where the disk is full.
+        The exception, Ctrl-C too, carries what was rendered so far as ``kept``.
     """
     tail_db = as_tail_db(tail_db)
     log, residual = _checked(log, sr, residual, progress, say)
@@ -149,7 +165,7 @@ def _synthesizer(log: ContactLog, residual: bool) -> Synthesizer:
 
 
 def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:
-    """Have how the bodies' modes radiate, computed now where it is not kept; say is told."""
+    """Compute the radiation of the bodies' modes where it is not cached; report each to ``say``."""
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:
             if say is not None:
@@ -158,12 +174,12 @@ def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> 
 
 
 def quenched_steps(log: ContactLog) -> set[int]:
-    """Steps before which all that rings stops."""
+    """Return the steps before which all ringing stops."""
     return {event.step for event in log.events if event.kind == "quench"}
 
 
 def together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
-    """Steps that a replay takes in at once: of the same bodies, with no quench between."""
+    """Group the steps that a replay takes in at once: of the same bodies, with no quench between."""
     group: list[Step] = []
     for number, step in enumerate(steps):
         if group and (len(group) == AT_ONCE or number in quenches or not same_bodies(step, group[0])):
@@ -175,12 +191,12 @@ def together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
 
 
 def same_bodies(one: Step, other: Step) -> bool:
-    """Whether two steps hold poses of the same bodies."""
+    """Return whether two steps hold poses of the same bodies."""
     return one.body is other.body or np.array_equal(one.body, other.body)
 
 
 def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> Iterator[Array]:
-    """The sound of a contact log a step at a time, as `Listener.frame` had it: (channels, n), `LATENCY_STEPS` late.
+    """Render a contact log a step at a time, as `Listener.frame` had it: (channels, n), `LATENCY_STEPS` late.
 
     say is called with what is being computed before the first step.
     """
@@ -194,6 +210,6 @@ def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> 
 
 
 def make_ready() -> None:
-    """Have the run time's machine code, compiled now where it is not kept: what the first step would else wait for."""
+    """Load the run time's machine code, or compile it where it is not cached: else the first step would wait for it."""
     nobody = Step(1 / 240, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), Contacts.none())
     Synthesizer(sr=8000, sensors=(Microphone(np.zeros(3)),), seed=0, air=Air()).feed(nobody, ())

@@ -1,8 +1,8 @@
-"""A contact log's sound, body by body: the run time with the last sum left out.
+"""Stems of a contact log, one a body: the run time without the last sum.
 
     ContactLog -> the same stages on the same tables -> hear, a row a body -> (bodies · channels, n)
 
-Contacts are those of the mix: a body that is struck by another sounds as it does there, and only what it sends itself
+Contacts are those of the mix: a body that is struck by another sounds as it does there, and only what it emits itself
 is its stem. Pressure is linear in the sources [Pierce 1989, sec. 4-3], so the stems' sum is the mix, to rounding.
 """
 
@@ -32,11 +32,16 @@ def render_apart(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[Array, Array]]:
-    """Pieces of what `render_blocks` gives, before bodies are summed: (b,) their indices in the log, ascending, and
-    (b, channels, n) pascals. Who is not among them is silent meanwhile.
+    """Render pieces as `render_blocks`, before bodies are summed.
 
-    frames: how many samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end.
-    witness: is shown every step. progress, say, errors: as `render_log` has them.
+    Yields (b,) indices of the bodies in the log, ascending, and (b, channels, n) pascals. Other bodies are silent
+    meanwhile.
+
+    Parameters
+    ----------
+    frames : number of samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end
+    witness : observer that is called with every step
+    progress, say : as of `render_log`, and so are errors
     """
     from sonic_bullet.files import check_sr
     from sonic_bullet.render import make_radiation_known, quenched_steps, together

@@ -1,4 +1,4 @@
-"""What the compiled stages know of every body: a BODY row each, and flat arrays of what belongs to its model.
+"""Table of the bodies for the compiled stages: a BODY row each, and flat arrays of what belongs to its model.
 
 Resonator + lines of its residual -> BODY row;  its model -> FACE, NODE rows, shapes, frequencies, once for all
     bodies that share it
@@ -19,10 +19,10 @@ from sonic_bullet.support import ContactSide
 from sonic_bullet.synth.strikes import SPAN
 
 EDGE_RADIUS_SHARE = 0.005
-"""Radius of a body's edges, as a share of its size: broken, as made things have them."""
+"""Radius of a body's edges, as a fraction of its size: broken, as made things have them."""
 EDGE_RADIUS_LEAST_M = 2e-4
 UNKNOWN_REBOUND = 0.7
-"""Restitution of a body whose log does not say; a pair's is 0.5 then."""
+"""Restitution of a body whose log does not give it; a pair's is 0.5 then."""
 NEVER = -(1 << 40)
 """Number of a step that was long ago."""
 
@@ -44,24 +44,25 @@ _NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
 
 
 def _stand(row: Any, place: _Place) -> None:
-    """Enter where its model is into a BODY row."""
+    """Enter the place of a body's model into its BODY row."""
     row["wall_m"], row["tie_m"] = place.wall_m, place.tie_m
     row["frequency_at"], row["shape_at"] = place.frequency_at, place.shape_at
     row["face_at"], row["faces"], row["node_at"] = place.face_at, place.faces, place.node_at
 
 
 class _Growing:
-    """An array that is appended to and stays in one piece: what is filled of it is a view."""
+    """Array that is appended to and stays in one piece: its filled part is a view."""
 
     def __init__(self, dtype: np.dtype | type) -> None:
         self._all, self._count = np.zeros(1, dtype), 0
 
     @property
     def filled(self) -> Array:
+        """View of the filled part."""
         return self._all[: self._count]
 
     def append(self, values: Array) -> int:
-        """The place of the first of the values (k,)."""
+        """Append the values (k,) and return the place of the first."""
         at, self._count = self._count, self._count + len(values)
         if self._count > len(self._all):
             grown = np.zeros(max(self._count, 2 * len(self._all)), self._all.dtype)
@@ -72,14 +73,15 @@ class _Growing:
 
 
 def pressed_pa(material: Material, side: ContactSide) -> float:
-    """E/(1 − ν²) where a material is touched: of its softest axis, for boards are pressed across their grain."""
+    """Compute E/(1 − ν²) where a material is touched: of its softest axis, for boards are pressed across the grain."""
     soft, usual = 1 / side.compliance_per_pa, material.plane_strain_pa
     return soft if soft < 0.99 * usual else usual  # to the bit where no axis is softer
 
 
 class BodyTable:
-    """bodies (b,) of BODY; faces of FACE and nodes of NODE, shapes (float32) and frequencies in Hz, all flat and found
-    by the numbers of a body's row. They are other arrays after `add`; what was in them stays where it was.
+    """Bodies (b,) of BODY; faces of FACE, nodes of NODE, shapes (float32) and frequencies in Hz, all flat.
+
+    A body's row holds its places in them. `add` replaces the arrays, but not the places.
     """
 
     def __init__(self) -> None:
@@ -89,22 +91,27 @@ class BodyTable:
 
     @property
     def bodies(self) -> Array:
+        """Rows of BODY (b,)."""
         return self._bodies.filled
 
     @property
     def faces(self) -> Array:
+        """Rows of FACE."""
         return self._faces.filled
 
     @property
     def nodes(self) -> Array:
+        """Rows of NODE."""
         return self._nodes.filled
 
     @property
     def shapes(self) -> Array:
+        """Mode shapes, flat."""
         return self._shapes.filled
 
     @property
     def frequency_hz(self) -> Array:
+        """Frequencies of the modes, flat."""
         return self._frequencies.filled
 
     @property
@@ -113,7 +120,7 @@ class BodyTable:
         return int(self.bodies["columns"].max(initial=1))
 
     def add(self, resonator: Resonator, follows: Array, surface_seed: int) -> int:
-        """One more body: its index. follows (l,): the mode that each line of its residual is struck as."""
+        """Add a body and return its index. follows (l,): the mode that each line of its residual is struck as."""
         place = self._place(resonator, np.asarray(follows, np.int64))
         body = resonator.body
         material = body.material
@@ -137,7 +144,7 @@ class BodyTable:
         return self._bodies.append(row)
 
     def copy(self) -> BodyTable:
-        """A table with bodies of its own; what belongs to models is the same."""
+        """Return a copy with its own bodies; what belongs to models is shared."""
         other = BodyTable()
         other._bodies.append(self.bodies)
         other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
@@ -145,8 +152,9 @@ class BodyTable:
         return other
 
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
-        """A table of the bodies (k,) of these numbers alone, whose resonators and `follows` are given. What belongs to
-        models is the same while half of it at least is theirs, else put together anew.
+        """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
+
+        What belongs to models is shared while half of it at least is theirs, else built anew.
         """
         other = BodyTable()
         other._bodies.append(self.bodies[keep])
@@ -161,7 +169,7 @@ class BodyTable:
         return other
 
     def _place(self, resonator: Resonator, follows: Array) -> _Place:
-        """Where the arrays of the body's model are, put there if it is the first that has it."""
+        """Return the place of the arrays of the body's model, added if it is the first that has it."""
         model, index = resonator.body.model, resonator.index
         if model is None or index is None:
             return _NOWHERE

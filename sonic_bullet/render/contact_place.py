@@ -1,10 +1,10 @@
-"""Where a contact lies on both bodies' true surfaces, and what its force does to their modes: for strikes and friction.
+"""Location of a contact on both bodies' true surfaces, and its force on their modes: for strikes and friction.
 
     row of ROW -> touch: nearest triangle, weights, curvature, once a row -> add_push: Uᵀj on either body's columns
     1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)],  1/E* = Σ (1-ν²)/E    [synth.pulse]
 
 Plain functions on the tables of `sonic_bullet.render.tables`, called by the stages of the run time. Triangles are
-looked up only for rows that strike or rub: each stage calls `touch` for those it needs.
+looked up only for rows with a strike or friction: each stage calls `touch` for those it needs.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -25,11 +25,10 @@ SIZELESS_M = 0.1
 
 @njit(nogil=True, error_model="numpy")
 def touch(rows, r, bodies, faces, nodes):
-    """Face, weights and curvature of row r on either body: its fields face, barycentric, curvature_per_m. Nothing where
-    they are known already.
+    """Find face, weights and curvature of row r on either body: its fields face, barycentric, curvature_per_m.
 
-    Where the contact's normal leans more than 20° from the face's, an edge or corner is touched: its curvature is the
-    body's edge_per_m.
+    Nothing is done where they are known already. Where the contact's normal leans more than 20° from the face's, an
+    edge or corner is touched: its curvature is the body's edge_per_m.
     """
     row = rows[r]
     if row.touched:
@@ -68,10 +67,10 @@ def touch(rows, r, bodies, faces, nodes):
 
 @njit(nogil=True, error_model="numpy")
 def add_push(rows, r, side, factor, bodies, faces, shapes, out):
-    """Add factor·Uᵀj of row r on the body of a side to out (columns,): the shapes, linear in the triangle, times the
-    row's push in N·s (with factor 1: N·s/√kg). `touch` the row first.
+    """Add factor·Uᵀj of row r on the body of a side to out (columns,).
 
-    shapes: flat float32, see BODY.shape_at. out may be longer than the body's columns.
+    Uᵀj: the shapes, linear in the triangle, times the row's impulse in N·s (with factor 1: N·s/√kg). `touch` the row
+    first. shapes: flat float32, see BODY.shape_at. out may be longer than the body's columns.
     """
     row = rows[r]
     body = bodies[row.body[side]]
@@ -94,14 +93,15 @@ def add_push(rows, r, side, factor, bodies, faces, shapes, out):
 
 @njit(nogil=True, error_model="numpy")
 def contact_modulus(low_pa, high_pa):
-    """E* in Pa of two moduli E/(1-ν²); infinite where both are rigid partners."""
+    """Compute E* in Pa of two moduli E/(1-ν²); infinite where both are rigid partners."""
     return 1 / (1 / low_pa + 1 / high_pa)
 
 
 @njit(nogil=True, error_model="numpy")
 def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
-    """m* in kg of two bodies, 0 where neither moves. quaternion (b, 4) of all; levers from their centres to the contact
-    and normal (3,), in the world.
+    """Compute m* in kg of two bodies, 0 where neither moves.
+
+    quaternion (b, 4) of all; levers from their centres to the contact and normal (3,), in the world.
     """
     mobility, n = 0.0, normal
     for side in range(2):
@@ -128,10 +128,10 @@ def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
 
 @njit(nogil=True, error_model="numpy")
 def flat_area_m2(bodies, low, high, spread_m, curvature_per_m, least_share):
-    """Area of a flat contact of two bodies, 0 where it is curved: the disc with the spread of the manifold's points.
+    """Compute the area of a flat contact of two bodies, 0 where it is curved: the disc with the points' spread.
 
     spread_m: root of Σ w·|p - Σ w·p|² of the points p under loads w of sum 1. least_share: of the smaller body's size,
-    below which no flat contact's radius is taken to be.
+    least radius of a flat contact.
     """
     size = np.inf
     for side in range(2):

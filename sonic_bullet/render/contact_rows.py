@@ -1,4 +1,4 @@
-"""Contacts of a step as both bodies of each pair see them, and the loads that they add to the pairs' histories.
+"""Contacts of a step in the frames of both bodies of each pair, and their loads in the pairs' histories.
 
     CONTACT (k,) -> orient: ROW (k,), turned onto the pair's lower body, sorted by pair, as they came within it
         -> enter_loads: PAIR, found by its key or begun anew; the newest load enters, the oldest leaves
@@ -6,7 +6,7 @@
 
 A pair keeps its place in the PAIR table as long as it touches: `active` (places) lists those in use, sorted by key, and
 `free` the others, the next one to be taken last; counts (2,): how many of both. Python makes room before it calls: for
-the active pairs and all that the steps at hand name. Nothing hangs on which place a pair has.
+the active pairs and all that the steps at hand name. No result depends on which place a pair has.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -21,8 +21,9 @@ from sonic_bullet.synth.strikes import NOW, SPAN
 
 @njit(nogil=True, error_model="numpy")
 def orient(contacts, quaternion, rows):
-    """Turn the contacts (k,) of a step onto the lower body of each pair: rows (k,), sorted by key, stably. quaternion
-    (b, 4): of the bodies in that step.
+    """Turn the contacts (k,) of a step onto the lower body of each pair: rows (k,), sorted by key, stably.
+
+    quaternion (b, 4): of the bodies in that step.
     """
     count = len(contacts)
     key, order, other = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
@@ -84,8 +85,9 @@ def _turn(contact, quaternion, turn, row):
 
 @njit(nogil=True, error_model="numpy")
 def enter_loads(rows, start, stop, dt_s, pairs, active, counts, free):
-    """The loads of rows start … stop - 1, one step's, enter the histories, which are one step older then. Pairs without
-    load in all of their history and without a voice (rubs) leave.
+    """Enter the loads of rows start … stop - 1, one step's, into the histories, which are shifted by a step.
+
+    Pairs without load in all of their history and without friction (rubs) leave.
     """
     merged = np.empty(counts[0] + stop - start, np.int64)
     i, r, kept = 0, start, 0
@@ -124,7 +126,7 @@ def enter_loads(rows, start, stop, dt_s, pairs, active, counts, free):
 
 @njit(nogil=True, error_model="numpy")
 def _begin(pair, row):
-    """A place for the pair of a row: no load so far, no voice."""
+    """Reset a place for the pair of a row: no load so far, no friction."""
     pair.key = row.key
     pair.rubs, pair.gains, pair.load_n = 0, 0, 0.0
     for side in range(2):
@@ -137,8 +139,9 @@ def _begin(pair, row):
 
 @njit(nogil=True, error_model="numpy")
 def opening(force, column):
-    """Opening of the load at a column: the best of the windows of SPAN steps around it, cut where the future is not
-    known.
+    """Compute the opening of the load at a column: the best of the windows of SPAN steps around it.
+
+    Windows are cut where the future is not known.
     """
     best = 0.0
     if force[column] > 0:

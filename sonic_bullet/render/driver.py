@@ -1,14 +1,14 @@
-"""The run time's driver: physics steps in, samples out, all stages in one compiled call.
+"""Driver of the run time: physics steps in, samples out, all stages in one compiled call.
 
     CONTACT rows, poses of a step -> take: ROW, load histories, into a window of SPAN steps
         -> excite: PULSE (strikes), drives (friction) of the step LOOKAHEAD before
-        -> settle: contacts that are held, and bodies whose poles they change, which Python makes (supports.py)
+        -> settle: contact patches, and bodies whose poles they change, which Python computes (supports.py)
         -> ring: modes and translations of all bodies -> source (W, b, n), pushed (b, 3, n)
         -> hear: through the air to the microphones; other sensors sum their weight set over the bodies
 
-Live listening is this driver with one step, a replay the same with many: what is made of a step hangs on nothing else.
-It stops before a step for which a table is too small, having changed nothing of it; whoever called enlarges the table
-and calls again. Sums in a fixed order: rows as they came, pairs by key, bodies by index.
+Live listening is this driver with one step, a replay the same with many: the result of a step depends on nothing else.
+It stops before a step for which a table is too small, having changed nothing of it; the caller enlarges the table and
+calls again. Sums in a fixed order: rows as they came, pairs by key, bodies by index.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -34,11 +34,10 @@ from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
 
 TO_GROW, PAUSED, BROKEN, TO_SETTLE = -1, -2, -3, -4
-"""Why the driver came back early: a table is too small; asked to stop before `hear`; what must not happen, a sum that
-is no number or a strike without a place; poles are to be made. Else it is DONE, or what `path_kernel.hear` said.
-"""
+"""Why the driver returned early: a table is too small; asked to stop before `hear`; an error (a sum that is not finite
+or a strike without a place); poles are to be computed. Else it is DONE, or the result of `path_kernel.hear`."""
 ANEW, RINGS, EXCITED = 0, 1, 2
-"""How far the first step is: nothing is done; it rings, and is to be heard; its pulses and drives are there."""
+"""Progress of the first step: nothing is done; it rings, and `hear` is next; its pulses and drives are there."""
 STEP = np.dtype(
     [
         ("dt_s", "f8"),  # of the step taken in
@@ -53,7 +52,7 @@ STEP = np.dtype(
     ],
     align=True,
 )
-"""A physics step as the driver is told of it: what is taken in, and when what is rendered then lies."""
+"""A physics step for the driver: what is taken in, and the time of what is rendered then."""
 STEP_LAYOUT = Struct("4d4q3dq")
 """STEP, field by field: packing a row so is ten times as fast as setting its fields."""
 assert STEP_LAYOUT.size == STEP.itemsize
@@ -61,7 +60,7 @@ assert STEP_LAYOUT.size == STEP.itemsize
 
 @njit(nogil=True, error_model="numpy")
 def aligned(size):  # pragma: no cover - compiled
-    """(size,) numbers that begin where a vector register does."""
+    """Allocate (size,) numbers that begin where a vector register does."""
     raw = np.empty(size + LANES)
     skip = (-(raw.ctypes.data // 8)) % LANES
     return raw[skip : skip + size]
@@ -95,7 +94,7 @@ def excite(
     frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, force, gain0, gain1, direction0, direction1,
     drive_body, drive_slot,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """Strikes and friction of step ``number``: how many pulses and drives there are of it."""
+    """Find strikes and friction of step ``number``; return the numbers of its pulses and drives."""
     here, there = window[number % SPAN], window[(number + 1) % SPAN]
     known = np.empty((SPAN, 2), np.int64)
     for j in range(SPAN):
@@ -128,7 +127,7 @@ def settle(
     number, window, rows, pairs, active, counts, held, stand, credit_s, bodies, bank_body, ringing, law, z, driven,
     pulses, found, drive_body, drives,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """What carries whom in step ``number``: how many bodies' poles are to be made."""
+    """Update the support state of step ``number``; return how many bodies' poles are to be computed."""
     here = window[number % SPAN]
     hold_contacts(pairs, active, counts[0], held, stand, bodies, rows, here.row[0], here.row[1], here.dt_s)
     count_lifted(stand, bank_body, ringing, law, z, driven)
@@ -143,8 +142,9 @@ def ring(
     weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight, pass_sound, passed, strikes,
     phasors, free_strikes, hertz, source, pushed, sounds,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """The step's pulses and drives on the bank: source (W, b, n or more) and pushed (b, 3, n or more). False where a
-    pulse found no place.
+    """Apply the step's pulses and drives to the bank: source (W, b, n or more) and pushed (b, 3, n or more).
+
+    False where a pulse found no place.
     """
     entered = enter_pulses(
         pulses, found, push, step.begin_s, step.after_s, step.sample, sr, bank_body, law, ringing, strikes, phasors,
@@ -164,8 +164,9 @@ def ring(
 
 @njit(nogil=True, error_model="numpy")
 def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - compiled
-    """What sensors that read modes by themselves (reads (c,): their weight set, 0 for a microphone) make of a step,
-    apart 1: of each body of it. False where that is no number.
+    """Compute a step's signal at sensors that read modes themselves; False where it is not finite.
+
+    reads (c,): their weight set, 0 for a microphone. apart 1: of each body of it.
     """
     channels = len(reads)
     for c in range(channels):
@@ -194,14 +195,22 @@ def advance_steps(  # noqa: PLR0911 - one return a reason to come back
     passed, strikes, phasors, free_strikes, hertz, source, pushed, sounds, microphone_m, samples_per_m, sources, places,
     lines, memory, taps, reads, apart, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """Steps ``first`` … of the table into out (channels, samples of all of them): how many are done, why it came back,
-    and how many pulses and drives the last one has.
+    """Render steps ``first`` … of the table into out (channels, samples of all of them).
 
-    taken: number of the first step of the table; start: sample of out's first. contacts: of all steps; position (k, b,
-    3), quaternion (k, b, 4), teleported (k, b). pressure (microphones, as out). pause: come back before the first step
-    is heard; resume: how far that step is; found, drives: its pulses and drives, where it is EXCITED. credit_s (1,),
-    (0,) where nothing supports. apart 1: out is (bodies·channels, …)
-    and pressure (bodies·microphones, …), body by body, nothing summed.
+    Returns how many are done, why it returned, and how many pulses and drives the last one has.
+
+    Parameters
+    ----------
+    taken : number of the first step of the table
+    start : sample of out's first
+    contacts : of all steps
+    position, quaternion, teleported : (k, b, 3), (k, b, 4), (k, b)
+    pressure : (microphones, as out)
+    pause : return before `hear` of the first step
+    resume : progress of the first step
+    found, drives : its pulses and drives, where it is EXCITED
+    credit_s : (1,), (0,) where nothing supports
+    apart : 1: out is (bodies·channels, …) and pressure (bodies·microphones, …), body by body, nothing summed
     """
     done = 0
     for i in range(first, len(steps)):
@@ -260,8 +269,9 @@ def finish(
     number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, samples_per_m, sources,
     places, lines, memory, taps, reads, apart, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
-    """Step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``; why
-    not, where it cannot be.
+    """Write step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``.
+
+    Returns DONE, or what is in the way.
     """
     here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
     status = hear(

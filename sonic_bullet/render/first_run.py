@@ -1,7 +1,7 @@
-"""The run time's machine code, made before the first step: where none is kept, by two processes side by side.
+"""Machine code of the run time, made before the first step: where none is cached, by two processes.
 
-arguments of driver.advance_steps -> types of those of its stages -> each stage written by one of the two
-    -> the driver: linked with them, optimised, kept
+arguments of driver.advance_steps -> types of those of its stages -> each stage compiled by one of the two
+    -> the driver: linked with them, optimised, cached
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.render import driver
 
 STAGES = (driver.excite, driver.ring, driver.finish, driver.take, driver.settle)
-"""Those that take longest first. Whatever types they are given, the driver has those compiled that it needs."""
+"""Stages, the slowest to compile first. Whatever types they get here, the driver compiles those that it needs."""
 SAMPLES = types.Array(types.float64, 1, "C")
 INNER = {
     **dict.fromkeys(("slot", "number", "quench", "found", "drives", "start"), types.int64),
@@ -33,7 +33,7 @@ OF_A_STEP = ("position", "quaternion", "teleported")
 
 
 def make_driver(arguments: Sequence[Any]) -> None:
-    """Have the driver's machine code for such arguments."""
+    """Load or compile the driver's machine code for such arguments."""
     kinds = tuple(numba.typeof(one) for one in arguments)
     with show_stage("machine code of the run time"):
         with suppress(Exception):  # a numba whose inner parts moved: it is compiled by one process
@@ -49,7 +49,7 @@ def _make_stages(kinds: tuple[Any, ...]) -> None:
     process = os.getpid()
 
     def do(stage: Any) -> bytes | None:
-        """The stage, where it is for the first process; what that one writes itself it has."""
+        """Compile a stage; return its code to the first process, which has its own."""
         here, stage_kinds = os.getpid() == process, stage_types(stage, kinds)
         if not here:
             name_apart()
@@ -62,7 +62,7 @@ def _make_stages(kinds: tuple[Any, ...]) -> None:
 
 
 def stage_types(stage: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Types of a stage's arguments where the driver's have the types ``kinds``."""
+    """Return the types of a stage's arguments where the driver's have the types ``kinds``."""
     known = dict(zip(_names(driver.advance_steps.py_func), kinds, strict=True))
     known |= INNER | {"step": known["steps"].dtype}
     if stage is driver.take:

@@ -3,10 +3,11 @@
     PAIR.support_n, rows of the next step -> loads and speeds at both ends -> synth.surface_kernel -> f - N per voice
         -> drives (Uᵀ on either body's columns and direction, per newton, at the step's start and end)
 
-What a step starts with is what the step before ended with (loads, speeds, gains, direction are carried in PAIR and in
-the gains), so nothing jumps at the step rate. A manifold's points flicker from step to step; the gains follow them with
-a time constant of `FOLLOW_S`. A pair has a voice (PAIR.rubs) while its support lasts; a voice that neither sweeps nor
-still oscillates costs nothing: no force, no gains, no search of triangles. Sides 0 = lower body and 1 = higher.
+A step starts with what the step before ended with (loads, speeds, gains, direction are carried in PAIR and in the
+gains), so nothing jumps at the step rate. A manifold's points flicker from step to step; the gains follow them with a
+time constant of `FOLLOW_S`. A pair has a contact oscillator, its voice (PAIR.rubs), while its support lasts. One that
+neither sweeps nor oscillates costs nothing: no force, no gains, no search of triangles. Sides 0 = lower body and 1 =
+higher.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -23,7 +24,7 @@ from sonic_bullet.synth.surface_kernel import FASTEST_M_S, contact_radius_m, dam
 
 FOLLOW_S = 0.02
 FRICTION_FLAT = 0.25
-"""Radius, as a share of the smaller body's size, of the least area on which a flat face rubs."""
+"""Radius, as a fraction of the smaller body's size, of the least area of friction of a flat face."""
 SWEEP_FLOOR_M_S = 2e-4
 """Slower sweeps make nothing audible: even waves of 10 µm pass at 20 Hz.
 
@@ -32,7 +33,7 @@ Solvers let bodies at rest creep about as fast.
 
 
 def surface_seed(seed: int, body: Body) -> int:
-    """BODY.surface_seed: a number for a body's surface, the same in every run, of the seed and of who the body is."""
+    """Compute BODY.surface_seed from the seed and the body's id: the same in every run."""
     who = np.random.SeedSequence(
         [seed & 0xFFFFFFFF, body.body_id & 0xFFFFFFFF, (body.link + 1) & 0xFFFFFFFF, body.epoch]
     )
@@ -44,16 +45,24 @@ def advance_friction(
     pairs, active, count, bodies, rows, row_count, faces, nodes, shapes, quaternion, dt_s, x, sr, gain, voices,
     force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
 ):  # fmt: skip
-    """The force signals of one step, a drive each; returns their number d.
+    """Compute the force signals of one step, a drive each; return their number d.
 
-    pairs: table of PAIR, support_n of this step filled in; active[:count]: slots in use, by rising key; bodies, faces,
-    nodes, shapes: the bodies' tables. rows[:row_count]: ROW of the step that follows, by key and arrival; quaternion
-    (b, 4): its orientations. dt_s: of this step; x (n,): share of it of each sample; sr: float, in Hz. gain (slots, 2,
-    columns): Uᵀ per newton of either side, carried, known where PAIR.gains says so. voices: scratch of VOICE, and room
-    for as many drives as pairs are active:
-    force (d, n) in newton: on the lower body along the direction, its negative on the higher. Linear between the step's
-    ends: gain0, gain1 (d, 2, columns): Uᵀ on the columns of both bodies a newton (what lies beyond a body's columns is
-    not written); direction0, direction1 (d, 3) on the lower body, world. drive_body (d, 2), drive_slot (d,).
+    Parameters
+    ----------
+    pairs : table of PAIR, support_n of this step filled in
+    active : active[:count] slots in use, by rising key
+    bodies, faces, nodes, shapes : the bodies' tables
+    rows : rows[:row_count] ROW of the step that follows, by key and arrival
+    quaternion : (b, 4) orientations of the step that follows
+    dt_s : of this step
+    x : (n,) position of each sample in the step, 0 … 1
+    sr : float, in Hz
+    gain : (slots, 2, columns) Uᵀ per newton of either side, carried, known where PAIR.gains says so
+    voices : scratch of VOICE, and room for as many drives as pairs are active
+    force : (d, n) in newton, on the lower body along the direction, its negative on the higher
+    gain0, gain1 : (d, 2, columns) Uᵀ on both bodies' columns a newton at the step's ends, linear between
+    direction0, direction1 : (d, 3) on the lower body, world, at the step's ends
+    drive_body, drive_slot : (d, 2), (d,)
     """
     follow = 1.0 - np.exp(-dt_s / FOLLOW_S)
     moving, drives, n = 0, 0, len(x)
@@ -99,8 +108,9 @@ def advance_friction(
 
 @njit(nogil=True, error_model="numpy")
 def _voices(pairs, active, count, bodies, rows, row_count, follow, voices):
-    """The voices that move or begin in this step, into ``voices``; returns their number. All pairs move on to the
-    step's end.
+    """Collect the voices that move or begin in this step in ``voices``; return their number.
+
+    All pairs advance to the step's end.
     """
     found, row = 0, 0
     for i in range(count):
@@ -142,8 +152,9 @@ def _voices(pairs, active, count, bodies, rows, row_count, follow, voices):
 
 @njit(nogil=True, error_model="numpy")
 def _aim(rows, begin, end, voice):
-    """Where a pair is heading by its rows: its voice's sweep and direction at the step's end, its rows and their load.
-    None where the manifold does not carry load.
+    """Set a voice's sweep and direction at the step's end, its rows and their load, from its pair's rows.
+
+    No rows where the manifold does not carry load.
     """
     total, along_x, along_y, along_z, sweep_low, sweep_high = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for r in range(begin, end):
@@ -169,8 +180,9 @@ def _aim(rows, begin, end, voice):
 
 @njit(nogil=True, error_model="numpy")
 def _begin(pair, bodies, rows, begin, end, faces, nodes, quaternion):
-    """Constants of a voice, by the manifold with which it begins: effective mass, curvature where the load is highest,
-    spread. Without rows: as two flats of the bodies' size.
+    """Set the constants of a voice by the manifold with which it begins: effective mass, curvature, spread.
+
+    The curvature is that where the load is highest. Without rows: as two flats of the bodies' size.
     """
     low, high = pair.body
     pair.modulus_pa = contact_modulus(bodies[low].modulus_pa, bodies[high].modulus_pa)

@@ -1,9 +1,9 @@
-"""Who is in a step, who comes, and who is gone: bodies of the log, in the order in which the tables hold them.
+"""Body lifetime: which bodies of the log the tables hold, which come, and which leave.
 
     Step.body -> further bodies, silent at first; those no longer in it ring on at their last pose
         -> once they are silent, and nothing under way names them: out of all tables
 
-Which bodies the tables hold changes no bit: they are summed in the order of their indices, and who is silent adds
+Which bodies the tables hold changes no bit: they are summed in the order of their indices, and a silent body adds
 nothing.
 """
 
@@ -26,8 +26,9 @@ Records = Sequence[Body] | Mapping[int, Body]
 
 
 def admit(setup: Setup, state: State, step: Step, bodies: Records) -> None:
-    """Let the bodies of a step that is to be taken in be those present. Raises LogError where one comes again, or after
-    one of a higher index.
+    """Set the bodies present to those of a step that is to be taken in.
+
+    Raises LogError where a body comes again, or after one of a higher index.
     """
     if np.array_equal(step.body, state.present):
         state.present = state.body if np.array_equal(step.body, state.body) else step.body
@@ -46,14 +47,15 @@ def admit(setup: Setup, state: State, step: Step, bodies: Records) -> None:
 
 
 def _name(state: State, body: Array) -> None:
-    """The tables' bodies (b,) by index in the log; `first_bodies` itself where they are the first."""
+    """Set the tables' bodies (b,) by index in the log; `first_bodies` itself where they are the first."""
     first = first_bodies(len(body))
     state.body = first if np.array_equal(body, first) else body
 
 
 def in_tables(state: State, contacts: Array, poses: tuple[Array, ...]) -> tuple[Array, tuple[Array, ...]]:
-    """Contact rows (k,) and poses of steps (s, p, ·) of the bodies present, by the tables' numbers: (s, b, ·), who is
-    gone is where it was.
+    """Translate contact rows (k,) and poses (s, p, ·) of the bodies present to the tables' numbers: (s, b, ·).
+
+    A body that has left keeps its pose.
     """
     if state.mapped:
         contacts = contacts.copy()
@@ -68,7 +70,7 @@ def in_tables(state: State, contacts: Array, poses: tuple[Array, ...]) -> tuple[
 
 
 def _filled(old: Array, here: Array, at: Array) -> Array:
-    """(s, b, ·): old (b, ·) for each step, with here (s, p, ·) at the places (p,)."""
+    """Repeat old (b, ·) for each step, with here (s, p, ·) at the places (p,): (s, b, ·)."""
     whole = np.repeat(old[None], len(here), axis=0)
     whole[:, at] = here
     whole.setflags(write=False)
@@ -76,7 +78,7 @@ def _filled(old: Array, here: Array, at: Array) -> Array:
 
 
 def release(state: State) -> None:
-    """Let those who are gone leave the tables, as far as they are silent and nothing under way names them."""
+    """Remove bodies that have left from the tables, where they are silent and nothing under way names them."""
     stays = np.isin(state.body, state.present)
     stays |= ~(bank.silent(state.ringing) & path.silent(state.path, state.travelling))
     stays[state.pairs.pair["body"][state.pairs.active[: state.pairs.count[0]]]] = True
@@ -90,9 +92,10 @@ def release(state: State) -> None:
 
 
 def lifted(state: State, who: Array | None = None) -> dict[str, tuple[int, int]]:
-    """By name of each body so far: steps that it rang on contacts, and at most how many of them were beyond the
-    contacts' law: Σ|F| of what rings, each mode where it lifts first, exceeded the load. who: of the tables, None: all
-    of them, beside those who left.
+    """Count, by name of each body so far, the steps that it rang on contacts, and those with contact separation.
+
+    The second is an upper bound: Σ|F| of the modes, each where it separates first, exceeded the load. who: of the
+    tables, None: all of them, beside those that have left.
     """
     found = dict(state.lifted)
     for b in range(len(state.stand)) if who is None else who.tolist():
@@ -104,7 +107,7 @@ def lifted(state: State, who: Array | None = None) -> dict[str, tuple[int, int]]
 
 
 def subset(state: State, keep: Array) -> None:
-    """The bodies (k,) of ascending numbers alone; nothing under way names another."""
+    """Keep only the bodies ``keep`` (k,), ascending; nothing under way names another."""
     number = np.full(len(state.body), -1)
     number[keep] = np.arange(len(keep))
     state.resonators = tuple(state.resonators[i] for i in keep)

@@ -1,16 +1,15 @@
-"""What sounds besides the modes of bodies whose material brings a residual: lines in the bank, grains of noise for
-strikes and rubbing.
+"""Residuals: lines in the bank, and grains of noise for strikes and friction, of bodies whose material has one.
 
-    tables of a step -> ForcePulse, Drive: strikes and friction by value, for whoever asks; the run time does without
+    tables of a step -> ForcePulse, Drive: strikes and friction by value, for observers; the run time does without
     Resonator + Residual -> ResidualVoice: lines as further modes (each struck as the mode it follows is),
         a voice for the noise (residual.grains)
     ForcePulse -> a² of each pair of modes, at each sensor's weights -> Grain
         level, place and pulse as the modes have them
     Drive -> sections of force -> Grain
 
-Lines weigh i·c/a times what their mode weighs: a quarter turn away, so that at one frequency powers add, as a residual
-of powers says. Where a mode's frequency or decay hangs on its level, so do those of the lines that follow it. All is in
-the bank's units (Pa·m, or what another sensor reads), before the sound path; no gain of its own.
+A line's weight is i·c/a times that of its mode: a quarter turn away, so that at one frequency powers add, as a residual
+of powers requires. Where a mode's frequency or decay depends on its level, so do those of the lines that follow it. All
+is in the bank's units (Pa·m, or what another sensor reads), before the sound path; no gain of its own.
 """
 
 from __future__ import annotations
@@ -40,11 +39,17 @@ Rubs = Mapping[tuple[int, int, int], Rubbed]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForcePulse:
-    """One strike. low, high: body indices. start_s: after the start of the step being rendered. length_s: of the pulse.
-    flat: half-sine, not Hertz'.
+    """One strike.
 
-    impulse_n_s (3,): world, on low. modes_low, modes_high (m,): Uᵀj of the whole impulse in N·s/√kg.
-    share: of all these, what the pulse hands over (synth.pulse.compliance).
+    Attributes
+    ----------
+    low, high : body indices
+    start_s : after the start of the step being rendered
+    length_s : of the pulse
+    flat : half-sine, not Hertz'
+    impulse_n_s : (3,) world, on low
+    modes_low, modes_high : (m,) Uᵀj of the whole impulse in N·s/√kg
+    share : transmitted fraction of all these (synth.pulse.compliance)
     """
 
     low: int
@@ -60,10 +65,13 @@ class ForcePulse:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A force signal on one pair. force_n (n,): on the lower body along the direction, its negative on the higher.
+    """A force signal on one pair, linear between the step's ends.
 
-    Linear between the step's ends: gain0, gain1: Uᵀ on the modes of both bodies, each (m,) a newton; direction0,
-    direction1 (3,) on the lower body, world.
+    Attributes
+    ----------
+    force_n : (n,) on the lower body along the direction, its negative on the higher
+    gain0, gain1 : Uᵀ on the modes of both bodies, each (m,) a newton
+    direction0, direction1 : (3,) on the lower body, world
     """
 
     low: int
@@ -78,7 +86,7 @@ class Drive:
 def pulses_of(
     scratch: StepScratch, found: int, modes: Array, begin_s: float, after_s: float
 ) -> list[tuple[float, ForcePulse]]:
-    """The step's strikes, each with the time from which its start counts. modes (b,): of each body.
+    """Return the step's strikes, each with the time from which its start counts. modes (b,): of each body.
 
     begin_s, after_s: start of the step and of the one after it, for which a strike may have been found already.
     """
@@ -94,7 +102,7 @@ def pulses_of(
 
 
 def drives_of(scratch: StepScratch, drives: int, modes: Array, samples: int) -> list[Drive]:
-    """The step's friction. modes (b,): of each body; samples: of the step."""
+    """Return the step's friction. modes (b,): of each body; samples: of the step."""
     force = scratch.force[: len(scratch.slot) * samples].reshape(len(scratch.slot), samples)
     found = []
     for d in range(drives):
@@ -112,8 +120,11 @@ def drives_of(scratch: StepScratch, drives: int, modes: Array, samples: int) -> 
 class ResidualVoice:
     """One body's residual.
 
-    lines: for the bank; follows (l,): the resonator's mode that each is struck as. group (m,): the voice's pair of each
-    mode, or -1.
+    Attributes
+    ----------
+    lines : for the bank
+    follows : (l,) the resonator's mode that each is struck as
+    group : (m,) the voice's pair of each mode, or -1
     """
 
     voice: Voice
@@ -123,7 +134,7 @@ class ResidualVoice:
 
 
 def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoice | None:
-    """A body's residual as it is played, or None where it has none, or no modes to follow."""
+    """Build a body's residual for playback, or None where it has none, or no modes to follow."""
     material, model = resonator.body.material, resonator.body.model
     if (
         material is None
@@ -164,8 +175,9 @@ def build_residual_voice(resonator: Resonator, sr: int, air: Air) -> ResidualVoi
 
 @WhileAlive
 def _voice(model: ModalModel, residual: Residual, air: Air, sr: int) -> Voice:
-    """A voice, once for bodies that share residual and model (records are compared by identity); pairs by the modes'
-    mean square over the surface.
+    """Build a voice, once for bodies that share residual and model (records are compared by identity).
+
+    Pairs are formed by the modes' mean square over the surface.
     """
     s = build_resonator(Body(0, -1, 0, "", 0.0, np.zeros((3, 3)), model=model), (), sr, air)
     order = np.argsort(s.omega_rad_s, kind="stable")
@@ -183,12 +195,12 @@ def _pulse_table(flat: bool) -> tuple[Array, Array]:
 
 
 def pulse(f_tau: Array, flat: bool) -> Array:
-    """|F̂| of a force pulse at products fτ (k,), relative to 0 Hz."""
+    """Interpolate |F̂| of a force pulse at products fτ (k,), relative to 0 Hz."""
     return np.asarray(np.interp(f_tau, *_pulse_table(flat), right=0.0))
 
 
 def struck_power(voice: ResidualVoice, weight: Array, push: Array) -> Array:
-    """a² (p,) at the onset of the pairs' modes, for Uᵀj (m,) of an impulse and the modes' weights (m,)."""
+    """Compute a² (p,) at the onset of the pairs' modes, for Uᵀj (m,) of an impulse and the modes' weights (m,)."""
     used = voice.group >= 0
     return np.bincount(voice.group[used], (np.abs(weight * push) ** 2)[used], len(voice.voice.pairs.target_hz))
 
@@ -202,7 +214,7 @@ def impact_grains(
     earliest: int,
     seed: int,
 ) -> list[Grain]:
-    """What one strike adds on both bodies."""
+    """Make the grains of one strike on both bodies."""
     start = max((step_start_s + impact.start_s) * sr, float(earliest))
     first, grains = int(np.ceil(start)), []
     for body, push in ((impact.low, impact.modes_low), (impact.high, impact.modes_high)):
@@ -231,9 +243,9 @@ def friction_grains(
     n: int,
     seed: int,
 ) -> tuple[list[Grain], Rubs]:
-    """Grains of the sections of rubbing that end within the n samples from ``at`` on, and what goes on afterwards.
+    """Make the grains of friction sections that end within the n samples from ``at`` on; also return the open sections.
 
-    number_of (b,): of each body in the log, by which its partners' noise is told apart.
+    number_of (b,): of each body in the log, which makes its partners' noise differ.
     """
     driven = {(d.low, d.high, side): d for d in drives for side in (0, 1) if voice[(d.low, d.high)[side]] is not None}
     grains, kept = [], {}
@@ -260,7 +272,7 @@ def friction_grains(
 
 
 def with_lines(resonator: Resonator, voice: ResidualVoice | None) -> ModeSet:
-    """What the bank plays of a body: its modes, then the lines of its residual."""
+    """Return a body's modes for the bank, followed by the lines of its residual."""
     s = resonator
     modes = ModeSet(
         s.omega_rad_s, s.decay_per_s, s.weight, s.bend, s.damping_growth, s.damping_growth_power, s.translation

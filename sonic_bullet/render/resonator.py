@@ -1,11 +1,11 @@
-"""A body as the synthesizer plays it: its audible modes and their weights at each sensor.
+"""A body for the synthesizer: its audible modes and their weights at each sensor.
 
     Body (records) + sensors + rate + air -> Resonator
 
-A rigid body that is pushed sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U is heard as p
-= ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is the impulse
-response of a mode with decay w and frequency w, to the letter (synth.bank), so the three translations of a body are
-three more modes of the bank: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V
+A rigid body that is accelerated sounds too: acceleration noise. A sphere of radius a whose velocity jumps by U radiates
+p = ρ₀c U (a/r) cosθ e^{-wt}(cos wt - sin wt), w = c/a [Kirchhoff 1876; Koss, Alfredson 1973, eq. 9]. That is exactly
+the impulse response of a mode with decay w and frequency w (synth.bank), so the three translations of a body are three
+more modes of the bank: strikes are exact there too. At low frequency it is the compact law p = 3ρ₀V
 cosθ/(8πcr)·da/dt [Chadwick, Zheng, James 2012], whose coefficient K makes ρ₀ca = 2Kw²; unlike it, it does not grow
 without bound where the body is no longer small.
 """
@@ -27,18 +27,27 @@ from sonic_bullet.support import ContactSide, Moving
 from sonic_bullet.synth.bank import Translation, audible
 
 RIGID = ContactSide(np.inf, 0.3, 0.0, 0.0)
-"""Of a partner of which nobody said what it is made of."""
+"""Side of a partner of unknown material."""
 FASTEST_RIGID = 0.6
-"""Share of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer hangs on w."""
+"""Fraction of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer depends on
+w."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Resonator:
-    """omega_rad_s, decay_per_s (m,): with the air's damping, once. weight (w, m): complex, one row a weight set (row 0:
-    pressure at 1 m). bend, damping_growth (m,): of frequency per |z|², of decay by
-    (damping_growth·|z|)^damping_growth_power, None in a linear body. shape (v, 3, m) float32: audible modes only.
-    size_m: cube root of the volume. jerk_pa_s3: dipole coefficient [Chadwick 2012]. dropped: modes not played. moving,
-    side: what it yields where it is pushed, and what it is there.
+    """A body's audible modes at each sensor.
+
+    Attributes
+    ----------
+    omega_rad_s, decay_per_s : (m,) with the air's damping, once
+    weight : (w, m) complex, one row a weight set (row 0: pressure at 1 m)
+    shape : (v, 3, m) float32
+    size_m : cube root of the volume
+    translation : acceleration noise, dipole coefficient by [Chadwick 2012]
+    dropped : number of modes not played
+    moving, side : mobility where it is touched, and its elastic properties there
+    bend, damping_growth : (m,) of frequency per |z|², of decay by (damping_growth·|z|)^damping_growth_power
+        None in a linear body
     """
 
     body: Body
@@ -59,11 +68,12 @@ class Resonator:
 
     @property
     def mode_count(self) -> int:
+        """Number of audible modes."""
         return len(self.omega_rad_s)
 
 
 def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
-    """The sensors that read modes by themselves, one weight set each behind row 0 (which serves all microphones)."""
+    """Return the sensors that read modes themselves, one weight set each behind row 0, that of all microphones."""
     return tuple(sensor for sensor in sensors if not isinstance(sensor, Microphone))
 
 
@@ -71,8 +81,8 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
     The pressure weight of mode and microphone is the far-field map of `radiation.far_field`; a vibrometer reads
-    (φ(q)·n); the seed's plain sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by
-    -i/(1 + i d/ω).
+    (φ(q)·n); a plain modal sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i
+    d/ω).
     """
     model = body.model
     readers = weight_sets(sensors)
@@ -135,8 +145,13 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
 
 
 class _Played(NamedTuple):
-    """What bodies that share a model share. keep: which of its modes are audible; omega_rad_s, decay_per_s, pressure,
-    shape: see `Resonator`, of those; most: velocity at the surface of a mode with |z| = 1.
+    """What bodies that share a model share.
+
+    Attributes
+    ----------
+    keep : which of its modes are audible
+    omega_rad_s, decay_per_s, pressure, shape : see `Resonator`, of those
+    most : velocity at the surface of a mode with |z| = 1
     """
 
     keep: Array
@@ -151,7 +166,7 @@ class _Played(NamedTuple):
 
 @WhileAlive
 def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played:
-    """Once for all bodies that share a model and are held alike (records are compared by identity)."""
+    """Compute once what bodies that share a model and mounting share (records are compared by identity)."""
     pressure, extra = radiation_of(model, air)
     pressure, extra = np.sqrt(radiating_share(mounting)) * pressure, radiating_share(mounting) * extra
     omega0_squared = model.omega0_squared_per_s2
@@ -168,7 +183,7 @@ def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played
 
 
 def _translation(body: Body, sr: int, air: Air) -> Translation | None:
-    """The mode that each translation of a moving body is; its gain is the force along it, its weight Pa·m per N·s."""
+    """Return the mode of each translation of a moving body: gain is the force along it, weight Pa·m per N·s."""
     radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
     if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # the least of volumes have a radius of none, too
         return None

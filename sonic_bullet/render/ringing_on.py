@@ -1,9 +1,9 @@
-"""What still sounds after a run's last step: the same run time, without physics.
+"""Tail of a run: what still sounds after its last step, by the same run time without physics.
 
-    state at the end -> steps in which nobody moves or touches -> blocks -> until each channel is tail_db below its peak
+    state at the end -> steps without motion or contact -> blocks -> until each channel is tail_db below its peak
 
-Bodies lie where the last step left them, and their poles are those that they had there: who stood on something is
-damped as before. Nobody is struck or rubbed.
+Bodies stay where the last step left them, and keep the poles that they had there: a body at rest on another is damped
+as before. There are no strikes and no friction.
 """
 
 from __future__ import annotations
@@ -26,17 +26,16 @@ if TYPE_CHECKING:
     from sonic_bullet.render.synthesis_state import Setup, State
 
 TAIL_DB = -60.0
-"""Where a tail ends unless something else is asked for: the fall of level that reverberation times are told for
-[ISO 3382-1:2009, sec. 3.2]."""
+"""Default end of a tail: the fall of level that reverberation times are stated for [ISO 3382-1:2009, sec. 3.2]."""
 MOST_S = 10.0
 BLOCK_S = 0.1
-"""What is looked at once: longer than beats of neighbouring modes that a listener hears as one decay."""
+"""Length checked at once: longer than beats of neighbouring modes that a listener hears as one decay."""
 STEP_S = 1 / 240
 """Steps of a tail are no shorter: nothing happens in them."""
 
 
 def as_tail_db(tail_db: object, name: str = "tail_db") -> float | None:
-    """A tail's end in dB re the peak, below 0; None and 0: no tail. name: what errors call it. Raises AudioError."""
+    """Check a tail's end in dB re the peak, below 0; None and 0: no tail. Raises AudioError, which names ``name``."""
     if tail_db is None:
         return None
     remedy = "give at most 0: -60 ends it 60 dB below the peak, 0 leaves it out"
@@ -44,8 +43,9 @@ def as_tail_db(tail_db: object, name: str = "tail_db") -> float | None:
 
 
 def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
-    """Blocks (channels, n) of what sounds after the end of ``last``, the newest step taken in, for ever. ``state``
-    stays.
+    """Yield blocks (channels, n) of what sounds after the end of ``last``, the newest step taken in, for ever.
+
+    ``state`` is not changed.
     """
     from sonic_bullet.render.synthesizer import advance
 
@@ -61,8 +61,9 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
 
 
 def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, tail_db: float) -> KeptSound:
-    """The sound up to the end of ``last`` and what still sounds, until each channel is tail_db below its peak; at most
-    `MOST_S` longer.
+    """Extend the sound up to the end of ``last`` by its tail, until each channel is tail_db below its peak.
+
+    At most `MOST_S` longer.
     """
     if last is None or not len(setup.sensors):
         return sound
@@ -91,5 +92,5 @@ def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, t
 
 
 def _peak(block: Array) -> Array:
-    """(channels,) of (channels, n)."""
+    """Return the peaks (channels,) of (channels, n)."""
     return np.asarray(np.abs(block).max(axis=1, initial=0.0))

@@ -1,6 +1,6 @@
-"""Why a render is silent, read off its log: what a user would otherwise look for with a debugger.
+"""Reasons why a render is silent, read off its log, so that users need no debugger.
 
-samples + ContactLog -> silent? -> the first of: no microphone, no step, nothing added, moved by hand, nothing touched,
+samples + ContactLog -> silent? -> the first of: no microphone, no step, nothing added, teleported, nothing touched,
 only others touched,
                                    no audible mode, a vibrometer elsewhere, support at rest, not there yet
 """
@@ -25,7 +25,7 @@ from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.synth.strikes import SPAN
 
 BY_HAND = 0.5
-"""Share of its steps in which a body was set elsewhere by hand, from which on that is what moves it."""
+"""Fraction of its steps in which a body was teleported, from which on that is what moves it."""
 SLIDES_M_S = 1e-3
 """Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
 (synth.strikes).
@@ -35,7 +35,7 @@ UNTOUCHED = "touched by nobody, so silent"
 
 
 def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
-    """One note that says why (channels, n) samples are silent; none where they are not.
+    """Return one note that says why (channels, n) samples are silent; none where they are not.
 
     Silent: no channel, none but zeros, or no pressure above the threshold of hearing, 20 µPa.
     """
@@ -53,20 +53,21 @@ def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...
 
 
 def is_silent(samples: Array | KeptSound, log: ContactLog) -> bool:
-    """Whether nothing in (channels, n) samples can be heard: no pressure above the threshold of hearing, 20 µPa."""
+    """Return whether no pressure in (channels, n) samples is above the threshold of hearing, 20 µPa."""
     peaks = as_sound(samples).peaks()
     least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
     return not bool((peaks > least).any())
 
 
 def render_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
-    """What a user should read of a render: why it is silent, or which of its bodies are."""
+    """Return notes on a render: why it is silent, or which of its bodies are."""
     return silence_notes(samples, log) or body_notes(log)
 
 
 def body_notes(log: ContactLog) -> tuple[str, ...]:
-    """What of the bodies that were added is not heard, or not as it might be, each kind in one note: who was touched by
-    nobody, who has no mode in the band, who radiates by a simpler law.
+    """Return notes on added bodies that are silent or simplified, each kind in one note.
+
+    Kinds: not touched, no mode in the band, radiation by a simpler law.
     """
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
@@ -88,12 +89,12 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
 
 
 def can_sound(body: Body) -> bool:
-    """Whether it may ring or click: ground, which has no modes and never moves, makes no sound in any case."""
+    """Return whether a body may ring or click: ground, which has no modes and never moves, makes no sound."""
     return body.model is not None or body.mass_kg > 0
 
 
 def why_silent(log: ContactLog) -> str | None:
-    """The reason why a log has no sound, with its remedy, in one line; None where something in it should be heard."""
+    """Return why a log has no sound, with a remedy, in one line; None where something in it should sound."""
     if not log.sensors:
         return "there is no microphone; give one, such as (0, -1, 0.5)"
     if not log.steps:
@@ -116,7 +117,7 @@ def why_silent(log: ContactLog) -> str | None:
 
 
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
-    """Why none of the added bodies met anybody."""
+    """Explain why none of the added bodies touched another."""
     named = _names(body for body, one in zip(log.bodies, added, strict=True) if one)
     moved = np.zeros(len(added))
     lived = np.zeros(len(added))
@@ -137,7 +138,7 @@ def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
 
 
 def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
-    """Why no sensor can hear any of the bodies that were touched."""
+    """Explain why no sensor can hear any of the bodies that were touched."""
     readers = [sensor for sensor in log.sensors if isinstance(sensor, Vibrometer)]
     ringing = [resonator for resonator in resonators if resonator.mode_count]
     if len(readers) == len(log.sensors):
@@ -176,9 +177,7 @@ def _read_place(sensor: Vibrometer, log: ContactLog) -> str:
 
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
-    """Whether all that happens is that bodies lie: nothing came faster than gravity brings it while it settles, nothing
-    slid or rolled.
-    """
+    """Detect that bodies only rest: nothing approached faster than gravity in settling, nothing slid or rolled."""
     step = log.step[mine]
     fall = np.concatenate([block.step["gravity_m_s2"] * block.step["dt_s"][:, None] for block in log.blocks()])[step]
     # as synth.strikes has it
@@ -197,7 +196,7 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
 
 
 def _arrives_late(log: ContactLog, mine: Array) -> str | None:
-    """Whether the sound of the first contact would come to every microphone only after the end."""
+    """Detect that the sound of the first contact would reach every microphone only after the end."""
     places = [sensor.position_m for sensor in log.sensors if isinstance(sensor, Microphone)]
     if len(places) < len(log.sensors):
         return None

@@ -1,8 +1,8 @@
 """Strikes of one physics step, from the pairs' loads and contact rows to force pulses on modes.
 
-    PAIR: load F - opening of F, over a rising edge -> STRIKE, with its share of up to three steps   [synth.strikes]
+    PAIR: load F - opening of F, over a rising edge -> STRIKE, with its fraction of up to three steps   [synth.strikes]
         + ROW of these steps -> impulse, normal, lever, approach; what of it has a cause
-        -> PULSE: start, length, impulse, share handed over; and Uᵀj on either body
+        -> PULSE: start, length, impulse, transmitted fraction; and Uᵀj on either body
 
 One pulse's rows of up to three steps, several points each, share its time history, so that the manifold's sum and
 moment, which are all that is reliable, are kept: Uᵀj is summed over the rows, each at its own point with its own
@@ -21,23 +21,22 @@ from sonic_bullet.synth.pulse import compliance, pulse_length
 from sonic_bullet.synth.strikes import NOW, SPAN
 
 STEEPEST = 10.0
-"""Most friction per normal force that a manifold which carries load may show: a contact that Bullet drops within a step
-keeps its friction.
+"""Most friction per normal force of a manifold that carries load: a contact that Bullet drops within a step keeps its
+friction.
 """
 STRUCK_FLAT = 0.02
-"""Radius, as a share of the smaller body's size, of the least area that a nearly flat impact touches."""
+"""Radius, as a fraction of the smaller body's size, of the least area that a nearly flat impact touches."""
 LEAST_JUMP_M_S = 1e-6
-"""An impact that changes the speed of its effective mass by less is passed over: a body of 10 cm sends 0 dB SPL to 1 m
-then.
-"""
+"""An impact that changes the speed of its effective mass by less is ignored: a body of 10 cm sends 0 dB SPL to 1 m
+then."""
 ROUNDS = 8
 """Bodies that an impact travels through in one physics step at most."""
 STEPS = SPAN - 1
 """Steps that one strike takes at most."""
 RECREATED = 3.0
-"""How many times its fixed point a bounce that gravity and the integration make again and again reaches: a point that
-bounces with restitution e on steps of dt stops losing speed at g·dt·e/(1-e); corners of bars, plates and boxes do up to
-2.8 times as much (Bullet, e 0.3 … 0.8, 1/60 … 1/1000 s).
+"""How many times its fixed point a bounce that gravity and the integration repeat reaches: a point that bounces with
+restitution e on steps of dt stops losing speed at g·dt·e/(1-e); corners of bars, plates and boxes do up to 2.8 times as
+much (Bullet, e 0.3 … 0.8, 1/60 … 1/1000 s).
 """
 
 STRIKE = np.dtype(
@@ -57,7 +56,7 @@ STRIKE = np.dtype(
     ],
     align=True,
 )
-"""A strike that is being looked at: one for each active pair at most."""
+"""A candidate strike: one for each active pair at most."""
 
 
 @njit(nogil=True, error_model="numpy")
@@ -84,17 +83,19 @@ def find_pulses(
     push,
     found,
 ):
-    """The strikes that begin ``ahead`` steps (0 or 1) after the one being rendered: into pulses and push (pulses, 2,
-    columns) from ``found`` on, their new number comes back. What they use of the loads is marked as used. Ask with
-    ahead = 0 first.
+    """Find the strikes that begin ``ahead`` steps (0 or 1) after the one being rendered.
 
-    number, dt_s, gravity_m_s2 (3,), quaternion (b, 4): of the step in which they begin. earliest_s: not after 0; a
-    strike is dated back that far at most, where the bodies overlap as the step starts. window (4, 2): rows of the step
-    being rendered and of the three after it, first and the one after the last. counts: as enter_loads has it.
-    frequency_hz: flat, see BODY.frequency_at; spectrum: synth.pulse.spectrum_table. strikes: scratch of STRIKE, one for
-    each active pair.
+    They are written to pulses and push (pulses, 2, columns) from ``found`` on; returns the new number. Loads that they
+    use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving volume) are skipped,
+    and those of which neither moves.
 
-    Pairs of which nothing can sound (no modes, no moving volume) are passed over, and those of which neither moves.
+    Parameters
+    ----------
+    number, dt_s, gravity_m_s2, quaternion : of the step in which they begin; (3,), (b, 4)
+    earliest_s : not after 0, how far a strike is dated back at most where the bodies overlap as the step starts
+    window : (4, 2) rows of the step being rendered and of the three after it, first and the one after the last
+    counts, frequency_hz, spectrum : as of enter_loads, BODY.frequency_at, synth.pulse.spectrum_table
+    strikes : scratch of STRIKE, one for each active pair
     """
     for i in range(counts[0]):
         pair = pairs[active[i]]
@@ -144,16 +145,15 @@ def find_pulses(
 
 @njit(nogil=True, error_model="numpy")
 def is_recreated(bodies, low, high, approach_m_s, fall_m_s, number):
-    """Whether a strike is one that gravity and the integration make again and again of a body at rest; else it is
-    remembered as the bodies' last cause. fall_m_s: what gravity gives along the normal in a step.
+    """Return whether gravity and the integration repeat a strike of a body at rest; else record it as the last cause.
 
-    Bounces of restitution e lose speed at g (1-e)/(2e) [a flight 2ve/g long loses (1-e)v]; half of that is asked of
-    them, for solvers give back up to 15 % more than e, and gravity of a step beside. What comes back sooner than after
-    a flight of that speed, no faster than `RECREATED` allows, and faster than the last cause leaves it by now, has no
-    cause but the steps' length.
+    fall_m_s: speed that gravity gives along the normal in a step. Bounces of restitution e lose speed at g (1-e)/(2e)
+    [a flight 2ve/g long loses (1-e)v]. Half of that is required of them, for solvers give back up to 15 % more than e,
+    and gravity of a step as well. A strike that comes sooner than after a flight of that speed, no faster than
+    `RECREATED` allows, and faster than the last cause leaves it by now, has no cause but the steps' length.
 
-    Who leaves at v is back after 2v/g at most: what its fastest strike since then brought is all that is left of that
-    cause. Corners of a plate strike many times in a flight, and lose sooner what a ball would keep.
+    A body that leaves at v is back after 2v/g at most: its fastest strike since then is all that is left of that cause.
+    Corners of a plate strike many times in a flight, and lose sooner what a ball would keep.
     """
     e = min(bodies[low].rebound * bodies[high].rebound, 1.0)
     limit = RECREATED * max(1.0, e / max(1.0 - e, 1e-9))
@@ -179,11 +179,10 @@ def is_recreated(bodies, low, high, approach_m_s, fall_m_s, number):
 
 @njit(nogil=True, error_model="numpy")
 def split_loads(ahead, pairs, active, count, rows, window, strikes):
-    """What is strike of the loads ``ahead`` steps after the one being rendered: the number of strikes, their bodies,
-    shares and rows. It is marked as used.
+    """Find the strikes in the loads ``ahead`` steps after the one being rendered, and mark them as used.
 
-    An opening that the future could still lower is taken as high as it may be, so nothing is struck that may be
-    support; asked again when more is known, a strike gives what it lacked.
+    Returns the number of strikes; their bodies, fractions and rows are set. An opening that the future could still
+    lower is taken as high as it may be, so that support is never struck; a later call gives a strike what it lacked.
     """
     found = 0
     for i in range(count):
@@ -219,9 +218,10 @@ def split_loads(ahead, pairs, active, count, rows, window, strikes):
 
 @njit(nogil=True, error_model="numpy")
 def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
-    """held (b,): steps for which gravity may have moved each mobile body although it rests: 1 where it carried load on
-    any pair within the STEPS before, SPAN where it was just put where it is: Bullet finds the corners on which a box
-    stands one a step, and it tilts meanwhile.
+    """Set held (b,): steps for which gravity may have moved each mobile body although it rests.
+
+    1 where it carried load on any pair within the STEPS before, SPAN where it was just placed: Bullet finds the corners
+    of a resting box one a step, and it tilts meanwhile.
     """
     for i in range(len(bodies)):
         held[i] = 0.0
@@ -239,7 +239,7 @@ def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
 
 @njit(nogil=True, error_model="numpy")
 def _gather(strike, rows):
-    """Sums over a strike's rows, each weighted by the share of its step that is strike; no budget as yet."""
+    """Sum over a strike's rows, each weighted by the fraction of its step that is strike; no budget as yet."""
     j, n, arm, centre = strike.impulse_n_s, strike.normal, strike.arm_m, strike.centre_m
     raw, approach, meets = 0.0, 0.0, np.inf
     for x in range(3):
@@ -275,10 +275,10 @@ def _gather(strike, rows):
 
 @njit(nogil=True, error_model="numpy")
 def accept(strikes, count, bodies, through):
-    """Strike impulses that a cause explains: the own budget, or that of a neighbour struck in the same step. A body
-    that never moves hands nothing on: the floor. through (b,): scratch.
+    """Bound strike impulses by their cause: the own budget, or that of a neighbour struck in the same step.
 
-    The largest neighbour counts, not the sum: solver noise of a pile must not add up to an impact.
+    A body that never moves transmits nothing: the floor. through (b,): scratch. The largest neighbour counts, not the
+    sum: solver noise of a pile must not add up to an impact.
     """
     for q in range(count):
         strikes[q].accepted_n_s = min(strikes[q].raw_n_s, strikes[q].budget_n_s)
@@ -304,7 +304,7 @@ def accept(strikes, count, bodies, through):
 
 @njit(nogil=True, error_model="numpy")
 def _make(strike, quaternion, rows, bodies, faces, nodes, shapes, frequency_hz, spectrum, pulse, push):
-    """Whether anything of a strike is heard; its pulse then, but for its start, and its Uᵀj in push (2, columns)."""
+    """Make a strike's pulse, but for its start, and its Uᵀj in push (2, columns); False where it is not audible."""
     low, high = strike.body[0], strike.body[1]
     j, raw, accepted = strike.impulse_n_s, max(strike.raw_n_s, 1e-300), strike.accepted_n_s
     mass = effective_mass(bodies, low, high, quaternion, strike.arm_m[0], strike.arm_m[1], strike.normal)

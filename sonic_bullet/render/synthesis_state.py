@@ -1,5 +1,4 @@
-"""What listening is set up with, and all that the next frame hangs on: tables that stay where they are, made, enlarged,
-copied, with further bodies, quenched.
+"""Setup and state of the run time: tables that are made, enlarged, copied, extended by bodies, quenched.
 
 Each body has two parts in the bank: its modes with the lines of its residual (see residual_voice.py), and its three
 translations (see resonator.py).
@@ -33,9 +32,10 @@ from sonic_bullet.synth.strikes import SPAN
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """What does not change while listening: rate in Hz, sensors (a channel each), seed and medium; residual: whether
-    those of materials are heard; supports: whether what bodies stand on acts on their modes; apart: whether frames are
-    (b·channels, n), body by body, instead of their sum.
+    """Constants of listening.
+
+    sr in Hz; sensors: a channel each; residual: whether those of materials sound; supports: whether resting contacts
+    act on modes; apart: whether frames are (b·channels, n), body by body, instead of their sum.
     """
 
     sr: int
@@ -49,25 +49,26 @@ class Setup:
 
     @property
     def microphone_m(self) -> Array:
-        """(c, 3) places of the microphones among the sensors."""
+        """Positions (c, 3) of the microphones among the sensors."""
         return np.array([s.position_m for s in self.sensors if isinstance(s, Microphone)]).reshape(-1, 3)
 
     @property
     def reads(self) -> Array:
-        """(c,) the weight set that each sensor reads; 0, that of all microphones, for a microphone."""
+        """Weight set (c,) that each sensor reads; 0, that of all microphones, for a microphone."""
         own = np.array([not isinstance(sensor, Microphone) for sensor in self.sensors], bool)
         return np.where(own, np.cumsum(own), 0).astype(np.int64)
 
 
 def pair_key(body: Array) -> Array:
-    """(k,) keys of pairs of bodies (k, 2), the lower one first."""
+    """Compute keys (k,) of pairs of bodies (k, 2), the lower one first."""
     return np.asarray(body[:, 0] << 32 | body[:, 1])
 
 
 @dataclass(slots=True, eq=False)
 class Window:
-    """The last SPAN steps, step k in place k % SPAN: step (SPAN,) WINDOW; poses and who was moved by hand (SPAN, b, ·);
-    row (SPAN·r,) ROW, r for each step.
+    """The last SPAN steps, step k in place k % SPAN.
+
+    step (SPAN,) WINDOW; poses and teleports (SPAN, b, ·); row (SPAN·r,) ROW, r for each step.
     """
 
     step: Array
@@ -77,7 +78,7 @@ class Window:
     row: Array
 
     def with_bodies(self, position_m: Array, quaternion_xyzw: Array) -> None:
-        """Room for further bodies (k,), which came where they are."""
+        """Make room for further bodies (k,), which appeared at these poses."""
         count = len(position_m)
         self.position_m = np.concatenate([self.position_m, np.broadcast_to(position_m, (SPAN, count, 3))], axis=1)
         turned = np.broadcast_to(quaternion_xyzw, (SPAN, count, 4))
@@ -85,7 +86,7 @@ class Window:
         self.teleported = np.concatenate([self.teleported, np.zeros((SPAN, count), bool)], axis=1)
 
     def subset(self, keep: Array, number: Array) -> None:
-        """The bodies (k,) of these numbers alone. number (b,): the new one of each."""
+        """Keep only the bodies ``keep`` (k,). number (b,): the new one of each."""
         self.position_m, self.quaternion_xyzw = self.position_m[:, keep].copy(), self.quaternion_xyzw[:, keep].copy()
         self.teleported = self.teleported[:, keep].copy()
         for first, stop in self.step["row"].tolist():
@@ -94,7 +95,7 @@ class Window:
             row["key"] = pair_key(row["body"])
 
     def with_room(self, rows: int) -> None:
-        """Room for so many rows a step."""
+        """Make room for so many rows a step."""
         old = len(self.row) // SPAN
         if rows > old:
             row = np.zeros((SPAN, max(rows, 2 * old)), ROW)
@@ -103,14 +104,16 @@ class Window:
             self.step["row"] += (np.arange(SPAN) * (row.shape[1] - old))[:, None]
 
     def copy(self) -> Window:
+        """Return an independent copy."""
         return Window(*(getattr(self, name).copy() for name in self.__slots__))
 
 
 @dataclass(slots=True, eq=False)
 class TouchingPairs:
-    """Bodies that touch: pair (slots,) PAIR, active (slots,): those in use by rising key, count (2,): how many are in
-    use and how many are free, free (slots,); gain (slots, 2, columns): Uᵀ per newton on either body; held (slots,)
-    HELD.
+    """Pairs of bodies that touch.
+
+    pair (slots,) PAIR; active (slots,): those in use by rising key; count (2,): how many are in use and free; free
+    (slots,); gain (slots, 2, columns): Uᵀ per newton on either body; held (slots,) HELD.
     """
 
     pair: Array
@@ -121,13 +124,13 @@ class TouchingPairs:
     held: Array
 
     def subset(self, number: Array) -> None:
-        """number (b,): the new one of each body."""
+        """Renumber the bodies; number (b,): the new one of each."""
         active = self.active[: self.count[0]]
         self.pair["body"][active] = number[self.pair["body"][active]]
         self.pair["key"][active] = pair_key(self.pair["body"][active])
 
     def with_room(self, slots: int, columns: int) -> None:
-        """Room for so many pairs more, and gains of so many columns."""
+        """Make room for so many pairs more, and gains of so many columns."""
         old, width = len(self.pair), self.gain.shape[2]
         if self.count[1] >= slots and width >= columns:
             return
@@ -142,14 +145,17 @@ class TouchingPairs:
         self.held = np.concatenate([self.held, np.zeros(more, HELD)])
 
     def copy(self) -> TouchingPairs:
+        """Return an independent copy."""
         return TouchingPairs(*(getattr(self, name).copy() for name in self.__slots__))
 
 
 @dataclass(slots=True, eq=False)
 class StepScratch:
-    """What one step is made in; nothing of it is needed for the next. pulse (p,) PULSE with push (p, 2, columns);
-    drives d: force (d·n,), gain0, gain1 (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source
-    (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
+    """Scratch of one step.
+
+    pulse (p,) PULSE with push (p, 2, columns); drives d: force (d·n,), gain0, gain1 (d, 2, columns), direction0,
+    direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these
+    are not zero; passed (W, b, n): zeros.
     """
 
     pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
@@ -185,13 +191,15 @@ class StepScratch:
 
 @dataclass(slots=True, eq=False)
 class State:
-    """All that the next frame hangs on. taken: steps taken in; clock: start of the step to be rendered next, waiting:
-    lengths of those taken in and not rendered. body (b,): each body's index in the log, ascending; present: those of
-    the step taken in last (the others are gone, and ring on where they were); newest: the highest so far. quenches:
-    steps before which all is to stop ringing. voices (b): their residuals; grains, rubs: what of those is under way.
-    witness: is shown every step once it rings (`Witness`), one at a time then.
-    stand (b,) STAND: how bodies stand on others; credit_s (1,): time left for new poles, (0,) where nothing supports.
-    lifted: of bodies that left the tables, by name, the steps that they rang on contacts, and those beyond these' law.
+    """All that the next frame depends on.
+
+    taken: steps taken in; clock: start of the step to be rendered next; waiting: lengths of those taken in and not
+    rendered. body (b,): each body's index in the log, ascending; present: those of the step taken in last (the others
+    have left, and ring on where they were); newest: the highest so far. quenches: steps before which all ringing stops.
+    voices (b): residuals; grains, rubs: their grains and sections under way. witness: called with every step once it
+    rings, then one at a time. stand (b,) STAND: support state; credit_s (1,): time left for new poles, (0,) where
+    nothing supports. lifted: of bodies that left, by name, the steps that they rang on contacts, and those with contact
+    separation.
     """
 
     window: Window
@@ -227,11 +235,11 @@ class State:
         return self.newest >= len(self.body)
 
     def changed(self) -> None:
-        """Some table is another array than before."""
+        """Forget the driver's tuple of tables, for some table is a new array."""
         self._tables = None
 
     def tables(self) -> tuple[Any, ...]:
-        """What the driver works on, in its order."""
+        """Return the driver's tables, in its order."""
         if self._tables is None:
             window, pairs, bodies, room = self.window, self.pairs, self.table, self.scratch
             bank, ringing, path_, travelling = self.bank, self.ringing, self.path, self.travelling
@@ -251,11 +259,11 @@ class State:
 
     @property
     def number(self) -> int:
-        """Of the step to be rendered next."""
+        """Number of the step to be rendered next."""
         return self.taken - len(self.waiting)
 
     def copy(self) -> State:
-        """A state of its own: advancing one leaves the other."""
+        """Return an independent copy: advancing one leaves the other."""
         return State(
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
@@ -265,13 +273,15 @@ class State:
 
 
 class Witness(Protocol):
-    """Whoever looks at what sounds in a step, and why: strikes and drives lie in the state's tables."""
+    """Observer of what sounds in a step, and why: strikes and drives lie in the state's tables."""
 
-    def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None: ...
+    def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:
+        """Observe step ``number``, which has ``found`` pulses and so many drives."""
+        ...
 
 
 def start(setup: Setup) -> State:
-    """Silence at time 0, nobody there."""
+    """Return silence at time 0, without bodies."""
     instrument, ringing = bank.empty_bank(
         setup.sr, 1 + len(weight_sets(setup.sensors)), passes=bank.PASSES if setup.supports else 0
     )
@@ -290,7 +300,7 @@ def start(setup: Setup) -> State:
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
-    """Further bodies, silent at first, at the poses (k, 3), (k, 4)."""
+    """Add bodies, silent at first, at the poses (k, 3), (k, 4)."""
     new = tuple(build_resonator(body, setup.sensors, setup.sr, setup.air) for body in bodies)
     voices = tuple(build_residual_voice(s, setup.sr, setup.air) if setup.residual else None for s in new)
     modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
@@ -309,10 +319,9 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
 
 
 def quench(state: State) -> None:
-    """Nothing rings from the next sample on; strikes under way and the sound still travelling to the microphones are
-    gone too.
+    """Stop all ringing from the next sample on, strikes under way and sound travelling to the microphones included.
 
-    Loads, and what rubs, stay: a ball that rolls rolls on.
+    Loads, and friction, stay: a ball that rolls rolls on.
     """
     air, travelling = path.empty_path(state.path.sr, state.path.air, state.path.microphone_m, state.ringing.at)
     radius = np.array([one.radius_m for one in state.resonators])

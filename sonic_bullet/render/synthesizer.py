@@ -1,4 +1,4 @@
-"""The run time: physics steps in, frames of sound out, with one explicit state between (synthesis_state.py).
+"""Run time: physics steps in, frames of sound out, with one explicit state between (synthesis_state.py).
 
     Step, Step, … -> STEP table -> driver.advance_steps, enlarging tables where it asks for it -> frames
                                         + grains of residuals, where a body has one: then a step at a time
@@ -33,14 +33,14 @@ from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
 LOOK_EVERY = 64
-"""Steps between two looks at who of those gone is silent: what a look costs, 20 µs, and what it takes to let somebody
-go are then nothing, and tables hold at most what went in so many steps beside what still rings.
-"""
+"""Steps between two checks for bodies that have left and are silent: a check costs 20 µs, so that it and the removal of
+a body cost nothing, and tables hold at most what left in so many steps beside what still rings."""
 
 
 def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
-    """Take in steps, of those bodies that the state has as present; (channels, n) of those that can be rendered then,
-    LOOKAHEAD before them. Changes ``state`` in place: `copy` it first to come back to it.
+    """Take in steps of the bodies present; return (channels, n) of what can be rendered then, LOOKAHEAD before them.
+
+    Changes ``state`` in place: `copy` it first to come back to it.
     """
     if len(steps) == 1 and not state.quenches:  # live, where a microsecond counts
         return _advanced(setup, state, steps)
@@ -57,7 +57,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
 
 
 def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
-    """The STEP table of steps to be taken in, and clock and waiting lengths after them."""
+    """Build the STEP table of steps to be taken in, and clock and waiting lengths after them."""
     layout, clock, waiting, number, at = driver.STEP_LAYOUT, state.clock, state.waiting, state.number, 0
     table = bytearray(len(steps) * layout.size)
     first = clock.sample(sr)
@@ -81,7 +81,7 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
 
 
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
-    """`advance` of steps without a quench between; of one alone where a body has a residual."""
+    """Advance by steps without a quench between; by one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
     table, clock, waiting = _schedule(sr, state, steps)
     contacts, poses = _joined(steps)
@@ -130,8 +130,9 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
-    """Contact rows of all steps, and their poses (k, b, ·): read-only, as those of one step are (one type is compiled
-    once).
+    """Join contact rows of all steps, and their poses (k, b, ·).
+
+    Read-only, as those of one step are, so that one type is compiled once.
     """
     first = steps[0]
     if len(steps) == 1:
@@ -144,7 +145,7 @@ def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
 
 
 def _make_room(state: State, step: Array, samples: int) -> None:
-    """See to it that the step fits: its rows, the pairs and the strikes that they may become."""
+    """Make room for the step: its rows, the pairs and the strikes that they may become."""
     rows = int(step["row"][1] - step["row"][0])
     pairs = int(state.pairs.count[0]) + rows
     columns = state.bank.columns
@@ -156,7 +157,7 @@ def _make_room(state: State, step: Array, samples: int) -> None:
 
 
 def _add_residuals(setup: Setup, state: State, step: Array, found: int, drives: int) -> None:
-    """Add to what rings what the modes cannot say of the step."""
+    """Add the residuals' grains of the step to the modes."""
     first, n, sr, room = int(step["sample"]), int(step["count"]), setup.sr, state.scratch
     modes = state.table.bodies["modes"]
     pulses = pulses_of(room, found, modes, float(step["begin_s"]), float(step["after_s"]))
@@ -175,9 +176,9 @@ def _add_residuals(setup: Setup, state: State, step: Array, found: int, drives: 
 
 
 def drained(setup: Setup, state: State, last: Step | None) -> Array:
-    """(channels, n) sound of the steps taken in but not yet rendered, as if nothing touched any more afterwards.
+    """Render the steps taken in but not yet rendered, (channels, n), as if nothing touched any more afterwards.
 
-    last: the newest of them. ``state`` stays.
+    last: the newest of them. ``state`` is not changed.
     """
     missing = len(state.waiting)
     if last is None or not missing:
@@ -189,7 +190,7 @@ def drained(setup: Setup, state: State, last: Step | None) -> Array:
 
 
 def clock_after(state: State) -> Clock:
-    """The clock at the end of the last step taken in."""
+    """Return the clock at the end of the last step taken in."""
     clock = state.clock
     for dt_s in state.waiting:
         clock = clock.after(dt_s)
@@ -197,9 +198,9 @@ def clock_after(state: State) -> Clock:
 
 
 class Synthesizer:
-    """Steps in, lagging frames out: the live form of `advance`, with the sound so far kept, unless ``keep`` is False.
+    """Live form of `advance`: steps in, lagging frames out; the sound so far is kept, unless ``keep`` is False.
 
-    unkept: why no more of it is kept, once a disk is full; frames go on.
+    unkept: why no more of it is kept, once a disk is full; frames continue.
     """
 
     def __init__(
@@ -235,14 +236,14 @@ class Synthesizer:
 
     @property
     def lifted(self) -> dict[str, tuple[int, int]]:
-        """See `presence.lifted`."""
+        """Steps with contact separation, see `presence.lifted`."""
         return lifted(self._state)
 
     def feed(self, step: Step, bodies: Records) -> Array:
-        """Take in a step; the frame (channels, n) as long as the step, LATENCY_STEPS late. bodies: by index, those at
-        least who are new in it. Raises LogError where a body comes that was gone.
+        """Take in a step; return the frame (channels, n) as long as the step, LATENCY_STEPS late.
 
-        Without a sensor nothing is computed but the time.
+        bodies: by index, at least those new in the step. Without a sensor nothing is computed but the time. Raises
+        LogError where a body comes that had left.
         """
         before = self._clock
         self._clock = before.after(step.dt_s)
@@ -268,7 +269,7 @@ class Synthesizer:
         return np.ascontiguousarray(out)
 
     def play(self, steps: Sequence[Step], bodies: Records) -> Array:
-        """Take in steps of the same bodies each; (channels, n) of what can be rendered then, without lag."""
+        """Take in steps of the same bodies each; return (channels, n) of what can be rendered then, without lag."""
         for step in steps:
             self._clock = self._clock.after(step.dt_s)
         self._steps += len(steps)
@@ -297,19 +298,21 @@ class Synthesizer:
         return frame
 
     def rest(self) -> Array:
-        """(channels, n) what the steps taken in will still sound, as if nothing touched any more."""
+        """Render the rest of the steps taken in, (channels, n), as if nothing touched any more."""
         channels = len(self._setup.sensors)
         if not channels:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
         return drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
 
     def sound(self) -> Array:
-        """(channels, floor(sr·time)) all sound so far, without lag; as `kept_sound` has it, in memory."""
+        """Return all sound so far, (channels, floor(sr·time)), without lag; as `kept_sound`, in memory."""
         return self.kept_sound().samples()
 
     def kept_sound(self, tail_db: float | None = None) -> KeptSound:
-        """All sound so far, without lag, where it lies; after an AudioError, what was made before it, after a full
-        disk, what was kept. tail_db: see `with_tail`. Raises AudioError where none is kept.
+        """Return all sound so far, without lag, where it is stored.
+
+        After an AudioError: what was made before it; after a full disk: what was kept. tail_db: see `with_tail`. Raises
+        AudioError where none is kept.
         """
         if self._sound is None:
             raise AudioError("the sound is not kept", "attach with keep_sound=True, or read() the frames")
@@ -318,14 +321,15 @@ class Synthesizer:
         return sound if self.unkept is not None else self.with_tail(sound, tail_db)
 
     def with_tail(self, sound: KeptSound, tail_db: float | None) -> KeptSound:
-        """The whole sound so far, and what rings on after it until it is tail_db below its peak; None: nothing more."""
+        """Extend the whole sound so far by its tail until it is tail_db below its peak; None: nothing more."""
         if tail_db is None or self._failed is not None:
             return sound
         return with_tail(sound, self._setup, self._state, self._last, tail_db)
 
     def quench(self) -> None:
-        """Stop all that rings where the steps taken in so far end, exactly there at any rate: in frames that is
-        LATENCY_STEPS later.
+        """Stop all ringing where the steps taken in so far end, exactly there at any rate.
+
+        In frames that is LATENCY_STEPS later.
         """
         if self._setup.sensors:
             self._state.quenches = self._state.quenches | {self._steps}

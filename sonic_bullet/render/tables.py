@@ -1,11 +1,11 @@
-"""What the run time's compiled stages work on: one table a kind of thing, each in a fixed place, rows by number.
+"""Tables of the run time's compiled stages: one a kind of thing, each in a fixed place, rows by number.
 
     Body -> BODY row + FACE, NODE rows and a slice of the shapes       once, when it is added
     contact rows of a step -> ROW (turned onto the pair's lower body)  four steps at a time: the step and its look-ahead
     pair of touching bodies -> PAIR, as long as it touches             load history, voice of friction
     strike -> PULSE                                                    one step
 
-Records stand at the doors (what a user passes, what a file holds); these tables are what goes round inside, checked in
+Records are used at the interfaces (what a user passes, what a file holds); these tables are used inside, checked in
 bulk when they are filled. Sides are 0 = the pair's lower body and 1 = the higher. b bodies, m modes.
 """
 
@@ -21,7 +21,7 @@ from sonic_bullet.synth.strikes import SPAN
 __all__ = ["BODY", "CONTACT", "FACE", "HISTORY", "NODE", "PAIR", "PULSE", "ROW"]
 
 HISTORY = 2 * SPAN - 1
-"""Steps of load that are remembered of a pair; column SPAN - 1 is the step being rendered."""
+"""Steps of load that are stored for a pair; column SPAN - 1 is the step being rendered."""
 
 BODY = np.dtype(
     [
@@ -33,12 +33,12 @@ BODY = np.dtype(
         ("hurst", "f8"),
         ("size_m", "f8"),  # cube root of the volume
         ("volume_m3", "f8"),
-        ("curvature_per_m", "f8"),  # of a shape that has one everywhere; NaN: its faces tell
+        ("curvature_per_m", "f8"),  # of a shape that has one everywhere; NaN: that of its faces
         ("edge_per_m", "f8"),  # curvature of its edges
         ("wall_m", "f8"),  # see geometry.nearest_point
         ("tie_m", "f8"),
         ("surface_seed", "i8"),
-        ("rigid", "i8"),  # 1 where its translations sound
+        ("rigid", "i8"),  # 1 where its translations are active
         ("modes", "i8"),  # audible modes
         ("columns", "i8"),  # the same and the lines of its residual: what shapes and gains are given for
         ("frequency_at", "i8"),  # of mode 0 in the flat array of frequencies in Hz (m,)
@@ -46,7 +46,7 @@ BODY = np.dtype(
         ("face_at", "i8"),
         ("faces", "i8"),  # 0: no surface
         ("node_at", "i8"),
-        ("placed", "i8"),  # step in which it began or was last moved by hand
+        ("placed", "i8"),  # step in which it began or was last teleported
         ("rebound", "f8"),  # restitution as the simulator has it; a pair's is the product
         ("loaded", "i8"),  # last step before the one looked at in which it carried load
         ("cause_m_s", "f8"),  # approach of its last strike that gravity and bouncing did not make, and its step
@@ -115,7 +115,7 @@ PULSE = np.dtype(
         ("start_s", "f8"),  # after the start of the step it was found in; before it, where negative
         ("length_s", "f8"),
         ("flat", "i8"),  # half-sine, not Hertz'
-        ("share", "f8"),  # of the impulse that the contact hands over (synth.pulse.compliance)
+        ("share", "f8"),  # transmitted fraction of the impulse (synth.pulse.compliance)
         ("impulse_n_s", "f8", (3,)),  # on the lower body, world frame
         ("ahead", "i8"),  # 0: found in the step being rendered, 1: in the one after it
     ],

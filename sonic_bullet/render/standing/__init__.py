@@ -1,1 +1,1 @@
-"""Who stands on what: contacts that are held, and the poles that bodies have on them."""
+"""Resting contacts: contact patches, and the poles of bodies on them."""

@@ -1,14 +1,14 @@
-"""What carries a body, without the flicker of a simulator's points: points that are held, loads that are smoothed.
+"""Contact patches: points tracked and loads smoothed, without the flicker of a simulator's points.
 
-    rows of the step being rendered, load less what strikes -> each row to the held point near it, or a new one
+    rows of the step being rendered, load less strikes -> each row to the tracked point near it, or a new one
         -> n += a (load of its rows − n),   a = 1 − e^{−dt/SMOOTH_S}
         -> HELD: up to MOST points a pair, sum and moment those of the rows, smoothed
-    sets or loads that are others than when poles were last made -> STAND.stale of both bodies
+    sets or loads that differ from those of the present poles -> STAND.stale of both bodies
 
 A resting box shows two, three or four of its corners, another choice each step; sum and moment alone are right. Each
-point keeps the mean of what its rows carried, so sum and moment of the held points are the smoothed ones exactly, and
-the set changes only where a point was not loaded for long, or lies elsewhere. A box that slides keeps its own corners
-as its points; that they lie elsewhere on the board makes poles anew.
+point keeps the mean of the loads of its rows, so sum and moment of the tracked points are the smoothed ones exactly,
+and the set changes only where a point was not loaded for long, or lies elsewhere. A box that slides keeps its own
+corners as its points; that they lie elsewhere on the board makes its poles stale.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -24,15 +24,14 @@ MOST = 4
 SMOOTH_S = 0.03
 """Time constant of loads: of 20 to 50 ms, seven steps at 240 Hz, within which each corner of a box is loaded."""
 NEAR = 0.15
-"""Of the smaller body's size: rows nearer than this to a held point are the same point."""
+"""Of the smaller body's size: rows nearer than this to a tracked point are the same point."""
 LEAST = 0.02
-"""Share of a pair's load below which a point is let go."""
+"""Fraction of a pair's load below which a point is dropped."""
 LEAST_N = 1e-9
 """Newtons below which nothing is carried."""
 FAR_OFF, OFF = 1.6, 1.1
-"""Factors by which a load differs from the one that poles were made for before they are made anew: at once, 17 % of a
-Hertz spring, and after REST_S, 3 %.
-"""
+"""Factors by which a load must differ from the one of the present poles before new ones are computed: at once, 17 % of
+a Hertz spring, and after REST_S, 3 %."""
 REST_S = 0.2
 
 HELD = np.dtype(
@@ -48,7 +47,7 @@ HELD = np.dtype(
     ],
     align=True,
 )
-"""What of a pair carries; beside its row of PAIR, in the same slot."""
+"""Contact patch of a pair; beside its row of PAIR, in the same slot."""
 
 STAND = np.dtype(
     [
@@ -62,12 +61,11 @@ STAND = np.dtype(
     ],
     align=True,
 )
-"""How a body stands."""
+"""Support state of a body."""
 
 SHARE = 0.06
-"""Of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes a third more, and live
-sound is never late for it. Who waits longest is served first, what moves before what does not.
-"""
+"""Fraction of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes a third more,
+and live sound is never late for it. The body that waits longest is served first, moving ones before fixed ones."""
 SAVED_S = 0.03
 """Most of it that is saved up for a moment in which many come to rest."""
 AGAIN_S = 0.02
@@ -76,7 +74,10 @@ AGAIN_S = 0.02
 
 @njit(nogil=True, error_model="numpy")
 def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, dt_s):
-    """All pairs move on by the step whose rows are first … stop - 1; pairs without them for SPAN steps let go."""
+    """Advance the contact patches of all pairs by the step whose rows are first … stop - 1.
+
+    A patch without rows for SPAN steps is released.
+    """
     row, follow = first, 1.0 - np.exp(-dt_s / SMOOTH_S)
     target, place = np.empty(MOST), np.empty((MOST + 1, 2, 3))
     for i in range(count):
@@ -114,7 +115,7 @@ def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, 
 
 @njit(nogil=True, error_model="numpy")
 def let_go(one, pair, stand):
-    """Nothing of a pair carries any more."""
+    """Release the contact patch of a pair."""
     if one.used:
         stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
     one.count = one.used = 0
@@ -123,7 +124,7 @@ def let_go(one, pair, stand):
 
 @njit(nogil=True, error_model="numpy")
 def _nearest(one, point, count):
-    """The held point nearest to a row's (2, 3), by the body on which it moved less, and how near."""
+    """Find the tracked point nearest to a row's (2, 3), by the body on which it moved less, and its distance."""
     best, least = 0, np.inf
     for k in range(count):
         for side in range(2):
@@ -138,8 +139,9 @@ def _nearest(one, point, count):
 
 @njit(nogil=True, error_model="numpy")
 def _smooth(one, rows, begin, end, share, near, follow, target, place):
-    """The held points take in rows begin … end - 1, whose loads in N·s times ``share`` are newtons. target (MOST,),
-    place (MOST + 1, 2, 3): room for what the rows carry, and for their normals.
+    """Update the tracked points by rows begin … end - 1, whose loads in N·s times ``share`` are newtons.
+
+    target (MOST,), place (MOST + 1, 2, 3): scratch for the rows' loads, and for their normals.
     """
     old = one.count
     total = _take_rows(one, rows, begin, end, share, near, target, place)
@@ -165,8 +167,9 @@ def _smooth(one, rows, begin, end, share, near, follow, target, place):
 
 @njit(nogil=True, error_model="numpy")
 def _take_rows(one, rows, begin, end, share, near, target, place):
-    """Each row to the held point near it, or a new one: target (MOST,) loads, place (MOST + 1, 2, 3) their moments and,
-    last, that of the normals; their sum in N.
+    """Assign each row to the tracked point near it, or to a new one; return the sum of the loads in N.
+
+    target (MOST,): loads; place (MOST + 1, 2, 3): their moments and, last, that of the normals.
     """
     target[:], place[:] = 0.0, 0.0
     old, total, most = one.count, 0.0, 0.0
@@ -194,8 +197,9 @@ def _take_rows(one, rows, begin, end, share, near, target, place):
 
 @njit(nogil=True, error_model="numpy")
 def _lean(one, outward, total, follow):
-    """The pair's normals follow those of a step, (2, 3) weighted by loads of ``total`` in all; where these press from
-    opposite sides and leave none, they stay.
+    """Smooth the pair's normals towards those of a step, (2, 3) weighted by loads of ``total`` in all.
+
+    Where these press from opposite sides and cancel, the normals stay.
     """
     for side in range(2):
         length, mean = _length(outward[side]), one.outward[side]
@@ -210,13 +214,13 @@ def _lean(one, outward, total, follow):
 
 @njit(nogil=True, error_model="numpy")
 def _length(vector):
-    """Of (3,)."""
+    """Compute the length of (3,)."""
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
 @njit(nogil=True, error_model="numpy")
 def _differs(one, near):
-    """Whether the points are others than those that poles were made for, or loaded otherwise."""
+    """Return whether points or loads differ from those that the present poles were computed for."""
     if one.count != one.used:
         return True
     off = OFF if one.used_s > REST_S else FAR_OFF
@@ -234,7 +238,7 @@ def _differs(one, near):
 
 @njit(nogil=True, error_model="numpy")
 def price_s(modes, points):
-    """What new poles cost, in s of a processor of 2025, by what they are made of: the same on every machine."""
+    """Estimate the cost of new poles, in s of a processor of 2025, from their counts: the same on every machine."""
     return 5e-4 + 1.5e-4 * points + 2e-7 * (modes + 6) ** 2
 
 
@@ -242,8 +246,9 @@ def price_s(modes, points):
 def choose_bodies(
     pairs, active, count, held, stand, bodies, ringing, pulses, found, drive_body, drives, dt_s, credit_s
 ):
-    """Mark as wanted those whose poles are to be made before this step rings; their number. credit_s (1,): what is
-    left of the time for it. Silent bodies wait: nothing of them is heard.
+    """Mark as wanted the bodies whose poles are to be computed before this step rings; return their number.
+
+    credit_s (1,): time left for it. Silent bodies wait.
     """
     credit_s[0] = min(credit_s[0] + SHARE * dt_s, SAVED_S)
     some = False
@@ -283,9 +288,7 @@ def choose_bodies(
 
 @njit(nogil=True, error_model="numpy")
 def _longest_stale(stand, bodies, waits):
-    """Who of those that wait comes first: of those that move, the one stale longest, then of those that do not; -1 for
-    nobody.
-    """
+    """Choose the next of those that wait: of moving bodies, the one stale longest, then of fixed ones; -1 for none."""
     best = -1
     for b in range(len(stand)):
         if waits[b]:
@@ -300,9 +303,10 @@ def _longest_stale(stand, bodies, waits):
 
 @njit(nogil=True, error_model="numpy")
 def count_lifted(stand, bank_body, ringing, law, z, driven):
-    """Count the steps in which what rings may lift a body off: Σ_k lift_k |z_k| > 1, law[6]: lift, newtons per unit of
-    z over the load, of each mode at the point that it lifts first: no step is missed, and some are counted in which
-    modes lift at different points.
+    """Count the steps in which ringing may cause contact separation: Σ_k lift_k |z_k| > 1.
+
+    law[6]: lift, newtons per unit of z over the load, of each mode at the point where it separates first. No step is
+    missed, and some are counted in which modes separate at different points.
     """
     modes = law.shape[1]
     for b in range(len(stand)):

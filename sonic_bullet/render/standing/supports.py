@@ -1,12 +1,12 @@
-"""What bodies stand on acts on their modes: other poles while they touch, and what passes on to whom they touch.
+"""Effect of resting contacts on a body: other poles while they last, and transmission to the bodies it touches.
 
     HELD of a body's pairs -> touches: places on both bodies, springs of the regions that touch     (support)
-        -> first_order -> poles, what passes to each partner, when it lifts -> the bank, from its next block on
+        -> first_order -> poles, transmission to each partner, contact separation -> the bank, from its next block on
 
-The driver says who (`held_contacts.choose_bodies`): whose contacts are others than those its poles were made for, and
-who is heard. The modes of each body stay its own, with its poles; what little the touches turn them into each other is
-left out. Lines of a residual take the change of the mode that they follow. Chains of bodies are not claimed: a body's
-poles know its partners as they are when nothing touches these.
+The driver chooses the bodies (`held_contacts.choose_bodies`): active ones whose contacts differ from those of their
+poles. The modes of each body stay its own, with its poles; the small coupling of its modes by the contacts is left out.
+Lines of a residual take the change of the mode that they follow. Chains of bodies are not claimed: a body's poles use
+its partners as they are free.
 """
 
 from __future__ import annotations
@@ -43,23 +43,23 @@ ON = 0.02
 NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
 LEAST_PASSED = 0.3
-"""Of a mode's own weight: what passes on with less would add 0.4 dB to it, and is left out."""
+"""Of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out."""
 FAINTEST = 1e-3
-"""And of its loudest one: 60 dB below, it is what is left when all else has died away."""
+"""Of a body's loudest mode: 60 dB below, it is what is left when all else has decayed."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
-"""Radians a sample beyond which the touches have made a mode too fast to sound, and its decay a sample then."""
+"""Radians a sample beyond which the contacts have made a mode too fast to play, and its decay a sample then."""
 
 
 @cache
 def _blas() -> ThreadpoolController:
-    """On matrices of a hundred more threads take seconds, and give other bits on other machines."""
+    """Return the controller of BLAS threads: on matrices of a hundred, more threads take seconds and change bits."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
 
 
 def settle(state: State, number: int) -> None:
-    """New poles for the bodies that the driver wants, before step ``number`` rings."""
+    """Update the poles of the bodies that the driver wants, before step ``number`` rings."""
     with _blas().limit(limits=1, user_api="blas"):
         for b in np.flatnonzero(state.stand["wanted"]).tolist():
             state.stand["wanted"][b] = 0
@@ -67,7 +67,10 @@ def settle(state: State, number: int) -> None:
 
 
 def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
-    """Partners of a body, its touches, the load (c,) on each, and what it becomes. quaternion (b, 4): all bodies'."""
+    """Compute a body's partners, its touches, the load (c,) on each, and its coupled modes.
+
+    quaternion (b, 4): all bodies'.
+    """
     partners, touches, load_n = _touches(state, b, quaternion)
     moving = [state.resonators[p].moving for p in partners]
     return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches)
@@ -92,7 +95,7 @@ def _stand(state: State, b: int, quaternion: Array) -> None:
 
 
 def _lanes(state: State, b: int) -> Array:
-    """s a sample (m + lines,) of a body that nothing touches."""
+    """Return s a sample (m + lines,) of a body without contacts."""
     row = state.bank.body[b]
     lanes = slice(int(row["start"]), int(row["start"] + row["columns"]))
     step: Array = state.bank.law[0, lanes] + 1j * state.bank.law[1, lanes]
@@ -100,15 +103,17 @@ def _lanes(state: State, b: int) -> Array:
 
 
 def _audible(new: Array, free: Array) -> Array:
-    """Poles as the bank can play them: what the touches stop or make too fast is gone within a block."""
+    """Limit poles to what the bank can play: a mode that the contacts stop or make too fast decays within a block."""
     stopped = np.minimum(free.real, -STOPPED) + 1j * np.minimum(free.imag, FASTEST_TURN)
     fast = ~np.isfinite(new) | (new.imag > FASTEST_TURN) | (new.imag <= 1e-6) | (-new.real > new.imag)
     return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
 
 
 def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
-    """Weights (W, columns) of what passes to each partner that is heard: more than LEAST_PASSED of what the body itself
-    sounds in some mode, of those within FAINTEST of its loudest, both without gains.
+    """Yield weights (W, columns) of the transmission to each audible partner.
+
+    Audible: more than LEAST_PASSED of the body's own sound in some mode, of those within FAINTEST of its loudest, both
+    without gains.
     """
     own = np.abs(state.resonators[b].weight[0]) / state.resonators[b].body.gain
     least = np.maximum(LEAST_PASSED * own, FAINTEST * own.max(initial=0.0))
@@ -121,9 +126,10 @@ def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns:
 
 
 def passed_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
-    """Weights (W, m) of another body's modes, at omega_rad_s (m,), in what a partner sounds whose own modes move with
-    rate (m_p, m) times theirs. Pressure is iωρ₀ times velocity: it goes with the frequency at which a mode is moved;
-    how well it radiates beside is taken at the mode's own.
+    """Compute weights (W, m) of another body's modes, at omega_rad_s (m,), in the sound of a partner.
+
+    rate (m_p, m): motion of the partner's own modes per motion of them. Pressure is iωρ₀ times velocity: it is
+    proportional to the frequency at which a mode is moved; its other radiation is taken at the mode's own.
     """
     rate = np.nan_to_num(rate)
     weight: Array = partner.weight @ rate
@@ -132,7 +138,7 @@ def passed_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
 
 
 def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array]:
-    """Partners of a body, its touches, and the load on each (c,)."""
+    """Return a body's partners, its touches, and the load on each (c,)."""
     partners: list[int] = []
     touches, loads = [], []
     pairs = state.pairs
@@ -156,8 +162,9 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
 
 
 def _axes(held: Array, quaternion: Array) -> Array:
-    """Normal and two tangents (2, 3, 3) as rows in either side's frame, the same directions for both. quaternion (2,
-    4).
+    """Build normal and two tangents (2, 3, 3) as rows in either side's frame, the same directions for both.
+
+    quaternion (2, 4).
     """
     turn = [_rotation(one) for one in quaternion]
     normal = turn[0] @ held["outward"][0]
@@ -170,7 +177,7 @@ def _axes(held: Array, quaternion: Array) -> Array:
 
 
 def _rotation(quaternion: Array) -> Array:
-    """(3, 3) from a body's frame into space."""
+    """Build the matrix (3, 3) from a body's frame into space."""
     x, y, z, w = quaternion.tolist()
     return np.array(
         [
@@ -182,9 +189,7 @@ def _rotation(quaternion: Array) -> Array:
 
 
 def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[list[Place], Array, float]:
-    """Places of a pair's points on one body, the surface's curvature there (c,), and how far the points' middle is from
-    it in m.
-    """
+    """Locate a pair's points on one body: places, the surface's curvature (c,), their middle's distance in m."""
     one, row = state.resonators[b], state.table.bodies[b]
     point = held["point_m"][: held["count"], side]
     shape, curvature, off = np.zeros((len(point), 3, one.mode_count)), np.zeros(len(point)), 0.0
@@ -208,8 +213,9 @@ def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[
 def _springs(
     state: State, both: list[int], held: Array, curvature: Array, off_m: float, load: Array
 ) -> Iterator[ContactSpring]:
-    """The spring of each of a pair's points: of its part of one region, or of a region of its own. off_m: of the
-    points' middle from the surfaces.
+    """Yield the spring of each of a pair's points: of its part of one region, or of a region of its own.
+
+    off_m: distance of the points' middle from the surfaces.
     """
     sides = state.resonators[both[0]].side, state.resonators[both[1]].side
     sizes = [float(row["size_m"]) for row in state.table.bodies[both] if row["volume_m3"] > 0]
@@ -229,7 +235,7 @@ def _springs(
 
 
 def _one_region(point_m: Array, curvature_per_m: float, off_m: float, size_m: float) -> Region | None:
-    """The line or face that touches between a pair's points (c, 3); None where nothing does there."""
+    """Return the line or face that touches between a pair's points (c, 3); None where there is none."""
     middle = point_m - point_m.sum(axis=0) / len(point_m)
     spread = np.sqrt(((middle.max(axis=0) - middle.min(axis=0)) ** 2).sum())
     if spread < STRUCK_FLAT * size_m or off_m > ON * spread:
