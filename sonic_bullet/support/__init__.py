@@ -1,12 +1,12 @@
-"""Bodies in place: what a body that touches others becomes, and what of it passes on to them.
+"""Coupled modes: a body's modes while it touches others, and what it transmits to them.
 
-    materials, loads, region of touching -> ContactSpring     springs      N/m, complex: stiffness and loss
-    modes, mass, inertia of a body       -> Moving            moving       what it yields where it is pushed
-    a body, its partners, its touches    -> InPlace           in_place     poles, mixing, what passes, when it lifts
-                                                              first_order  the same in a tenth of the time, nearly
+    materials, loads, contact region     -> ContactSpring     springs      N/m, complex: stiffness and loss
+    modes, mass, inertia of a body       -> Moving            moving       its driving-point mobility
+    a body, its partners, its touches    -> InPlace           in_place     poles, mixing, transmission, separation
+                                                              first_order  nearly the same in a tenth of the time
 
-Values in, values out; nothing here knows a scene, a step or a sample. The run time asks anew when a body's set of
-touches or their loads change; till then poles stay.
+Values in, values out: no scene, step or sample. The run time calls it when a body's set of touches or their loads
+change; until then poles stay.
 """
 
 from sonic_bullet.support.first_order import first_order

@@ -1,14 +1,15 @@
-"""The poles of what touches: of T(s) q = 0, a body's modes and rigid motions with forces at its touches.
+"""Poles of a body in contact: of T(s) q = 0, a body's modes and rigid motions with forces at its touches.
 
     T(s) = s² + 2Ds + Λ + s Φᵀ W(s) Φ,  W = (s/K + Y_p(s))⁻¹,  forces F = W Φ s q
-        Φ (r, m + 6): the body's modes and rigid motions at r springs; Y_p: what the partners yield (`moving`)
+        Φ (r, m + 6): the body's modes and rigid motions at r springs; Y_p: the partners' mobility (`moving`)
     real start   (Λ + Bᵀ Re(K) B) q = λ q,  B = (Φ, −Φ_p), of partners their rigid motions
     Newton       s <- s − qᵀT q/qᵀT'q,  q <- T⁻¹ T' q               [Rayleigh quotients: Lancaster 1966, sec. 5.3]
     T⁻¹ = D⁻¹ − s D⁻¹Φᵀ S⁻¹ Φ D⁻¹,  D = s² + 2Ds + Λ,  S = s/K + Y_p + s Φ D⁻¹ Φᵀ                 [Woodbury 1950]
 
-The start is exact in stiffness at any strength and orders all motions, so that equal frequencies part as the touches
-want it; Newton adds losses and what partners yield, with everything else kept, in some three steps of the size of the
-touches. Where it does not stand still, or finds one pole twice, the poles are those of all bodies at once (`_coupled`).
+The start is exact in stiffness at any strength and orders all motions, so that equal frequencies split as the touches
+require. Newton adds losses and the partners' mobility, with everything else kept, in some three steps of the size of
+the touches. Where it does not converge, or finds one pole twice, the poles are those of all bodies at once
+(`_coupled`).
 """
 
 from __future__ import annotations
@@ -22,20 +23,27 @@ from sonic_bullet.records import Array
 STEPS = 12
 """Newton steps at most; three are usual, their order is cubic."""
 CLOSE = 1e-9
-"""Relative change of a pole in the step after which it stands: that step's error is of its third power."""
+"""Relative change of a pole in the step after which it has converged: that step's error is of its third power."""
 SPLIT = 1e-9
 """Relative to the higher: poles nearer than this with the same motion are one pole found twice."""
 ALIKE = 0.9
 """Product of two unit motions that are the same."""
 OFF = 1e-6
-"""Damping ratio of the start: without any, what yields might have its own pole just there."""
+"""Damping ratio of the start: without any, the partners' mobility might have its own pole just there."""
 TINY = 1e-14
 """Least |D| over |s|²: on a free pole itself D has no inverse."""
 
 
 class Touched(NamedTuple):
-    """Φ (r, N) of the body and (r, P) of all partners side by side at r springs; K (r,); λ, d of both; y₀, y₂ (r,);
-    φφᵀ of both (`squares`).
+    """Matrices of a body and its partners at r springs.
+
+    Attributes
+    ----------
+    own, other : Φ (r, N) of the body and (r, P) of all partners side by side
+    spring : K (r,)
+    lam, decay, other_lam, other_decay : λ, d of both
+    plate, half_space : y₀, y₂ (r,)
+    own_square, other_square : φφᵀ of both (`squares`)
     """
 
     own: Array
@@ -52,7 +60,7 @@ class Touched(NamedTuple):
 
 
 def start(x: Touched, m: int) -> tuple[Array, Array]:
-    """s (m,) and q (m, N) of the undamped body on springs, old mode by old mode: the new one that has most of it."""
+    """Compute s (m,) and q (m, N) of the undamped body on springs: for each old mode the new one with most of it."""
     rigid = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     both = np.hstack([x.own, -x.other[:, rigid]])
     stiff = both.T @ (x.spring.real[:, None] * both)
@@ -63,7 +71,7 @@ def start(x: Touched, m: int) -> tuple[Array, Array]:
 
 
 def likest(share: Array) -> Array:
-    """Which column each row of shares (m, n) is, each column once, the most in all; -1 (m,) where none is left."""
+    """Assign to each row of weights (m, n) a column, each once, with the largest sum; -1 (m,) where none is left."""
     from scipy.optimize import linear_sum_assignment  # a fifth of a second, for those who need it
 
     row, column = linear_sum_assignment(share, maximize=True)
@@ -73,24 +81,24 @@ def likest(share: Array) -> Array:
 
 
 def _summed(weight: Array, square: Array) -> Array:
-    """Σ_j w_j φ_j φ_jᵀ (k, r, r) of weights (k, N) and φ_j φ_jᵀ (N, r²)."""
+    """Compute Σ_j w_j φ_j φ_jᵀ (k, r, r) of weights (k, N) and φ_j φ_jᵀ (N, r²)."""
     size = round(np.sqrt(square.shape[1]))
     return np.asarray((weight @ square).reshape(-1, size, size))
 
 
 def squares(moves: Array) -> Array:
-    """φ_j φ_jᵀ (N, r²) of Φ (r, N)."""
+    """Compute φ_j φ_jᵀ (N, r²) of Φ (r, N)."""
     return np.asarray((moves[:, None] * moves).reshape(-1, moves.shape[1]).T.astype(complex))
 
 
 def _apart(square: Array, s: Array) -> Array:
-    """s² + 2ds + λ, not 0 where s is the free pole itself."""
+    """Bound s² + 2ds + λ away from 0, where s is the free pole itself."""
     least = TINY * np.abs(s) ** 2
     return np.asarray(np.where(np.abs(square) < least, least, square))
 
 
 def inverse_w(x: Touched, s: Array) -> tuple[Array, Array]:
-    """W⁻¹(s) and its derivative, (k, r, r) of s (k,)."""
+    """Compute W⁻¹(s) and its derivative, (k, r, r) of s (k,)."""
     at = s[:, None]
     below = _apart(at**2 + 2 * x.other_decay * at + x.other_lam, at)
     yields = _summed(at / below, x.other_square)
@@ -102,7 +110,7 @@ def inverse_w(x: Touched, s: Array) -> tuple[Array, Array]:
 
 
 def _step(x: Touched, s: Array, q: Array) -> tuple[Array, Array]:
-    """Newton's next s and q, of s (k,) and q (k, N)."""
+    """Compute Newton's next s and q, of s (k,) and q (k, N)."""
     at = s[:, None]
     inverse, slope = inverse_w(x, s)
     w = np.linalg.inv(inverse)
@@ -121,7 +129,7 @@ def _step(x: Touched, s: Array, q: Array) -> tuple[Array, Array]:
 
 
 def _solved(whole: Array, right: Array) -> Array:
-    """whole⁻¹ right; on a pole itself, to the last bit, there is no inverse, and next to it the same motion."""
+    """Solve whole⁻¹ right; exactly on a pole there is no inverse, and next to it the same motion."""
     try:
         return np.asarray(np.linalg.solve(whole, right))
     except np.linalg.LinAlgError:
@@ -130,7 +138,7 @@ def _solved(whole: Array, right: Array) -> Array:
 
 
 def _newton(x: Touched, start: Array, q_start: Array) -> tuple[Array, Array, Array]:
-    """s (m,), q (m, N) of each start, and whether Newton's pole stands."""
+    """Iterate s (m,), q (m, N) from each start; also return whether Newton's pole has converged."""
     s, q, moving = start.copy(), q_start.copy(), np.ones(len(start), bool)
     for _ in range(STEPS):
         at = np.flatnonzero(moving)
@@ -143,7 +151,7 @@ def _newton(x: Touched, start: Array, q_start: Array) -> tuple[Array, Array, Arr
 
 
 def poles(x: Touched, s_start: Array, q_start: Array) -> tuple[Array, Array, Array]:
-    """Newton's poles; where they do not stand, or one is found twice, those of the coupled eigenproblem."""
+    """Find the poles by Newton; where they do not converge, or one is found twice, from the coupled eigenproblem."""
     s, q, stands = _newton(x, s_start, q_start)
     again = ~stands
     same = (np.abs(s[:, None] - s) < SPLIT * np.abs(s)) & (np.abs(q.conj() @ q.T) > ALIKE) & stands & stands[:, None]
@@ -161,7 +169,7 @@ def poles(x: Touched, s_start: Array, q_start: Array) -> tuple[Array, Array, Arr
 
 
 def _coupled(x: Touched) -> tuple[Array, Array]:
-    """s (k,) that swing and q (k, N) of all bodies at once, what radiates into half-spaces left out:
+    """Find s (k,) that oscillate and q (k, N) of all bodies at once, radiation into half-spaces left out.
 
     q̈ + 2Dq̇ + Λq + Bᵀ K (Bq − p) = 0,  ṗ = y₀ K (Bq − p),  B = (Φ, −Φ_p)         [Tisseur & Meerbergen 2001, sec. 3.4]
     """

@@ -1,15 +1,15 @@
-"""Poles of a body while it touches, in milliseconds: springs exactly, what loses and what partners yield in one step.
+"""Poles of a body in contact, in milliseconds: springs exactly, losses and the partners' mobility in one step.
 
     (Λ + Bᵀ Re(K) B) q = ω² q,  B = (Φ, −Φ_r)     the body's modes and rigid motions, light partners' rigid motions
     F_n = Re(K) B q_n,  s = jω_k                   forces at the touches, of each motion
-    g = Y F_k,  Y = 1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)     what gives way beside the springs, and how far
-    x = F_kᵀg,  ρ = gᵀRg/x,  R = Re K − Σ_{n≠k} F_n F_nᵀ/(ω_n² − ω_k²)     what all other motions hold against it
-    δ = x/(1 + ρ),  ε = dδ/ds²                      exact at one touch, or of one thing that yields
+    g = Y F_k,  Y = 1/K − 1/Re K + Σ_j φ_j φ_jᵀ/(λ_j + 2 d_j s + s²)     compliance beside the springs, and its motion
+    x = F_kᵀg,  ρ = gᵀRg/x,  R = Re K − Σ_{n≠k} F_n F_nᵀ/(ω_n² − ω_k²)     resistance of all other motions to it
+    δ = x/(1 + ρ),  ε = dδ/ds²                      exact at one touch, or of one compliant motion
     s² + 2 s qᵀDq + ω² − 2δ/(1 + √(1 − 4ε)) = 0     δ taken on as the one pole c²/(D + s²) that has this value and slope
 
-Of det(1 + Y(s)(Re K − Σ_n F_n F_nᵀ/(ω_n² + s²))) = 0, the springs' ends held and then let go. To first order in x it is
-Rayleigh's quotient of `in_place`, whose Newton goes on to the exact pole at many times the cost: how far the two are
-from each other is in docs/measured/in-place.md.
+Of det(1 + Y(s)(Re K − Σ_n F_n F_nᵀ/(ω_n² + s²))) = 0, the springs' ends held and then released. To first order in x it
+is Rayleigh's quotient of `in_place`, whose Newton iteration finds the exact pole at many times the cost. The measured
+difference between the two is in docs/measured/in-place.md.
 """
 
 from __future__ import annotations
@@ -26,9 +26,11 @@ from sonic_bullet.support.moving import Moving
 
 
 def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
-    """See `in_place`; `turn` is the identity: a mode takes the pole of the motion that most resembles its own when
-    free. What passes, at most ½ of each such motion, and what lifts is that of a mode's own motion, Q of all: two of
-    one frequency stay who they are, whichever way the touches turn them.
+    """Approximate `in_place`; `turn` is the identity.
+
+    A mode takes the pole of the motion that most resembles its free one. Transmission, at most ½ of each such motion,
+    and contact forces are those of the mode's own motion, Q of all: two modes of one frequency keep their identity,
+    however the touches couple them.
     """
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
@@ -89,8 +91,9 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
 
 
 def _held_against(spring: Array, every: Array, value: Array, chosen: Array, gives: Array) -> Array:
-    """gᵀRg (m,) of forces F (r, n) of all motions and what gives way under the chosen ones', g (r, m). Two motions of
-    nearly one frequency would each need the other's: what they hold against each other is bounded by their product.
+    """Compute gᵀRg (m,) of forces F (r, n) of all motions and compliant motion of the chosen ones, g (r, m).
+
+    Two motions of nearly one frequency would each need the other's: their mutual term is bounded by their product.
     """
     product = times(every.T, gives)  # F_nᵀ g_k
     product[chosen, np.arange(len(chosen))] = 0
@@ -101,16 +104,16 @@ def _held_against(spring: Array, every: Array, value: Array, chosen: Array, give
 
 
 def times_real(z: Array, matrix: Array) -> Array:
-    """A complex matrix times a real one."""
+    """Multiply a complex matrix by a real one."""
     return times(matrix.T, z.T).T
 
 
 def times(matrix: Array, z: Array) -> Array:
-    """A real matrix times a complex one, in half the time."""
+    """Multiply a real matrix by a complex one, in half the time."""
     both: Array = matrix @ np.ascontiguousarray(z).view(float)
     return both.view(complex)
 
 
 def size_squared(z: Array) -> Array:
-    """|z|²"""
+    """Compute |z|²."""
     return np.asarray(z.real**2 + z.imag**2)

@@ -1,13 +1,13 @@
-"""A body while it touches others: its modes there, and what passes on to those that it touches.
+"""Coupled modes of a body in contact with others, and what it transmits to them.
 
     Moving (body, partners) + Touch (points, springs) -> Touched -> poles -> InPlace
 
-One body is solved at a time, its partners as they are when nothing else touches them: what lies on what lies on a
-table yields as if on the table's own modes alone; longer chains are not claimed.
+One body is solved at a time, its partners as they are free of other contacts: a body on a body on a table moves as if
+on the table's own modes alone; longer chains are not claimed.
 
 Energy: ½|z|² of the new modes is that of the body and its touches' springs. A change of touches is an orthogonal map
-of z, and no decay is below zero: nothing that comes or goes adds energy. A touch begins unstretched, and what one held
-when it goes stays with the body. (A spring attached at an old length would add without bound.)
+of z, and no decay is below zero: no contact that begins or ends adds energy. A touch begins unstretched, and the energy
+of one that ends stays with the body. (A spring attached at an old length would add without bound.)
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from sonic_bullet.support.moving import Moving, Place
 from sonic_bullet.support.springs import ContactSpring
 
 STOPPED = 0.99
-"""d over |s| of what no longer swings: a touch holds that motion."""
+"""d over |s| of a motion that no longer oscillates: a touch stops it."""
 LOST = 0.05
-"""Of a new mode's motion, in the lane it is given: below this nothing of it passes on."""
+"""Of a new mode's motion, in the lane it is given: below this nothing of it is transmitted."""
 HELD = 2.0
 """A new mode above so many times the highest own one is the touches' own stiffness: its motion is stopped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Touch:
-    """One point at which a body touches partner number ``partner``. own, other: the point on either; spring: of this
-    point alone.
+    """One point at which a body touches partner number ``partner``.
+
+    own, other: the point on either; spring: of this point alone.
     """
 
     partner: int
@@ -45,15 +46,20 @@ class Touch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InPlace:
-    """A body while it touches: m modes as before, mixed.
+    """A body in contact: m modes as before, mixed.
 
-    turn (m, m) real, orthogonal: new modes in old ones, by columns; column k is what old mode k became (the identity
-    where they do not mix). State z, gains Uᵀj and shapes of the free modes become turnᵀ z, turnᵀ Uᵀj, Φ turn: ½|z|²
-    stays what it is. omega_rad_s, decay_per_s (m,): poles of the new modes; no decay is below 0. passes: for each
-    partner (m_p, m) complex, its modes' velocity per velocity of each new mode, at most ½ in all: of two that meet at
-    one frequency, each has the other's half. force_n_s (c, m): amplitude of the normal force at each touch in N, for a
-    velocity amplitude z of 1 of a new mode: where Σ|force z| exceeds the load the touch lifts. shares (m, 3): parts of
-    decay_per_s that are its own, the contacts' loss, the partners'. newton (m,): whether Newton's pole stands.
+    Attributes
+    ----------
+    turn : (m, m) real, orthogonal: new modes in old ones, by columns; column k is what old mode k became
+        The identity where they do not mix. State z, gains Uᵀj and shapes of the free modes become turnᵀ z, turnᵀ Uᵀj,
+        Φ turn: ½|z|² stays what it is.
+    omega_rad_s, decay_per_s : (m,) poles of the new modes; no decay is below 0
+    passes : for each partner (m_p, m) complex, its modes' velocity per velocity of each new mode
+        At most ½ in all: of two that meet at one frequency, each has the other's half.
+    force_n_s : (c, m) amplitude of the normal force at each touch in N, for a velocity amplitude z of 1 of a new mode
+        Where Σ|force z| exceeds the load the contact separates.
+    shares : (m, 3) parts of decay_per_s that are its own, the contacts' loss, the partners'
+    newton : (m,) whether Newton's pole has converged
     """
 
     omega_rad_s: Array
@@ -66,7 +72,7 @@ class InPlace:
 
 
 def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
-    """What a body becomes at these touches. None of them: what it is when free."""
+    """Compute the coupled modes of a body at these touches. Without touches: its free modes."""
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
         return InPlace(
@@ -88,8 +94,9 @@ def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch])
 def touched_rows(
     body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], *, squared: bool = True
 ) -> tuple[Touched, Array]:
-    """All springs of all touches, and which of their (3c,) directions those are: what slides has none. squared: with
-    φφᵀ, which Newton needs.
+    """Collect all springs of all touches, and which of their (3c,) directions those are.
+
+    A sliding touch has no tangential one. squared: with φφᵀ, which Newton needs.
     """
     begin = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
     own, of = body.moves([touch.own for touch in touches]), np.array([touch.partner for touch in touches])
@@ -119,7 +126,7 @@ def touched_rows(
 
 
 def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Array, stands: Array) -> InPlace:
-    """The record of poles s (m,) and motions q (m, N)."""
+    """Make the record of poles s (m,) and motions q (m, N)."""
     modes = q[:, :m]
     q = q / np.exp(0.5j * np.angle((modes * modes).sum(axis=1)))[:, None]  # as real as can be
     q *= np.where(np.diag(q.real) < 0, -1, 1)[:, None]
@@ -150,7 +157,7 @@ def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Arra
 
 
 def _shares(x: Touched, m: int, omega: Array, decay: Array, v: Array, force: Array) -> Array:
-    """Parts (m, 3) of the decays, by the mean powers Σ d|v|², ½ F* Re(jω/K) F and ½ F* Re(Y_p) F."""
+    """Split the decays (m, 3) by the mean powers Σ d|v|², ½ F* Re(jω/K) F and ½ F* Re(Y_p) F."""
     spring = 0.5 * (np.abs(force) ** 2 * (1j * omega[:, None] / x.spring).real).sum(axis=1)
     both = 0.5 * np.einsum("ki,kij,kj->k", force.conj(), inverse_w(x, 1j * omega)[0].real, force).real
     own = (np.abs(v[:, :m]) ** 2 * x.decay[:m]).sum(axis=1)

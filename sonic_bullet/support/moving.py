@@ -1,4 +1,4 @@
-"""What a body yields where it is pushed: its modes, its motion as a whole, and what lies under it.
+"""Driving-point mobility of a body: its modes, its rigid motions, and what lies under it.
 
 Y(s) = Σ_k s φ_k φ_kᵀ/(s² + 2 d_k s + λ_k) + Σ_r φ_r φ_rᵀ/s + n nᵀ (y₀ − y₂ s²),   λ = ω² + d²
 φ_r = (1/√M, (r ×) J^{−1/2})                six rigid motions, mass-normalised as the modes are; n the normal
@@ -17,9 +17,15 @@ from sonic_bullet.records import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moving:
-    """A body as something that gives way. omega_rad_s, decay_per_s (m,): its modes', as the bank has them when nothing
-    touches it. mass_kg 0: it does not move as a whole. inertia_kg_m2 (3, 3): body frame, about its centre.
-    plate_m_n_s: y₀ in m/(N·s); half_space_m_s_n: y₂ in m·s/N: of what is known by neither modes nor mass.
+    """Data of a body's mobility.
+
+    Attributes
+    ----------
+    omega_rad_s, decay_per_s : (m,) of its modes, as the bank has them without contacts
+    mass_kg : 0: it has no rigid motion
+    inertia_kg_m2 : (3, 3) body frame, about its centre
+    plate_m_n_s, half_space_m_s_n : y₀ in m/(N·s) and y₂ in m·s/N, of what has neither modes nor mass
+    turn : J^{−1/2}, by columns
     """
 
     omega_rad_s: Array
@@ -31,6 +37,7 @@ class Moving:
     turn: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        """Compute J^{−1/2}."""
         value, vector = np.linalg.eigh(self.inertia_kg_m2)
         least = max(1e-12 * float(value.max()), 1e-300)
         turn = vector / np.sqrt(np.maximum(value, least)) if value.max() > 0 else 0 * vector
@@ -43,11 +50,11 @@ class Moving:
 
     @property
     def decay(self) -> Array:
-        """d (m + 6,)"""
+        """Decays d (m + 6,)."""
         return np.append(self.decay_per_s, np.zeros(6))
 
     def moves(self, places: Sequence[Place]) -> Array:
-        """Φ (3c, m + 6): motion along each place's axes of each mode and of each rigid motion; 0 where it has none."""
+        """Compute Φ (3c, m + 6): motion along each place's axes of each mode and rigid motion; 0 where it has none."""
         rigid = np.zeros((len(places), 3, 6))
         if self.mass_kg > 0:
             x, y, z = np.array([place.arm_m for place in places]).T
@@ -61,8 +68,13 @@ class Moving:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A point of a body, in its frame: shape (3, m) mode shapes in 1/√kg, arm_m (3,) from the centre of mass, axes (3,
-    3): the contact's normal and two tangents as rows, the same three directions in space for both bodies.
+    """A point of a body, in its frame.
+
+    Attributes
+    ----------
+    shape : (3, m) mode shapes in 1/√kg
+    arm_m : (3,) from the centre of mass
+    axes : (3, 3) the contact's normal and two tangents as rows, the same three directions in space for both bodies
     """
 
     shape: Array
@@ -71,6 +83,6 @@ class Place:
 
 
 def wide_plate_m_n_s(youngs_pa: float, poisson: float, density_kg_m3: float, thickness_m: float) -> float:
-    """y₀ of a plate whose edges are far, in m/(N·s)."""
+    """Compute y₀ of a plate whose edges are far, in m/(N·s)."""
     bending = youngs_pa * thickness_m**3 / (12 * (1 - poisson**2))
     return float(1 / (8 * np.sqrt(bending * density_kg_m3 * thickness_m)))

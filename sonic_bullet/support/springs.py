@@ -1,4 +1,4 @@
-"""Stiffness and loss of a contact, from the region of touching, the materials and the load.
+"""Stiffness and loss of a contact, from its region, the materials and the load.
 
     K_c = π E* a / 𝐊(e),  e² = 1 − (b/a)²     a region with half-axes a >= b acts as the flat punch of its outline
         [Green & Sneddon 1950; of a circle 2E*a: Johnson 1985, Contact Mechanics, eq. 3.36]
@@ -8,11 +8,11 @@
     face   a, b of the geometry; rectangles as the ellipse of their area and aspect
     K_r = N/u₀,  u₀ = h/2                     roughness in series, h rms of both    [Persson 2007, PRL 99, 125502]
     1/K = (1/K_c + 1/K_r)/(1 + jη),  K_t/K = 2(1 − ν)/(2 − ν)          [Mindlin 1949; Johnson 1985, eq. 7.42, 7.44]
-    η = Σ η_i c_i/Σ c_i,  c_i = (1 − ν_i²)/E_i             loss by each material's share of the compliance, 1/E* = Σ c_i
+    η = Σ η_i c_i/Σ c_i,  c_i = (1 − ν_i²)/E_i        loss by each material's fraction of the compliance, 1/E* = Σ c_i
     pad    K = EA/h, sideways GA/h
 
-Increments about a load see the region of that load stay as it is [Barber 2003, Proc. R. Soc. A 459, 53]. Asperities are
-of the same two materials, and lose as they do. η is a constant, as in the handbooks: the Rayleigh law of wood, made for
+For increments about a load the region of that load is constant [Barber 2003, Proc. R. Soc. A 459, 53]. Asperities are
+of the same two materials, with the same loss. η is a constant, as in the handbooks: the Rayleigh law of wood, made for
 an object's modes, would lose a third of a cycle's energy at 17 kHz.
 """
 
@@ -34,7 +34,10 @@ SQUARE = 2 / np.sqrt(np.pi)
 
 @dataclass(frozen=True, slots=True)
 class ContactSide:
-    """One body's part in a contact. modulus_pa: E as it is pressed (wood: across the grain); loss_factor: η."""
+    """Properties of one body in a contact.
+
+    modulus_pa: E as it is pressed (wood: across the grain); loss_factor: η.
+    """
 
     modulus_pa: float
     poisson: float
@@ -43,8 +46,9 @@ class ContactSide:
 
     @classmethod
     def of(cls, material: Material) -> ContactSide:
-        """What a material is where it is touched: its softest axis, and its least Rayleigh loss, 2√(αβ), none where
-        nobody knows it.
+        """Take a material's properties in a contact.
+
+        Its softest axis, and its least Rayleigh loss, 2√(αβ), none where that is not known.
         """
         softest = float(1 / np.diag(np.linalg.inv(material.stiffness_pa))[:3].max())
         alpha, beta = material.alpha_per_s, material.beta_s
@@ -53,21 +57,24 @@ class ContactSide:
 
     @property
     def compliance_per_pa(self) -> float:
-        """(1 − ν²)/E"""
+        """Compliance (1 − ν²)/E."""
         return (1 - self.poisson**2) / self.modulus_pa
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Where two bodies touch, along two axes in their tangent plane. half_m: how far they conform, 0 where they curve
-    apart at once; curvature_per_m: κ of both together, of no matter where they conform. A ball on a plane: (0, 0), (κ,
-    κ); a rod that lies on it: (L/2, 0), (0, 1/R); a box: (l/2, w/2), (0, 0).
+    """Contact region of two bodies, along two axes in their tangent plane.
+
+    half_m: how far they conform, 0 where they curve away from each other at once; curvature_per_m: κ of both together,
+    unused where they conform. A ball on a plane: (0, 0), (κ, κ); a rod that lies on it: (L/2, 0), (0, 1/R); a box:
+    (l/2, w/2), (0, 0).
     """
 
     half_m: tuple[float, float]
     curvature_per_m: tuple[float, float]
 
     def __post_init__(self) -> None:
+        """Check that each axis has a half-length or a curvature."""
         for half, curvature in zip(self.half_m, self.curvature_per_m, strict=True):
             if not (0 < half < np.inf or (half == 0 and 0 < curvature < np.inf)):
                 raise RecordError(
@@ -76,7 +83,7 @@ class Region:
                 )
 
     def half_axes_m(self, modulus_pa: float, load_n: float) -> tuple[float, float]:
-        """a >= b in m of the ellipse that touches under a load. modulus_pa: E*."""
+        """Compute a >= b in m of the ellipse that touches under a load. modulus_pa: E*."""
         if not any(self.half_m):
             small, large = sorted(self.curvature_per_m)
             mean = (3 * load_n / (4 * modulus_pa * np.sqrt(small * large))) ** (1 / 3)
@@ -98,12 +105,12 @@ class ContactSpring:
     tangential_n_m: complex
 
     def share(self, part: float) -> ContactSpring:
-        """The spring of a part of the region: what several points share."""
+        """Return the spring of a fraction of the region, for several points in one."""
         return ContactSpring(self.normal_n_m * part, self.tangential_n_m * part)
 
 
 def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_n: float) -> ContactSpring:
-    """The whole region's spring under the whole load in N. Raises RecordError for a load that is not above zero."""
+    """Compute the whole region's spring under the whole load in N. Raises RecordError for a load not above zero."""
     from scipy.special import ellipkm1
 
     load = as_number(load_n, "load of a contact", "give a load above zero", above=0)
@@ -118,7 +125,10 @@ def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_
 
 
 def pad_spring(modulus_pa: float, poisson: float, loss_factor: float, area_m2: float, height_m: float) -> ContactSpring:
-    """The spring of a pad of felt or rubber: EA/h along its height, GA/h across: a short column that does not bulge."""
+    """Compute the spring of a pad of felt or rubber: EA/h along its height, GA/h across.
+
+    A short column that does not bulge.
+    """
     area = as_number(area_m2, "area of a pad", "give an area above zero", above=0)
     height = as_number(height_m, "height of a pad", "give a height above zero", above=0)
     normal = as_number(modulus_pa, "modulus of a pad", "give a modulus above zero", above=0) * area / height
