@@ -3,7 +3,7 @@
     modes, lines: f, d, a as lists;
         noise: centres of bands and times, levels in half decibels below the loudest, a byte each, base64
 
-Byte 0 is silence, byte q stands for ½(q - 255) dB. Levels are of powers per Hz over bands a sixth of an octave wide or
+Byte 0 is silence, byte q means ½(q - 255) dB. Levels are of powers per Hz over bands a sixth of an octave wide or
 wider, frames that grow with time: no phase, no waveform.
 """
 
@@ -27,7 +27,7 @@ Numbers = Annotated[tuple[float, ...], msgspec.Meta(max_length=MOST)]
 
 
 class ResidualForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """`Residual` as JSON. source: what it was taken from. loudest_per_hz: the power per Hz that byte 255 stands for."""
+    """`Residual` as JSON. source: what it was taken from; loudest_per_hz: the power per Hz of byte 255."""
 
     source: str
     mode_freq_hz: Numbers
@@ -44,7 +44,7 @@ class ResidualForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 def form_of(residual: Residual) -> ResidualForm:
-    """The compact form; `residual_of` gives the same back to a quarter of a decibel."""
+    """Encode a residual; `residual_of` returns the same to a quarter of a decibel."""
     loudest = float(residual.power_per_hz.max(initial=0.0))
     with np.errstate(divide="ignore"):
         level = (
@@ -66,7 +66,7 @@ def form_of(residual: Residual) -> ResidualForm:
 
 
 def residual_of(form: ResidualForm, where: str = "preset") -> Residual:
-    """The residual a form describes. Raises MaterialError naming the preset and what is wrong."""
+    """Decode a residual. Raises MaterialError naming the preset and what is wrong."""
     shape = (len(form.freq_hz), len(form.time_s))
     try:
         content = base64.b64decode(form.levels, validate=True)
@@ -101,5 +101,5 @@ def residual_of(form: ResidualForm, where: str = "preset") -> Residual:
 
 
 def _short(values: Array) -> tuple[float, ...]:
-    """Nine digits: a part in 1e9 of a frequency is no matter of hearing."""
+    """Round to nine digits: a part in 1e9 of a frequency is inaudible."""
     return tuple(float(f"{value:.9g}") for value in values)

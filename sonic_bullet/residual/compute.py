@@ -1,15 +1,14 @@
-"""The residual of a recording: what is left of its power when what the modes represent is taken off [Ren, Yeh, Lin
-2013, sec. 6.1].
+"""Residual of a recording: its power minus that of the modes [Ren, Yeh, Lin 2013, sec. 6.1].
 
     represented(t) = Σ_i R_i φ_i(t)
-        features φ_i, each with the share R_i that the modes have of it (its match ratio)
+        features φ_i, each with the fraction R_i that the modes have of it (its match ratio)
     P_residual = max(P_recorded - P_represented, 0)                                             pixel by pixel
 
-For a preset it is described in two parts. What is left of the features, √(1 - R_i²) of each, is lines: their
-frequencies are known far better than a spectrogram shows them. In no band more is left than recordings have beyond what
-is played: modes too close to be resolved make one feature that matches none of them. What is left beside all features
-is noise, of which bands and times keep the mean, less the recording's own floor, less what most strikes do not have,
-and less what is not noise: the foot of lines that are no pure damped sinusoids would else be spread over whole bands.
+A preset describes it in two parts. The rest of the features, √(1 - R_i²) of each, is lines: their frequencies are known
+far better than from a spectrogram. No band keeps more than recordings have beyond what is played: modes too close to be
+resolved make one feature that matches none of them. The rest beside all features is noise, stored as means over bands
+and times. From it are subtracted the recording's own floor, what most strikes do not have, and what is not noise: the
+foot of lines that are no pure damped sinusoids would else be spread over whole bands.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ LONGEST_S = 1.0
 FINE_WINDOW = 4096
 LINES_MOST = 128
 LINE_FLOOR = 1e-4
-"""Lines with less than this share of the loudest line's energy (40 dB) and less than of the clip's are left out."""
+"""Lines with less than this fraction of the loudest line's energy (40 dB) and of the clip's are left out."""
 BAND_OCTAVES = 1 / 6
 GROWTH = 1.12
 ABOVE = 2.0
@@ -42,7 +41,7 @@ NEPERS = 40.0
 
 
 def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
-    """Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `NEPERS`."""
+    """Compute Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `NEPERS`."""
     out = np.zeros(n)
     decay = np.asarray(decay_per_s, float)
     length = np.where(decay > 0, np.minimum(n, NEPERS * sr / np.maximum(decay, 1e-9) + 1), n).astype(np.int64)
@@ -63,10 +62,9 @@ def _damped(pole: Array, amplitude: Array, length: Array, out: Array) -> None:  
 def clip_residual(
     recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = WINDOW
 ) -> tuple[Power, Array]:
-    """P_residual of a recording (n,) and the complex transform of recorded - represented (m, k), whose phases its
-    inversion starts from.
+    """Compute P_residual of a recording (n,), and the complex transform of recorded - represented (m, k).
 
-    Raises AudioError: empty, NaN, other lengths, or another rate.
+    The inversion starts from the phases of the second. Raises AudioError: empty, NaN, other lengths, or another rate.
     """
     if represented_sr is not None and represented_sr != sr:
         raise AudioError(f"a residual of {represented_sr} Hz beside a recording of {sr} Hz", "resample one of them")
@@ -79,14 +77,15 @@ def clip_residual(
 
 
 def noise_floor_per_hz(left: Power) -> Array:
-    """(b,) floor: the median over the last third of the frames; an exponential law's median is ln 2 of its mean."""
+    """Estimate the floor (b,): the median over the last third of the frames, over ln 2, as of an exponential law."""
     tail = left.per_hz[:, -max(len(left.time_s) // 3, 1) :]
     return np.asarray(np.median(tail, axis=1) / np.log(2))
 
 
 def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
-    """Bands (b,) in Hz, times (n,) in s and mean power per Hz (b, n) less the floor: a sixth of an octave or a bin,
-    frames of 1, 1, … then ever more.
+    """Average the power less the floor over bands and times: bands (b,) in Hz, times (n,) in s, power per Hz (b, n).
+
+    Bands of a sixth of an octave or a bin, frames of 1, 1, … then ever more.
     """
     width = left.freq_hz[1]
     edge = [0.0]
@@ -113,10 +112,9 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
 
 
 def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
-    """`cells` of the mean over strikes, where most strikes have some for themselves: what one of two has and the other
-    has not is no property of the body.
+    """Compute `cells` of the mean over strikes, where most strikes have some themselves. Nothing below `LOWEST_BINS`.
 
-    Nothing below `LOWEST_BINS`.
+    What one of two strikes has and the other has not is no property of the body.
     """
     mean = Power(left[0].freq_hz, left[0].time_s, np.mean([p.per_hz for p in left], axis=0))
     freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
@@ -125,8 +123,9 @@ def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
 
 
 def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
-    """(b, n) share of the power in bands about freq_hz (b,) that is noise: median over mean across a band's fine bins,
-    ln 2 for noise, little where lines remain.
+    """Estimate the fraction (b, n) of the power in bands about freq_hz (b,) that is noise.
+
+    Median over mean across a band's fine bins, ln 2 for noise, little where lines remain.
     """
     edge = np.concatenate([[0.0], (freq_hz[1:] + freq_hz[:-1]) / 2, [np.inf]])
     bounds = np.searchsorted(fine.freq_hz, edge)
@@ -142,10 +141,10 @@ def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
 def line_room(
     recorded: list[Power], rest: list[Power], played: list[Power], lines: tuple[Array, Array, Array], seconds: float
 ) -> Array:
-    """Share (l,) of lines' energies for which there is room: all lines in a band together have no more than what
-    recordings have there beyond what is played, or what recorded - played has, if that is more (a line missing beside a
-    mode that is played too loud). Energies are means over strikes.
+    """Compute the fraction (l,) of lines' energies that the recordings allow.
 
+    All lines in a band together have no more than the recordings have there beyond what is played, or than recorded -
+    played has, if that is more (a line missing beside a mode that is played too loud). Energies are means over strikes.
     A line's band: `LINE_WIDTHS` of its half width either way, and three bins at least.
     """
     freq_hz, decay_per_s, amplitude = lines
@@ -176,12 +175,16 @@ def residual_record(
     lines: tuple[Array, Array, Array],
     source: str,
 ) -> Residual:
-    """The residual of strikes (s, n) from the onset on: ``left`` (s, n) beside all features, ``rest`` (s, n) beside
-    the modes as the model plays them.
+    """Make the residual of strikes (s, n) from the onset on.
 
-    lines: frequency, decay, amplitude (l,), mean square over the strikes, that the modes' share of the features leaves;
-    neither they nor noise become more than there is in ``rest``. Levels come out relative to the strongest mode. Raises
-    AudioError on empty clips and NaN, RecordError where nothing can follow.
+    Levels are relative to the strongest mode. Neither lines nor noise exceed ``rest``. Raises AudioError on empty clips
+    and NaN, RecordError where nothing can follow.
+
+    Parameters
+    ----------
+    left : (s, n) beside all features
+    rest : (s, n) beside the modes as the model plays them
+    lines : frequency, decay, amplitude (l,), mean square over the strikes, of the rest of the features
     """
     if not len(recorded) or recorded.shape != left.shape or recorded.shape != rest.shape:
         raise AudioError(

@@ -1,4 +1,4 @@
-"""What a strike adds beside its modes: a grain of shaped noise, cut once a body and then filtered to each place.
+"""Noise of a strike beside its modes: a grain of shaped noise, made once a body and then filtered to each place.
 
     once a body:
         P(f, t) shifted and stretched onto its modes -> magnitudes -> invert -> base_v(t), v = 0, 1 from two seeds
@@ -6,9 +6,9 @@
         A: `transfer.scale` of the modes as they are struck there, F̂: the force pulse
     each strike:     J-level · (cos θ g_0 + sin θ g_1), θ seeded: as loud, of the same spectrogram, and no two alike
 
-A does not hang on time, so the order (transfer, then invert) or (invert, then scale) is one up to the window's length.
-Places are distinguished by A itself, in steps of 2 dB at each pair of modes, and pulses in eighths of an octave:
-whoever comes first, a cached grain has the same bits.
+A does not depend on time, so the order (transfer, then invert) or (invert, then scale) gives the same up to the
+window's length. Places are distinguished by A itself, in steps of 2 dB at each pair of modes, and pulses in eighths of
+an octave: a cached grain has the same bits, whichever strike made it.
 """
 
 from __future__ import annotations
@@ -50,9 +50,15 @@ SEEDS = (0x5EED, 0xF00D)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Voice:
-    """A body's residual. pairs; here_hz (k,): source frequency of each bin; source_power (p,) of the pairs' modes; base
-    (2, F) complex64: spectra of the base grains of ``length`` samples at FFT size ``size``; lines. silent: the noise is
-    none. cache: of `placed`, by key; a pure function's, so it may be shared.
+    """A body's residual for playback.
+
+    Attributes
+    ----------
+    here_hz : (k,) source frequency of each bin
+    source_power : (p,) of the pairs' modes
+    base : (2, F) complex64, spectra of the base grains of ``length`` samples at FFT size ``size``
+    silent : whether there is no noise
+    cache : of `placed`, by key; a pure function's, so it may be shared
     """
 
     sr: int
@@ -68,7 +74,7 @@ class Voice:
 
 
 def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: float = LONGEST_S) -> Voice:
-    """A body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
+    """Make a body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
     source = source_modes(residual)
     pairs = pair(source, target)
     joined, _ = merged(source)
@@ -97,7 +103,7 @@ def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: floa
 
 
 def duration(residual: Residual, pairs: ModePairs, sr: int, longest_s: float) -> int:
-    """Samples until the last of a residual's noise has passed, when stretched onto the pairs; a window at least."""
+    """Count the samples until the end of a residual's noise, stretched onto the pairs; a window at least."""
     sounding = np.flatnonzero(residual.power_per_hz.any(axis=0))
     last = float(residual.time_s[min(int(sounding[-1]) + 1, len(residual.time_s) - 1)]) if len(sounding) else 0.0
     return max(2 * WINDOW, round(sr * min(longest_s, last / float(pairs.rate.min()))))
@@ -105,7 +111,7 @@ def duration(residual: Residual, pairs: ModePairs, sr: int, longest_s: float) ->
 
 @lru_cache(maxsize=16)
 def faded(n: int, sr: int) -> Array:
-    """(n,) float32: rises within a millisecond, falls over the last 15 %, with no corner in either."""
+    """Return a window (n,) float32 that rises within a millisecond and falls over the last 15 %, without corners."""
     shape = np.ones(n, np.float32)
     rise, fall = max(2, round(FADE_IN_S * sr)), max(2, int(FADE_OUT * n))
     shape[:rise] = np.sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
@@ -115,14 +121,14 @@ def faded(n: int, sr: int) -> Array:
 
 
 def response(voice: Voice, struck_power: Array, pulse: Array | None = None) -> Array:
-    """(k,) by which the base grains' bins are multiplied: √A for modes struck to a² (p,), times a pulse's |F̂| (k,)."""
+    """Compute the factors (k,) of the base grains' bins: √A for modes struck to a² (p,), times a pulse's |F̂| (k,)."""
     return np.asarray(
         np.sqrt(scale(voice.pairs, voice.source_power, struck_power, voice.here_hz)) * (1.0 if pulse is None else pulse)
     )
 
 
 def filtered(voice: Voice, gain: Array) -> Array:
-    """(2, length) float32: the base grains through a response (k,)."""
+    """Filter the base grains by a response (k,): (2, length) float32."""
     spectrum = np.empty_like(voice.base)
     _filter(voice.base, np.asarray(gain, np.float32), spectrum)
     from scipy.fft import irfft
@@ -134,10 +140,10 @@ Pulse = Callable[[Array, bool], Array]
 
 
 def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: Pulse) -> tuple[Array, float]:
-    """The two grains (2, length) of a place and a pulse, and the level by which they are to be multiplied. struck_power
-    (p,): a² of the pairs.
+    """Return the two grains (2, length) of a place and a pulse, and the level by which they are to be multiplied.
 
-    pulse: |F̂| (k,) of a force pulse at products fτ (k,), flat or not, relative to 0 Hz.
+    struck_power (p,): a² of the pairs. pulse: |F̂| (k,) of a force pulse at products fτ (k,), flat or not, relative to
+    0 Hz.
     """
     most = float(struck_power.max(initial=0.0))
     if most <= 0 or voice.silent:
@@ -158,7 +164,7 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
 
 
 def varied(grains: Array, level: float, number: int) -> Array:
-    """(length,) float32: a grain of its own for each ``number``, as loud as the others."""
+    """Mix a different grain (length,) float32 for each ``number``, as loud as the others."""
     angle = 2 * np.pi * fraction(number)
     out = np.empty(grains.shape[1], np.float32)
     _mix(grains, np.float32(level * np.cos(angle)), np.float32(level * np.sin(angle)), out)
@@ -166,7 +172,7 @@ def varied(grains: Array, level: float, number: int) -> Array:
 
 
 def mixed_number(*parts: int) -> int:
-    """A number below 2⁶⁴ that any change of any part changes everywhere (splitmix64's finaliser, a part at a time)."""
+    """Hash parts to a number below 2⁶⁴ (splitmix64's finaliser, a part at a time)."""
     state = 0x9E3779B97F4A7C15
     for part in parts:
         state = (state ^ (part & 0xFFFFFFFFFFFFFFFF)) * 0xBF58476D1CE4E5B9 & 0xFFFFFFFFFFFFFFFF
@@ -176,13 +182,13 @@ def mixed_number(*parts: int) -> int:
 
 
 def fraction(number: int) -> float:
-    """A number below 2⁶⁴ as a share of 1."""
+    """Scale a number below 2⁶⁴ to 0 … 1."""
     return (number >> 11) / (1 << 53)
 
 
 @njit(nogil=True)
 def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover - compiled
-    """step (p + 2,) ← levels of power (p,) below the most, in whole steps."""
+    """Write levels of power (p,) below the most, in whole steps, to step (p + 2,)."""
     least = most * 10.0 ** (LEAST_DB / 10.0)
     for p in range(len(power)):
         step[p] = round(10.0 * np.log10(max(power[p], least) / most) / STEP_DB)
@@ -196,7 +202,7 @@ def _mix(grains: Array, first: np.float32, second: np.float32, out: Array) -> No
 
 @njit(nogil=True)
 def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover - compiled
-    """out (v, F) = base · gain, the gain (k,) linear between its bins."""
+    """Compute out (v, F) = base · gain, the gain (k,) linear between its bins."""
     every = (base.shape[1] - 1) // (len(gain) - 1)
     for k in range(base.shape[1]):
         low = min(k // every, len(gain) - 2)
@@ -207,9 +213,7 @@ def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover -
 
 
 def angles(number: int) -> Array:
-    """(k,) an angle for each bin, wandering at random over `KNOTS` bands: two numbers' grains have next to nothing in
-    common.
-    """
+    """Draw an angle (k,) for each bin, random over `KNOTS` bands: grains of two numbers are all but uncorrelated."""
     state = np.uint64(mixed_number(number)) + np.arange(KNOTS, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -219,7 +223,7 @@ def angles(number: int) -> Array:
 
 @njit(nogil=True)
 def shape(spectrum: Array, base: Array, first: Array, second: Array) -> None:  # pragma: no cover - compiled
-    """spectrum (F,) ← spectrum·(first·base_0 + second·base_1), first and second (k,) linear between their bins."""
+    """Multiply spectrum (F,) by first·base_0 + second·base_1, first and second (k,) linear between their bins."""
     every = (base.shape[1] - 1) // (len(first) - 1)
     for k in range(base.shape[1]):
         low = min(k // every, len(first) - 2)

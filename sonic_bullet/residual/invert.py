@@ -1,11 +1,11 @@
-"""From a power spectrogram back to samples: the iterative inverse short-time transform, ten turns at most.
+"""Inversion of a power spectrogram to samples: the iterative inverse short-time transform, ten iterations at most.
 
     S ← A·C/|C|,  C = T(T⁻¹(S))                                 magnitudes kept, phases made consistent
         [Griffin & Lim 1984, eq. 8]
     S ← A·Q/|Q|,  Q = C + μ (C - C before)                       with momentum
         [Perraudin et al. 2013, algorithm 2]
 
-A = √P. It starts from phases that are given: the source's, where there is a source, those of seeded noise else.
+A = √P. It starts from given phases: the source's, where there is a source, else those of seeded noise.
 """
 
 from __future__ import annotations
@@ -22,9 +22,8 @@ ITERATIONS = 4
 MOST_ITERATIONS = 10
 MOMENTUM = 0.99
 OVERLAP = 2
-"""With frames half a window apart four turns leave 10 % inconsistent, where a quarter apart ten leave 20 % (noise with
-a decay, momentum 0.99).
-"""
+"""With frames half a window apart four iterations leave 10 % inconsistent, where a quarter apart ten leave 20 % (noise
+with a decay, momentum 0.99)."""
 LONGEST_NOISE = 1 << 18
 
 
@@ -38,7 +37,7 @@ def invert(
     window: int = WINDOW,
     overlap: int = OVERLAP,
 ) -> Array:
-    """Samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count.
+    """Compute samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count.
 
     iterations: 0 … 10.
     """
@@ -55,8 +54,9 @@ def invert(
 
 
 def noise_phases(n: int, seed: int, window: int = WINDOW, overlap: int = OVERLAP) -> Array:
-    """(m, k) complex64: the transform of white noise, whose phases are consistent with each other; the same for a
-    longer grain, as far as both go.
+    """Return the transform (m, k) complex64 of white noise, whose phases are consistent with each other.
+
+    A longer grain's are the same, as far as both go.
     """
     frames = frame_count(n, window, overlap)
     longest = max(LONGEST_NOISE, 1 << int(np.ceil(np.log2(n + window))))
@@ -71,12 +71,12 @@ def _noise(n: int, seed: int, window: int, overlap: int) -> Array:
 
 
 def magnitude_of(per_hz: Array, sr: int, window: int = WINDOW) -> Array:
-    """|S| (m, k) of powers per Hz (k, m)."""
+    """Compute |S| (m, k) of powers per Hz (k, m)."""
     return np.asarray(np.sqrt(per_hz.T * (sr * float((hann(window).astype(float) ** 2).sum()))), np.float32)
 
 
 def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW, overlap: int = OVERLAP) -> float:
-    """‖|T(x)| - A‖/‖A‖: how far samples are from having the magnitudes asked for."""
+    """Compute ‖|T(x)| - A‖/‖A‖: how far samples are from the magnitudes asked for."""
     return float(
         np.linalg.norm(np.abs(transform(sample, window, overlap)) - magnitude)
         / max(float(np.linalg.norm(magnitude)), 1e-300)
@@ -87,7 +87,7 @@ def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW, overlap
 def _phased(
     spectrum: Array, before: Array, magnitude: Array, momentum: np.float32
 ) -> None:  # pragma: no cover - compiled
-    """spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← spectrum as it came.
+    """Set spectrum ← magnitude·Q/|Q|, Q = spectrum + momentum (spectrum - before); before ← the former spectrum.
 
     Real and imaginary parts in turn.
     """

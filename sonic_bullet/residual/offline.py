@@ -5,8 +5,8 @@ recorded, represented + Modes of source and target -> transfer -> invert, from t
 Residual + Modes (a complex) -> Voice -> lines, each a quarter turn from the mode it follows; a grain of noise ->
     samples   what the run time plays of one strike
 
-Phases: a sinusoid of f_s seen at t_s stands at f_s t_s turns; carried to f_t and t_t it stands at f_t t_t. So each
-pixel takes the phase of the pixel it comes from, turned by f_t t_t - f_s t_s. A body carried onto itself turns nothing.
+Phases: a sinusoid of f_s at t_s has f_s t_s turns; moved to f_t and t_t it has f_t t_t. So each pixel takes the phase
+of its source pixel, turned by f_t t_t - f_s t_s. A body's transfer to itself turns nothing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_
 
 LONGEST_S = 1.0
 LOOKING = 4
-"""Frames a quarter of a window apart, as `clip_residual` sees a recording."""
+"""Frames a quarter of a window apart, as in `clip_residual`."""
 
 
 def transferred_clip(
@@ -34,9 +34,10 @@ def transferred_clip(
     *,
     seconds: float | None = None,
 ) -> Array:
-    """(n,) float32: the residual of a recording (k,), of which ``represented`` (k,) is said by modes ``source``, beside
-    modes ``target``; as long as the recording or ``seconds``. Raises AudioError as `clip_residual` and `StruckModes`
-    do.
+    """Transfer the residual of a recording (k,) from modes ``source`` to modes ``target``: (n,) float32.
+
+    represented (k,): what ``source`` represents of the recording. As long as the recording, or ``seconds``. Raises
+    AudioError as `clip_residual` and `StruckModes`.
     """
     left, start = clip_residual(recorded, represented, sr)
     pairs = pair(source, target)
@@ -56,7 +57,7 @@ def transferred_clip(
 def residual_sound(
     residual: Residual, freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, seed: int = 0
 ) -> Array:
-    """(n,) what the residual adds to modes (m,) of complex amplitude at the onset, in their unit."""
+    """Synthesise the residual (n,) of modes (m,) of complex amplitude at the onset, in their unit."""
     order = np.argsort(freq_hz, kind="stable")
     freq, decay, start = freq_hz[order], decay_per_s[order], np.asarray(amplitude, complex)[order]
     if not len(freq) or not np.abs(start).max() > 0:

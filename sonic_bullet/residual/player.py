@@ -1,14 +1,13 @@
-"""Grains under way, and rubbing as a row of micro-collisions: state in, samples and state out.
+"""Grains under way, and friction as a row of micro-collisions: state in, samples and state out.
 
     strike:    grain from sample n_0 on
-    rubbing:   force f on the sections [jG, jG + 2G) of absolute time, under w² + w'² = 1:
+    friction:  force f on the sections [jG, jG + 2G) of absolute time, under w² + w'² = 1:
         grain_j = T⁻¹(T(f w) √A (cos θ_j T(base_0) + sin θ_j T(base_1))), θ_j(f) seeded
 
-A section's force is carried as it is, every micro-collision of it at its own time; sections overlap by half with
-windows whose squares add to one, and as no two have the same noise their powers add: steady rubbing is steady. A
-section is known when it is over, so its sound comes 2G samples late, 21 ms at 48 kHz. Sections lie on the grid of
-absolute samples, grains are added in the order in which they became known: any way of cutting the calls gives the same
-bits.
+A section's force is used as it is, every micro-collision of it at its own time. Sections overlap by half with windows
+whose squares add to one, and as no two have the same noise their powers add: steady friction sounds steady. A section
+is known when it is over, so its sound comes 2G samples late, 21 ms at 48 kHz. Sections lie on the grid of absolute
+samples, grains are added in the order in which they became known: any split into calls gives the same bits.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from sonic_bullet.residual.grains import Voice, angles, response, shape
 
 SECTION = 512
 LEAST_LEVEL = 2e-6
-"""Sections that could reach no more than this, -20 dB SPL at 1 m, are passed over."""
+"""Sections that could reach no more than this, -20 dB SPL at 1 m, are skipped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +35,7 @@ class Grain:
 
 
 def add_grains(out: Array, grains: tuple[Grain, ...], at: int) -> tuple[Grain, ...]:
-    """Add to out (W, b, n), whose first sample is ``at``, what of the grains lies in it; those that go on
-    afterwards.
-    """
+    """Add the grains to out (W, b, n), whose first sample is ``at``; return those that continue afterwards."""
     end = at + out.shape[2]
     for grain in grains:
         low, high = max(grain.start, at), min(grain.start + len(grain.sample), end)
@@ -51,10 +48,10 @@ def add_grains(out: Array, grains: tuple[Grain, ...], at: int) -> tuple[Grain, .
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rubbed:
-    """The force of one pair on one side so far: samples (n,) in newton from absolute sample ``start``, a multiple of
-    `SECTION`.
+    """Friction force of one pair on one side so far.
 
-    gain (m,): Uᵀ per newton on the side's modes, as it was last.
+    Samples (n,) in newton from absolute sample ``start``, a multiple of `SECTION`. gain (m,): last Uᵀ per newton on the
+    side's modes.
     """
 
     start: int
@@ -63,17 +60,17 @@ class Rubbed:
 
 
 def section_window() -> Array:
-    """(2G,) rising and falling smoothly, w[n]² + w[n + G]² = 1 (the power-complementary window of Vorbis)."""
+    """Return a window (2G,) with w[n]² + w[n + G]² = 1 (the power-complementary window of Vorbis)."""
     return np.asarray(np.sin(np.pi / 2 * np.sin(np.pi * (np.arange(2 * SECTION) + 0.5) / (2 * SECTION)) ** 2))
 
 
 def rubbed(
     state: Rubbed | None, force_n: Array | None, at: int, n: int
 ) -> tuple[list[tuple[int, Array]], Rubbed | None]:
-    """Sections (number j, force under the window (2G,)) that are complete with the n samples from ``at`` on, and the
-    state after them.
+    """Cut the sections that are complete with the n samples from ``at`` on; also return the state after them.
 
-    force_n None: the pair does not rub; the state is None when nothing of it is left.
+    Sections are (number j, force under the window (2G,)). force_n None: the pair has no friction; the state is None
+    when nothing of it is left.
     """
     if state is None:
         if force_n is None:
@@ -93,7 +90,10 @@ def rubbed(
 
 
 def section_grain(voice: Voice, force_n: Array, struck_power: Array, number: int) -> Array:
-    """(length + 2G,) sound of one section of force (2G,) in newton; struck_power (p,): a² of the pairs per N·s."""
+    """Compute the sound (length + 2G,) of one section of force (2G,) in newton.
+
+    struck_power (p,): a² of the pairs per N·s.
+    """
     level = float(np.sqrt(struck_power.max(initial=0.0))) * float(np.abs(force_n).sum()) / voice.sr
     if voice.silent or level < LEAST_LEVEL:
         return np.zeros(0, np.float32)

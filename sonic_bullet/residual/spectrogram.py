@@ -5,7 +5,7 @@
     x[n] = Σ_m w[n - mH] x_m[n - mH] / Σ_m w²[n - mH]                         nearest in squares
         [Griffin & Lim 1984, eq. 6]
 
-w: Hann, periodic; H = N/4 for looking at a sound, N/2 for making one: phases then settle sooner. m frames, k bins.
+w: Hann, periodic; H = N/4 for analysis, N/2 for synthesis: phases then converge sooner. m frames, k bins.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ WINDOW = 512
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Power:
-    """Power per Hz (b, n) over freq_hz (b,) and time_s (n,), both ascending; between the points it is bilinear, above
-    and after them zero.
+    """Power per Hz (b, n) over freq_hz (b,) and time_s (n,), both ascending.
+
+    Bilinear between the points, zero above and after them.
     """
 
     freq_hz: Array
@@ -33,6 +34,7 @@ class Power:
     per_hz: Array
 
     def __post_init__(self) -> None:
+        """Check shapes, axes and signs."""
         for name, shape in (
             ("freq_hz", (None,)),
             ("time_s", (None,)),
@@ -47,27 +49,28 @@ class Power:
 
 @lru_cache(maxsize=8)
 def hann(length: int) -> Array:
-    """(length,) float32, periodic, read-only."""
+    """Return the Hann window (length,) float32, periodic, read-only."""
     window = (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)).astype(np.float32)
     window.setflags(write=False)
     return window
 
 
 def frame_count(n: int, window: int = WINDOW, overlap: int = 4) -> int:
-    """Frames that see any of n samples, window/overlap apart."""
+    """Count the frames that contain any of n samples, window/overlap apart."""
     return (n + window // 2) // (window // overlap) + 1
 
 
 def axes(n: int, sr: int, window: int = WINDOW, overlap: int = 4) -> tuple[Array, Array]:
-    """Frequencies (window/2 + 1,) in Hz and times (m,) in s of `transform`."""
+    """Return frequencies (window/2 + 1,) in Hz and times (m,) in s of `transform`."""
     return np.arange(window // 2 + 1) * sr / window, np.arange(frame_count(n, window, overlap)) * (
         window // overlap
     ) / sr
 
 
 def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
-    """S (m, window/2 + 1) complex64 of samples (n,); frame m lies about sample m·window/overlap, zeros stand before and
-    after.
+    """Compute S (m, window/2 + 1) complex64 of samples (n,).
+
+    Frame m is centred on sample m·window/overlap, with zeros before and after the samples.
     """
     from scipy.fft import rfft  # several frames at once in vector registers, which numpy's does not
 
@@ -77,7 +80,7 @@ def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
 
 
 def inverse(spectrum: Array, n: int, window: int = WINDOW, overlap: int = 4) -> Array:
-    """Samples (n,) float32 whose transform is nearest to S in squares."""
+    """Compute the samples (n,) float32 whose transform is nearest to S in squares."""
     from scipy.fft import irfft
 
     out = np.zeros(n, np.float32)
@@ -89,7 +92,7 @@ def inverse(spectrum: Array, n: int, window: int = WINDOW, overlap: int = 4) -> 
 
 @lru_cache(maxsize=8)
 def _edge(window: int, overlap: int) -> Array:
-    """(window/2,) what the first samples lack, as no frame lies about a time before them."""
+    """Compute factors (window/2,) of the first samples, which no frame centred before them covers."""
     hop, square = window // overlap, np.concatenate([np.zeros(window), hann(window).astype(float) ** 2])
     at = window + window // 2 + np.arange(window // 2)
     seen = np.sum([square[at - m * hop] for m in range(overlap)], axis=0)
@@ -99,7 +102,7 @@ def _edge(window: int, overlap: int) -> Array:
 
 @lru_cache(maxsize=8)
 def _synthesis(window: int, overlap: int) -> Array:
-    """(window,) w/Σ w² over frames, as it is in the middle of a sound."""
+    """Compute w/Σ w² over frames (window,), as it is in the middle of a sound."""
     shape = hann(window).astype(float)
     made = (shape / np.tile((shape**2).reshape(overlap, window // overlap).sum(axis=0), overlap)).astype(np.float32)
     made.setflags(write=False)
@@ -107,7 +110,7 @@ def _synthesis(window: int, overlap: int) -> Array:
 
 
 def power(sample: Array, sr: int, window: int = WINDOW) -> Power:
-    """The power spectrogram of samples (n,) at sr Hz. Raises AudioError on nothing, NaN or a bad rate."""
+    """Compute the power spectrogram of samples (n,) at sr Hz. Raises AudioError on nothing, NaN or a bad rate."""
     sample = checked(sample, sr)
     frequency, time = axes(len(sample), sr, window)
     return Power(
@@ -118,7 +121,7 @@ def power(sample: Array, sr: int, window: int = WINDOW) -> Power:
 
 
 def checked(sample: Array, sr: int) -> Array:
-    """Samples (n,) as float64. Raises AudioError."""
+    """Check samples (n,) and return them as float64. Raises AudioError."""
     sample = np.asarray(sample, float)
     if sample.ndim != 1 or len(sample) == 0:
         raise AudioError(f"a clip of shape {sample.shape}", "give one channel that is not empty")
@@ -131,7 +134,7 @@ def checked(sample: Array, sr: int) -> Array:
 
 @njit(nogil=True)
 def _cut(sample: Array, window: Array, hop: int, frames: Array) -> None:  # pragma: no cover - compiled
-    """frames (m, N) of samples under the window, zeros outside."""
+    """Cut frames (m, N) of samples under the window, zeros outside."""
     size = len(window)
     for m in range(len(frames)):
         first = m * hop - size // 2

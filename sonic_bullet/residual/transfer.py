@@ -1,5 +1,6 @@
-"""A residual follows the modes: what turns the source's modal spectrogram into the target's is done to the residual
-[Ren, Yeh, Lin 2013, eq. 28-29, algorithm 1].
+"""Transfer of a residual: it is mapped as the source's modal spectrogram is onto the target's.
+
+[Ren, Yeh, Lin 2013, eq. 28-29, algorithm 1]
 
     (1) shift     the pixel at f_s goes to f_t:
         f_s^i -> f_t^j, and midpoints between modes -> midpoints, linear between
@@ -10,8 +11,8 @@
 At a mode the shift is the paper's Δf. Towards the midpoints the paper shifts by the same Δf and cuts or doubles what
 does not fit; here a neighbourhood fills its new one, so bands of a body twice the size lie at half the frequencies, and
 |df_s/df_t| keeps their energy relative to the modes'. After (2) source and target mode decay alike, so the ratio of
-their spectrograms, pixel by pixel, no longer hangs on time. h_k is a mode's skirt, b_k 7 % of its neighbourhood: a mode
-that is not struck takes its neighbourhood down by 20 dB, and its neighbours' skirts meet without a step. Below the
+their spectrograms, pixel by pixel, no longer depends on time. h_k is a mode's skirt, b_k 7 % of its neighbourhood: a
+mode that is not struck reduces its neighbourhood by 20 dB, and its neighbours' skirts meet without a step. Below the
 lowest and above the highest pair frequencies keep their ratio to that pair's. m, p modes, pairs; b bands, n frames.
 """
 
@@ -32,7 +33,7 @@ ALIKE = 0.02
 """Frequencies that agree so well after scaling are of the same mode of a scaled body."""
 ALIKE_COUNT = 12
 ONE_MODE = 1e-3
-"""Modes closer than this, relative, count as one: what hears them hears one line."""
+"""Modes closer than this, relative, count as one: an analysis finds one line."""
 SKIRT = 0.07
 FAINT = 1e-6
 LEAST_DECAY_PER_S = 0.1
@@ -42,8 +43,9 @@ TINY = 1e-300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StruckModes:
-    """m modes as one strike starts them: freq_hz ascending, decay_per_s, amplitude ≥ 0 at the onset, in any
-    one unit.
+    """Modes (m,) as one strike starts them.
+
+    freq_hz ascending, decay_per_s, amplitude ≥ 0 at the onset, in any one unit.
     """
 
     freq_hz: Array
@@ -51,6 +53,7 @@ class StruckModes:
     amplitude: Array
 
     def __post_init__(self) -> None:
+        """Check shapes, order and signs."""
         m = len(np.atleast_1d(self.freq_hz))
         for name in ("freq_hz", "decay_per_s", "amplitude"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), np.float64, (m,), f"modes' {name}"))
@@ -68,17 +71,21 @@ class StruckModes:
 
     @property
     def energy(self) -> Array:
-        """(m,) a²/4d, what each mode sends out in all."""
+        """Energy (m,) a²/4d that each mode emits in all."""
         return np.asarray(self.amplitude**2 / (4 * np.maximum(self.decay_per_s, LEAST_DECAY_PER_S)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModePairs:
-    """p pairs of modes, ascending on both sides: source_hz, target_hz (p,); rate (p,) = d_t/d_s; source, target (p,):
-    which mode each is.
+    """Pairs (p,) of modes, ascending on both sides.
 
-    natural: the bodies are one shape scaled, so the pairs are the same modes. group (m,): the target's pair each of its
-    modes counts to, -1: none.
+    Attributes
+    ----------
+    source_hz, target_hz : (p,)
+    rate : (p,) d_t/d_s
+    source, target : (p,) index of each mode
+    natural : whether the bodies are one shape scaled, so that the pairs are the same modes
+    group : (m,) the target's pair that each of its modes counts to, -1: none
     """
 
     source_hz: Array
@@ -91,19 +98,19 @@ class ModePairs:
 
 
 def source_modes(residual: Residual) -> StruckModes:
-    """The modes a residual was taken beside."""
+    """Return the modes a residual was taken beside."""
     return StruckModes(residual.mode_freq_hz, residual.mode_decay_per_s, residual.mode_amplitude)
 
 
 def source_power(residual: Residual) -> Power:
-    """A residual's noise."""
+    """Return a residual's noise."""
     return Power(residual.freq_hz, residual.time_s, residual.power_per_hz)
 
 
 def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
-    """Modes closer than `ONE_MODE` as one: powers add, frequency and decay are the mean by power.
+    """Merge modes closer than `ONE_MODE`: powers add, frequency and decay are the mean by power.
 
-    And (m,) which of them each is.
+    Also returns (m,) which of them each is.
     """
     group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > ONE_MODE * modes.freq_hz[1:])]).astype(np.int64)
     weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY
@@ -113,8 +120,10 @@ def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
 
 
 def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> ModePairs:
-    """Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both
-    sides, from low to high.
+    """Pair the modes of source and target.
+
+    Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides,
+    from low to high.
     """
     a, _ = merged(source)
     b, group = merged(target)
@@ -134,9 +143,9 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> 
 
 
 def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
-    """Modes of a and b that are the same of one scaled shape; none where the lowest do not agree.
+    """Match modes of a and b that are the same of one scaled shape; none where the lowest do not agree.
 
-    The scale is looked for among ratios of the lowest.
+    The scale is searched among ratios of the lowest.
     """
     count = min(ALIKE_COUNT, len(a.freq_hz), len(b.freq_hz))
     none = np.zeros(0, np.int64)
@@ -157,13 +166,13 @@ def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
 
 
 def _nearest(values: Array, to: Array) -> tuple[Array, Array]:
-    """Index into ascending ``values``, and the value, nearest to each of ``to``."""
+    """Find the index into ascending ``values``, and the value, nearest to each of ``to``."""
     at = np.searchsorted((values[1:] + values[:-1]) / 2, to)
     return at, values[at]
 
 
 def neighbourhood(centre_hz: Array, freq_hz: Array) -> Array:
-    """(k,) in whose neighbourhood each frequency lies, between the midpoints of centres (p,)."""
+    """Return in whose neighbourhood each frequency (k,) lies, between the midpoints of centres (p,)."""
     return np.searchsorted((centre_hz[1:] + centre_hz[:-1]) / 2, freq_hz)
 
 
@@ -175,12 +184,12 @@ def _knots(centre_hz: Array) -> Array:
 
 
 def shifted_hz(pairs: ModePairs, freq_hz: Array) -> Array:
-    """Where source frequencies (k,) go."""
+    """Map source frequencies (k,) to the target."""
     return np.asarray(np.interp(freq_hz, _knots(pairs.source_hz), _knots(pairs.target_hz)))
 
 
 def come_from(pairs: ModePairs, freq_hz: Array) -> tuple[Array, Array, Array]:
-    """Source frequency, |df_s/df_t| and d_t/d_s (k,) of target frequencies (k,)."""
+    """Compute source frequency, |df_s/df_t| and d_t/d_s (k,) of target frequencies (k,)."""
     there, here = _knots(pairs.target_hz), _knots(pairs.source_hz)
     piece = np.clip(np.searchsorted(there, freq_hz, "right") - 1, 0, len(there) - 2)
     slope = (np.diff(here) / np.diff(there))[piece]
@@ -188,7 +197,7 @@ def come_from(pairs: ModePairs, freq_hz: Array) -> tuple[Array, Array, Array]:
 
 
 def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: Array) -> Array:
-    """A (k,) at source frequencies (k,), from a² (p,) of both sides of the pairs."""
+    """Compute A (k,) at source frequencies (k,), from a² (p,) of both sides of the pairs."""
     edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
     out = np.empty(len(freq_hz))
@@ -217,7 +226,7 @@ def _scale(
 
 
 def paired_power(pairs: ModePairs, target: StruckModes) -> Array:
-    """a² (p,) of the target's modes, summed into its pairs."""
+    """Sum a² of the target's modes into its pairs (p,)."""
     mine = pairs.group >= 0
     return np.bincount(pairs.group[mine], target.amplitude[mine] ** 2, len(pairs.target_hz))
 
@@ -231,8 +240,9 @@ def transfer(
     *,
     pairs: ModePairs | None = None,
 ) -> Array:
-    """P_t (k, n) at target frequencies (k,) and times (n,) from the onset on, of a residual taken beside ``source`` and
-    now beside ``target``.
+    """Compute P_t (k, n) at target frequencies (k,) and times (n,) from the onset on.
+
+    The residual was taken beside ``source`` and is now beside ``target``.
     """
     pairs = pairs or pair(source, target)
     merged_source, _ = merged(source)
@@ -242,7 +252,7 @@ def transfer(
 
 
 def moved(residual: Power, come_from_hz: Array, level: Array, rate: Array, time_s: Array) -> Array:
-    """level·P(come_from_hz, rate·t) (k, n)."""
+    """Compute level·P(come_from_hz, rate·t) (k, n)."""
     out = np.zeros((len(come_from_hz), len(time_s)))
     _moved(
         residual.freq_hz, residual.time_s, residual.per_hz, come_from_hz, level, rate, np.asarray(time_s, float), out
@@ -276,8 +286,9 @@ def _moved(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualLines:
-    """l damped sinusoids of a transferred residual: freq_hz, decay_per_s, ratio (l,) of their amplitude to that of
-    the mode they follow; follows (l,): its pair.
+    """Damped sinusoids (l,) of a transferred residual.
+
+    ratio (l,): their amplitude over that of the mode they follow; follows (l,): its pair.
     """
 
     freq_hz: Array
@@ -287,7 +298,7 @@ class ResidualLines:
 
 
 def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
-    """The residual's lines, moved, stretched and each struck as the mode is in whose neighbourhood it lies."""
+    """Move and stretch the residual's lines, each struck as the mode in whose neighbourhood it lies."""
     source, _ = merged(source_modes(residual))
     follows = neighbourhood(pairs.source_hz, residual.line_freq_hz)
     below = scale(
