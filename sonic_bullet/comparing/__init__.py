@@ -1,11 +1,11 @@
-"""Two versions of a scene, and which input makes them sound different.
+"""Compare two versions of a scene, and find which input makes them sound different.
 
     scene, scene -> sides -> calls side by side -> inputs that differ ┐
                     logs  -> effects, first difference first          ├─> Comparison -> words, JSON, page
-                    put back one by one in the second scene -> causes ┘
+                    substituted one by one in the second scene -> causes ┘
 
-sides: what is compared, run | compared_sides: all together | comparison_record: what is found | words: in words
-inputs: side by side, put back, the smallest set that is the cause | outcome: what they did | ensemble: chance
+sides: the two to compare, run | compared_sides: the comparison | comparison_record: its result | words: text of it
+inputs: pairing, substitution, the smallest set that is the cause | outcome: effects | ensemble: chance
 baselines, revisions, folders: of projects | pytest_plugin, failure_folder: of their tests
 """
 

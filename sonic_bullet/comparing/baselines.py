@@ -1,9 +1,9 @@
-"""What a version of a scene sounds like, kept as a small file, and a later version held against it.
+"""Baseline of a scene's sound in a small file, and comparison of a later version with it.
 
     scene -> digest of its samples, measurements, ensemble, commit, reason, versions -> NAME.json
-    NAME.json + scene -> the same samples, or within chance, or what of it has changed
+    NAME.json + scene -> the same samples, or within chance, or the changes
 
-The file holds no sound. Where the commit is still there, the scene as it was is run again: then the cause is named.
+The file holds no sound. Where the commit still exists, the scene as it was is run again to name the cause.
 """
 
 from __future__ import annotations
@@ -46,8 +46,18 @@ Tell = Callable[[str], None]
 
 
 class SceneBaseline(msgspec.Struct, omit_defaults=True):
-    """See the module. commit: of the scene's repository, "": none; clean: the scene was as it is in that commit;
-    features, spectra: of the ensemble, empty for a plain script; seconds, rests: how long it ran, and whether to rest.
+    """A baseline; see the module.
+
+    Parameters
+    ----------
+    commit
+        Of the scene's repository; "": none.
+    clean
+        The scene was as in that commit.
+    features, spectra
+        Of the ensemble, empty for a plain script.
+    seconds, rests
+        How long it ran, and whether it was at rest then.
     """
 
     format: str
@@ -72,8 +82,18 @@ class SceneBaseline(msgspec.Struct, omit_defaults=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """A scene held against its baseline. same: the samples are; audible: within the ensemble or not, None: there is
-    none, or no need to ask; words: one line each of what has changed; closeness: see `Comparison`.
+    """A scene compared with its baseline.
+
+    Parameters
+    ----------
+    same
+        Samples are equal.
+    audible
+        Position within the ensemble; None: there is none, or it was not needed.
+    words
+        One line for each change.
+    closeness
+        See `Comparison`.
     """
 
     baseline: SceneBaseline
@@ -90,17 +110,17 @@ class Checked:
 
     @property
     def compared(self) -> str:
-        """What was looked at, in one line: bodies, events, seconds, tolerance."""
+        """What was compared, in one line: bodies, events, seconds, tolerance."""
         return compared_words(self.side, self.same, self.closeness)
 
 
 def baseline_place(scene: str | Path) -> Path:
-    """Where a scene's baseline is looked for and kept if nobody says where: beside the scene."""
+    """Return the default place of a scene's baseline, in a folder beside the scene."""
     return Path(scene).resolve().parent / FOLDER / f"{Path(scene).stem}.json"
 
 
 def samples_digest(sound: KeptSound) -> str:
-    """What tells one sound from another."""
+    """Hash the samples of a sound."""
     made = hashlib.sha256()
     for block in sound.blocks():
         made.update(np.ascontiguousarray(block).tobytes())
@@ -108,7 +128,7 @@ def samples_digest(sound: KeptSound) -> str:
 
 
 def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) -> SceneBaseline:
-    """What the scene sounds like now. Raises what running it does."""
+    """Run a scene and make its baseline; raises what running it does."""
     side = run(SceneSide(scene), "a")
     assert side.log is not None
     x, place = side.sound.samples(), Path(scene).resolve()
@@ -127,13 +147,13 @@ def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) 
 
 
 def write_baseline(path: str | Path, baseline: SceneBaseline) -> None:
-    """Write it, whole or not at all. Raises FileError."""
+    """Write a baseline, whole or not at all; raises FileError."""
     with replacing(str(path)) as file:
         file.write(json_bytes(baseline) + b"\n")
 
 
 def read_baseline(path: str | Path) -> SceneBaseline:
-    """Raises FileError, and CompareError for one of another version."""
+    """Read a baseline; raises FileError, and CompareError for one of another version."""
     remedy = "make it anew: sonic-bullet baseline"
     with reading(str(path), "baseline", FileError, remedy):
         data = Path(path).read_bytes()
@@ -148,9 +168,9 @@ def read_baseline(path: str | Path) -> SceneBaseline:
 def check_baseline(
     baseline: SceneBaseline, scene: str | Path, tell: Tell, tolerance_db: float | None = None
 ) -> Checked:
-    """The scene as it is now against the baseline; tolerance_db: of octave levels, where samples need not be equal.
+    """Compare the scene as it is now with a baseline; raises what running it does.
 
-    Raises what running it does.
+    tolerance_db: of octave levels, where samples need not be equal.
     """
     side = run(SceneSide(scene, sr=baseline.sr), "b")
     assert side.log is not None

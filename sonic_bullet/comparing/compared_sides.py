@@ -1,7 +1,7 @@
-"""Compare two scenes, logs or recordings: what differs, what follows from it, and which input is the cause.
+"""Compare two scenes, logs or recordings: differing inputs, their effects, and which input is the cause.
 
-Side, Side -> inputs that differ (calls of scenes, records of logs) -> put back -> causes
-           -> effects: contacts, modes, sound                                              -> Comparison
+Side, Side -> inputs that differ (calls of scenes, records of logs) -> substituted -> causes
+           -> effects: contacts, modes, sound                                               -> Comparison
 """
 
 from __future__ import annotations
@@ -38,11 +38,25 @@ ORDER = {True: 0, None: 1, False: 2}
 
 @says_so(text="say")
 def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> Comparison:
-    """What of B is other than of A, and why.
+    """Compare B with A, and name the causes of differences.
 
-    a, b: a scene's file or a `SceneSide`, a contact log or its file, a recording's file. say: is given what is being
-    done. Two scenes, or two logs of equal contacts, tell their causes; other pairs what differs. Interrupted while it
-    looks for causes, it returns what it has (`stopped`). Raises SonicBulletError: what cannot be run, read or compared.
+    Parameters
+    ----------
+    a, b
+        A scene's file or a `SceneSide`, a contact log or its file, a recording's file. Two scenes, or two logs of equal
+        contacts, have causes; other pairs only differences.
+    say
+        Called with the current task.
+
+    Returns
+    -------
+    Comparison
+        Where the search for causes is interrupted, the result so far (`stopped`).
+
+    Raises
+    ------
+    SonicBulletError
+        A side cannot be run, read or compared.
     """
     tell = as_call(say, "say") or (lambda text: None)
     tell("A")
@@ -52,7 +66,7 @@ def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> 
 
 
 def compared(a: Side, b: Side, tell: Tell) -> Comparison:
-    """Two sides that are known. Raises CompareError."""
+    """Compare two sides that were run or read; raises CompareError."""
     same = a.sr == b.sr and same_sound(a.sound, b.sound)
     if a.log is None or b.log is None:
         effects = () if same else _of_recordings(a, b)
@@ -100,7 +114,7 @@ def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference, tell: Tell)
 def _put_back(
     b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], tell: Tell, like: Sequence[bytes] | None
 ) -> Side:
-    """B run with those inputs of A; like: frames that it must have, else OtherSound is raised."""
+    """Run B with those inputs of A; like: frames that it must have, else raise OtherSound."""
     assert b.scene is not None
     options = {one.option: one.a for one in asked if one.option}
     if "seconds" in options and not defines_build(Path(b.scene.path)):
@@ -137,8 +151,10 @@ def _of_logs(
 
 
 def _rank(one: Logged, first: FirstDifference) -> int:
-    """How early an input of a log can have acted on contacts that differ: of who starts elsewhere or touches otherwise
-    first, then of the engine, of others, and of sound alone.
+    """Rank an input of a log by how early it can have acted on contacts that differ.
+
+    Bodies that start elsewhere or have other contacts come first, then the engine, then others, then inputs of sound
+    alone.
     """
     if first.step is None:
         return 0
@@ -186,7 +202,7 @@ def _of_recordings(a: Side, b: Side) -> tuple[Consequence, ...]:
 
 
 def _levels(a: Side, b: Side) -> tuple[str, ...]:
-    """Whose level is unknown, of recordings."""
+    """List the recordings whose level is unknown."""
     return tuple(note for side in (a, b) if side.log is None for note in side.notes)
 
 
@@ -202,7 +218,7 @@ def _notes(a: Side, b: Side) -> tuple[str, ...]:
 
 
 def _why_open(causes: Causes, first: FirstDifference, a: Side) -> tuple[str, ...]:
-    """Why no cause is certain."""
+    """Explain why no cause is certain."""
     if a.scene is None:
         return (
             ("contacts differ, and a log cannot be simulated again: share not determinable; compare the scenes",)

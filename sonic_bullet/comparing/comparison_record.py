@@ -1,4 +1,4 @@
-"""What a comparison finds: records, and what JSON holds of them."""
+"""Result of a comparison: records, and their JSON."""
 
 from __future__ import annotations
 
@@ -14,12 +14,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Difference:
-    """An input that is not the same in both.
+    """An input that differs.
 
-    who: the body, "": the engine, what listens, how it is rendered; what: the quantity; a, b: its values, None where
-    there is none. words: one line. cause: True where it is among the smallest set whose return makes A of B, False
-    where it changes no sample, None where that is not known. share: of what is put right when all is put back, where
-    contacts are equal. kept: why it cannot be put back, "" where it can.
+    Parameters
+    ----------
+    who
+        The body; "": the engine, sensors, rendering.
+    what
+        The quantity.
+    a, b
+        Its values, None where there is none.
+    words
+        One line.
+    cause
+        True where it is in the smallest set whose substitution makes A of B, False where it changes no sample, None
+        where that is not known.
+    share
+        Fraction of the difference that it explains, where contacts are equal.
+    kept
+        Why it cannot be substituted, "" where it can.
     """
 
     who: str
@@ -34,8 +47,16 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consequence:
-    """What inputs did, never a cause. kind: contacts, modes, level, onset, decay, loudness, or what became of a
-    recording; at_s: when it begins; values: numbers by name, units in the names.
+    """Effect of inputs, never a cause.
+
+    Parameters
+    ----------
+    kind
+        contacts, modes, level, onset, decay, loudness, or a change of a recording.
+    at_s
+        When it begins.
+    values
+        Numbers by name, units in the names.
     """
 
     kind: str
@@ -46,10 +67,22 @@ class Consequence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Two sides compared. same: their samples are equal, to the bit. differences: causes first. exact: whether the
-    causes put back in B give A to the bit; None: not tried. audible: whether B stands out of an ensemble of A; None:
-    not asked. stopped: it was interrupted, and this is what it had. closeness: whether B is within a tolerance of A;
-    None: not asked.
+    """Result of a comparison of two sides.
+
+    Parameters
+    ----------
+    same
+        Samples are equal, to the bit.
+    differences
+        Causes first.
+    exact
+        Whether the causes substituted in B give A to the bit; None: not tried.
+    audible
+        Whether B differs from an ensemble of A; None: not asked for.
+    stopped
+        It was interrupted, and is incomplete.
+    closeness
+        Whether B is within a tolerance of A; None: not asked for.
     """
 
     a: Side
@@ -65,7 +98,7 @@ class Comparison:
 
     @property
     def causes(self) -> tuple[Difference, ...]:
-        """The inputs whose return makes A of B."""
+        """Inputs whose substitution makes A of B."""
         return tuple(one for one in self.differences if one.cause)
 
     @property
@@ -77,20 +110,20 @@ class Comparison:
 
     @property
     def compared(self) -> str:
-        """What was looked at, in one line: bodies, events, seconds, tolerance."""
+        """What was compared, in one line: bodies, events, seconds, tolerance."""
         from sonic_bullet.comparing.tolerance import compared_words
 
         return compared_words(self.b, self.same, self.closeness)
 
     @property
     def verdict(self) -> str:
-        """One line."""
+        """Verdict in one line."""
         from sonic_bullet.comparing.words import verdict
 
         return verdict(self)
 
     def lines(self) -> list[str]:
-        """The whole finding, a line each: verdict, inputs, effects, notes."""
+        """Return the whole finding, a line each: verdict, inputs, effects, notes."""
         tag = {True: "cause", False: "changes no sample", None: "input"}
         return [
             self.verdict,
@@ -103,7 +136,7 @@ class Comparison:
         ]
 
     def described(self) -> dict[str, Any]:
-        """What JSON holds of it."""
+        """Return the comparison as JSON holds it."""
         return {
             "a": self.a.name,
             "b": self.b.name,
@@ -126,7 +159,7 @@ class Comparison:
 
 
 def _shown(value: Any) -> Any:
-    """A value as JSON can hold it."""
+    """Convert a value to one that JSON can hold."""
     if value is None or isinstance(value, (bool, int, str)) or (isinstance(value, float) and math.isfinite(value)):
         return value
     if isinstance(value, (tuple, list)):

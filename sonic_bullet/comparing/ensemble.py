@@ -1,11 +1,11 @@
-"""Is a change beyond chance? The scene again and again, each body's start shifted by 0.1 mm along the support.
+"""Is a change beyond chance? Run the scene many times, each body's start shifted by 0.1 mm along the support.
 
     A, 99 times -> features (99, k) ┐
     B           -> features (k,)    ┴-> T² of each of the 100 among all -> rank of B -> p = rank/100
 
-What is chaotic sounds otherwise at the least push, so one run is no standard. T² is the squared Mahalanobis distance
-[Mahalanobis 1936] of a run's features from the mean of all 100, with their common covariance: no run is treated other
-than the rest, so under the null hypothesis every rank is as likely (a permutation test), and B alarms in 1 of 100.
+A chaotic scene sounds different after the smallest change, so one run is not a reference. T² is the squared Mahalanobis
+distance [Mahalanobis 1936] of a run's features from the mean of all 100, with their common covariance: all runs are
+treated alike, so under the null hypothesis every rank is as likely (a permutation test), and B alarms in 1 of 100.
 Features: contacts (episodes, impulse), log-spectral distance from the mean of the others, octave levels, signed level.
 """
 
@@ -28,7 +28,7 @@ from sonic_bullet.records.errors import CompareError
 from sonic_bullet.session.scene_file import defines_build
 
 RUNS = 99
-"""The fewest with which a rank can be at the 1 % level."""
+"""Fewest runs in which a rank can be at the 1 % level."""
 LEVEL = 0.01
 SHIFT_M = 1e-4
 SLICES = 12
@@ -36,14 +36,22 @@ FLOOR_DB = -90.0
 REST_M = 1e-5
 """A body that moves less in the last tenth of a second rests."""
 LONGEST = 4
-"""Times as long as a scene says of itself it is run to see it rest."""
+"""Longest run to reach rest, as a multiple of the scene's own length."""
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ensemble:
-    """features (runs, k), spectra (runs, slices · bands): of shifted runs of a scene, seconds long each. rests: whether
-    it rests by then.
+    """Shifted runs of a scene.
+
+    Parameters
+    ----------
+    features : Array, shape (runs, k)
+    spectra : Array, shape (runs, slices · bands)
+    seconds
+        Length of each run.
+    rests
+        Whether the scene is at rest then.
     """
 
     features: Array
@@ -54,7 +62,7 @@ class Ensemble:
 
 @dataclass(frozen=True, slots=True)
 class Audibility:
-    """rank: of B's statistic among all runs, 1 the largest; p: rank / (runs + 1)."""
+    """Rank of B's statistic among all runs, 1 the largest; p: rank / (runs + 1)."""
 
     statistic: float
     rank: int
@@ -64,13 +72,13 @@ class Audibility:
     note: str = ""
 
     def described(self) -> dict[str, Any]:
-        """What JSON holds of it."""
+        """Return the audibility as JSON holds it."""
         return {"statistic": self.statistic, "rank": self.rank, "runs": self.runs, "p": self.p,
                 "beyond_chance": self.beyond_chance, "note": self.note}  # fmt: skip
 
     @property
     def words(self) -> str:
-        """One line."""
+        """The result in one line."""
         what = "beyond chance" if self.beyond_chance else "within chance"
         tail = f"; {self.note}" if self.note else ""
         asked = f"its distance from A is rank {self.rank} of {self.runs + 1}, among runs of A started 0.1 mm apart"
@@ -79,13 +87,13 @@ class Audibility:
 
 @dataclass(slots=True, eq=False)
 class Shifted:
-    """A `Plan`: every body that moves starts SHIFT_M away, along the support, in a direction of its own."""
+    """A `Plan`: every moving body starts SHIFT_M away, along the support, in a direction of its own."""
 
     seed: int
     _count: int = 0
 
     def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
-        """See `Plan`."""
+        """Shift the start in calls that place a body, see `Plan`."""
         given = call.arguments
         place = {"createMultiBody": "basePosition", "loadURDF": "basePosition"}.get(call.name)
         if call.name == "resetBasePositionAndOrientation" and call.step == 0 and call.who is not None:
@@ -99,7 +107,7 @@ class Shifted:
         return [], with_leaves(given, {(place,): self._moved(given.get(place, (0.0, 0.0, 0.0)), who)})
 
     def behind(self, step: int, name: str | None = None) -> list[Call]:
-        """See `Plan`."""
+        """Return no calls, see `Plan`."""
         return []
 
     def _moved(self, place: Any, who: Who) -> tuple[float, ...]:
@@ -109,7 +117,13 @@ class Shifted:
 
 
 def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
-    """Shifted runs of a scene. Raises CompareError for a plain script, whose starts are its own affair."""
+    """Run a scene with shifted starts.
+
+    Raises
+    ------
+    CompareError
+        It is a plain script, which sets its own starts.
+    """
     if not defines_build(Path(scene.path)):
         raise CompareError(
             f"{scene.path} is a plain script: it has no ensemble", "write build(client), or leave --audible out"
@@ -126,7 +140,7 @@ def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
 
 
 def until_rest(scene: SceneSide) -> tuple[float, bool]:
-    """How long to run a scene so that everything in it rests at the end, and whether it does."""
+    """Find how long to run a scene until all is at rest, and whether that is reached."""
     side = run(scene, "a")
     assert side.log is not None
     first = seconds = side.log.duration_s
@@ -141,7 +155,7 @@ def until_rest(scene: SceneSide) -> tuple[float, bool]:
 
 
 def at_rest(log: ContactLog) -> bool:
-    """Whether nobody who sounds moves in the last tenth of a second."""
+    """Tell whether no sounding body moves in the last tenth of a second."""
     count = max(2, round(0.1 / log.steps[-1].dt_s))
     one, other = log.steps[max(0, len(log.steps) - count)], log.steps[-1]
     if len(one.body) != len(other.body):
@@ -151,7 +165,7 @@ def at_rest(log: ContactLog) -> bool:
 
 
 def measured(side: Side) -> tuple[Array, Array]:
-    """Features (k,) but the distance, and the log spectra (slices · bands,) that it is of."""
+    """Return the features (k,) without the distance, and the log spectra (slices · bands,) of the distance."""
     assert side.log is not None
     x = side.sound.samples()
     spectra = _band_spectra(x, side.sr)
@@ -161,7 +175,7 @@ def measured(side: Side) -> tuple[Array, Array]:
 
 
 def _contacts(log: ContactLog) -> tuple[float, float]:
-    """ln(1 + contact episodes), ln of the sum of impulses."""
+    """Return ln(1 + contact episodes), ln of the sum of impulses."""
     before: set[tuple[int, int]] = set()
     episodes, total = 0, 0.0
     for step in log.steps:
@@ -174,7 +188,7 @@ def _contacts(log: ContactLog) -> tuple[float, float]:
 
 
 def _band_spectra(x: Array, sr: int) -> Array:
-    """(slices, bands) mean square in octave bands, dB, with a floor FLOOR_DB below the largest."""
+    """Return mean squares (slices, bands) in octave bands, dB, with a floor FLOOR_DB below the largest."""
     n = x.shape[1] // SLICES
     frames = x[:, : n * SLICES].reshape(len(x), SLICES, n)
     power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
@@ -185,7 +199,7 @@ def _band_spectra(x: Array, sr: int) -> Array:
 
 
 def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
-    """Where a run stands among those of an ensemble."""
+    """Rank a run among those of an ensemble."""
     every = np.vstack([known.spectra, spectra])
     n = len(every)
     apart = np.sqrt(np.square((every - every.mean(axis=0)) * (n / (n - 1))).mean(axis=1))
@@ -200,7 +214,13 @@ def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
 
 
 def audible(a: Side, b: Side, tell: Tell, known: Ensemble | None = None) -> Audibility:
-    """Whether B stands out of an ensemble of A. Raises CompareError where A is no scene with a `build`."""
+    """Test whether B differs from an ensemble of A.
+
+    Raises
+    ------
+    CompareError
+        A is not a scene with a `build`.
+    """
     if a.scene is None or b.scene is None:
         raise CompareError(f"{a.name} is no scene: it has no ensemble", "leave --audible out, or compare scenes")
     known = ensemble(a.scene, tell) if known is None else known

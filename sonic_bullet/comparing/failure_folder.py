@@ -1,4 +1,4 @@
-"""What a comparison that failed leaves to be looked at: expected and actual WAV, difference, spectrum.png, result.json.
+"""Files of a failed comparison: expected and actual WAV, difference, spectrum.png, result.json.
 
 Comparison -> FOLDER/expected.wav actual.wav difference.wav spectrum.png result.json [after pytest-mpl]
 """
@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 
 
 def write_failure(folder: Path, found: Comparison) -> None:
-    """Write all of it. Raises FileError."""
+    """Write all files; raises FileError."""
     folder.mkdir(parents=True, exist_ok=True)
     one, other, sr = at_common_rate(found.a.sound.samples(), found.b.sound.samples(), found.a.sr, found.b.sr)
     write_audio(str(folder / "expected.wav"), one, sr)

@@ -1,6 +1,6 @@
-"""Folders of scenes, logs or recordings, compared pair by pair: two names that are the same are a pair.
+"""Compare folders of scenes, logs or recordings, by pairs of equal names.
 
-A/pour.py B/pour.py -> compared -> what is kept of it        A/roll.py alone -> a partner is missing
+A/pour.py B/pour.py -> compared -> its result        A/roll.py alone -> a partner is missing
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.session.scene_file import defines_build
 
 AT_ONCE = 4
-"""Pairs that two processes are given at a time; what is done is kept when it is stopped."""
+"""Pairs given to two processes at a time; finished ones are kept when the run is stopped."""
 
 
 @dataclass(frozen=True, slots=True)
 class Paired:
-    """One name of both folders. kept: what was made of its comparison, None: a partner is missing or it broke; error:
-    why.
-    """
+    """A name of either folder. kept: result of its comparison, None: a partner is missing or it failed; error: why."""
 
     name: str
     kept: Any = None
@@ -32,7 +30,13 @@ class Paired:
 
 
 def pairs_of(a: Path, b: Path) -> list[tuple[str, Path | None, Path | None]]:
-    """Names in both, or one alone, in order. Raises CompareError where there is nothing to compare."""
+    """List the names of both folders, or one, in order.
+
+    Raises
+    ------
+    CompareError
+        There is nothing to compare.
+    """
     found = [
         {str(path.relative_to(place)): path for path in sorted(place.rglob("*")) if _taken(path)} for place in (a, b)
     ]
@@ -43,7 +47,7 @@ def pairs_of(a: Path, b: Path) -> list[tuple[str, Path | None, Path | None]]:
 
 
 def _taken(path: Path) -> bool:
-    """Whether it is something to compare; a Python file without a step to make is what scenes import."""
+    """Tell whether a file is to be compared; a Python file that makes no step is a module of scenes."""
     if path.suffix.lower() == ".py":
         try:
             return defines_build(path) or "stepSimulation" in path.read_text(encoding="utf-8", errors="replace")
@@ -55,9 +59,9 @@ def _taken(path: Path) -> bool:
 def compare_folders(
     a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]], say: Callable[[str], None]
 ) -> tuple[list[Paired], bool]:
-    """What ``both`` makes of each pair, and whether it was stopped before the last.
+    """Return the result of ``both`` for each pair, and whether it was stopped before the last.
 
-    both: compares two files where the work is done: on two cores, side by side; "stopped" in what it returns ends all.
+    both: compares two files, on two cores side by side; "stopped" in its result ends all.
     """
     listed = pairs_of(a, b)
     reached: list[Paired] = []

@@ -3,8 +3,8 @@
     def test_pour(sonic_scene):
         sonic_scene("scenes/pour.py")          against scenes/sonic_baselines/pour.json, or --sonic-ref REV
 
-A scene runs in a process of its own: one that ends it fails its test and no other. Everything else is imported when a
-test asks for it: pytest loads this module at every start, whatever it tests.
+A scene runs in a process of its own: one that ends it fails its test and no other. All other modules are imported when
+a test needs them, as pytest loads this one at every start.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import Any
 import pytest
 
 PASSED = "sonic_bullet passed"
-"""Name of the property of a test that says what was compared."""
+"""Property of a test that holds what was compared."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options of this plugin."""
+    """Add the options of this plugin."""
     group = parser.getgroup("sonic_bullet", "scenes that sound")
     group.addoption("--sonic-ref", metavar="REV", help="hold scenes against this git revision, not against baselines")
     group.addoption("--sonic-update", action="store_true", help="make the baselines of scenes anew")
@@ -35,9 +35,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def sonic_scene(request: pytest.FixtureRequest) -> Callable[..., Any]:
-    """A function of a scene's path that fails where the scene sounds otherwise than it did.
+    """Provide a function of a scene's path that fails where the scene sounds different than before.
 
-    The path counts from the test's own folder, or else from where pytest was started. tolerance_db: instead of
+    The path is relative to the test's folder, or else to where pytest was started. tolerance_db: in place of
     --tolerance-db.
     """
 
@@ -58,7 +58,7 @@ def sonic_scene(request: pytest.FixtureRequest) -> Callable[..., Any]:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say what was compared where it passed."""
+    """List what was compared in tests that passed."""
     passed = terminalreporter.stats.get("passed", [])
     lines = [value for one in passed for name, value in one.user_properties if name == PASSED]
     if lines:
@@ -68,7 +68,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 
 def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
-    """What ``check`` gives, called where a scene may end its process."""
+    """Call ``check`` in a child process, which a scene may end; return its result."""
     from sonic_bullet.machine.json_text import json_bytes
     from sonic_bullet.machine.supervisor import supervised
     from sonic_bullet.machine.worker import temporary_folder
@@ -101,7 +101,7 @@ def _quiet(text: str) -> None:
 def _checked(
     scene: Path, here: Path, results: Path, config: pytest.Config, tolerance_db: float | None
 ) -> tuple[str, str]:
-    """What is wrong, in one line and those that explain it, "": nothing; what was compared."""
+    """Check a scene; return the failure with its explanation ("": none), and what was compared."""
     ref = config.getoption("--sonic-ref")
     if ref is not None:
         return _against(scene, ref, [], results, tolerance_db)
@@ -137,7 +137,7 @@ def _checked(
 
 
 def _against(scene: Path, ref: str, said: list[str], results: Path, tolerance_db: float | None) -> tuple[str, str]:
-    """The cause of what was said, from the scene as it was at a revision; "": nothing was said and nothing differs."""
+    """Name the cause of a failure from the scene at a revision; "": there is no failure and no difference."""
     from dataclasses import replace
 
     from sonic_bullet.comparing.compared_sides import compare

@@ -1,10 +1,10 @@
-"""A scene run in a whole tree of a revision: its working folder, its import path and its modules are those of the tree.
+"""Run a scene in the whole tree of a revision, with its working folder, import path and modules.
 
     working tree   top/scenes/bar.py   top/parts/cup.py   cwd top/scenes
-    revision       tree/scenes/bar.py  tree/parts/cup.py  cwd tree/scenes      what is installed is both sides'
+    revision       tree/scenes/bar.py  tree/parts/cup.py  cwd tree/scenes      installed packages are common
 
-What neither side can pin is noted while it runs: files outside the repository, files by absolute path in the working
-tree, files that git does not know.
+Files that no revision determines are noted in the run: files outside the repository, files by absolute path in the
+working tree, files that git does not know.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ import sonic_bullet
 
 INSTALLED = ("site-packages", "dist-packages")
 METADATA = (".egg-info", ".dist-info")
-"""Folders in which Python looks up what is installed, wherever a package itself lies."""
+"""Folders of installed packages' metadata, wherever a package itself is."""
 OF_SYSTEM = ("/proc", "/dev", "/sys", "/etc", "/usr", "/lib", "/run", "/bin", "/opt")
 MOST_NAMED = 8
 
 
 @dataclass(frozen=True, slots=True)
 class RevisionTree:
-    """tree: the files of a revision of the repository at ``top``; untracked: what the tree has from there by links."""
+    """Files of a revision of the repository at ``top``, in ``tree``; untracked: files linked from there."""
 
     top: Path
     tree: Path
     untracked: tuple[str, ...] = ()
 
     def place(self, path: Path) -> Path:
-        """Where something of the repository is in the tree; what is elsewhere stays."""
+        """Return the place in the tree of a path in the repository; other paths stay."""
         return self.tree / path.relative_to(self.top) if path.is_relative_to(self.top) else path
 
     def is_untracked(self, inside: Path) -> bool:
-        """Whether git does not know that path of the repository."""
+        """Tell whether git does not know that path of the repository."""
         return any(inside.is_relative_to(one) for one in self.untracked)
 
 
 @dataclass(slots=True)
 class ReadFiles:
-    """Absolute paths of files that were opened for reading while it is `_NOTED`."""
+    """Absolute paths of files opened for reading while it is the last of `_NOTED`."""
 
     paths: set[str] = field(default_factory=set)
 
@@ -72,7 +72,7 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
 
 @contextmanager
 def noted_files() -> Iterator[ReadFiles]:
-    """The files that Python opens while this lasts."""
+    """Record the files that Python opens within the block."""
     if not _HOOKS:
         _HOOKS.append(_audit)
         sys.addaudithook(_audit)
@@ -84,7 +84,7 @@ def noted_files() -> Iterator[ReadFiles]:
 
 
 def unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:
-    """What of the files that a side has read is not of its version, each with the reason."""
+    """Return those of the files read by a side that are not of its version, each with the reason."""
     found = set()
     temporary = Path(tempfile.gettempdir()).resolve()
     for name in paths:
@@ -108,7 +108,7 @@ def unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:
 
 
 def unpinned_words(found: set[str]) -> tuple[str, ...]:
-    """The note of a report."""
+    """Make the note of a report."""
     if not found:
         return ()
     named = sorted(found)
@@ -117,7 +117,7 @@ def unpinned_words(found: set[str]) -> tuple[str, ...]:
 
 
 def _is_installed(path: Path) -> bool:
-    """Whether it belongs to the interpreter, its packages, this package or its cache."""
+    """Tell whether a file belongs to the interpreter, its packages, this package or its cache."""
     from sonic_bullet.machine.user_folder import cache_folders
 
     library = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "platstdlib")]
@@ -131,7 +131,7 @@ _PACKAGE = tuple(Path(one).resolve() for one in sonic_bullet.__path__)
 
 
 def _places(module: ModuleType) -> list[Path]:
-    """Where a module lies; a package without a file may lie in several folders."""
+    """Return the files, or folders, of a module."""
     file = getattr(module, "__file__", None)
     with suppress(Exception):  # a module may be any object
         places: list[str] = [file] if file else list(getattr(module, "__path__", ()))
@@ -141,7 +141,7 @@ def _places(module: ModuleType) -> list[Path]:
 
 @contextmanager
 def own_modules(revision: RevisionTree | None) -> Iterator[None]:
-    """What a scene imports, and where from, is its own: another version's is another, of the same names.
+    """Give a scene its own modules and import path, as modules of another version have the same names.
 
     revision: of the old side, which gets nothing of the working tree; None: the scene as it is now.
     """
@@ -177,7 +177,7 @@ def _folder() -> Path | None:
 
 
 def _moved(entry: str, revision: RevisionTree) -> str:
-    """An entry of the import path, in the tree where it is of the repository; "" is the working folder."""
+    """Move an entry of the import path to the tree where it is in the repository; "" is the working folder."""
     if not entry:
         return entry
     path = Path(entry).resolve()
@@ -186,7 +186,7 @@ def _moved(entry: str, revision: RevisionTree) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _OfTheTree:
-    """A finder of modules: what others find in the working tree is taken from the revision's, or is not there."""
+    """A finder that takes modules of the working tree from the revision's, or does not find them."""
 
     revision: RevisionTree
 

@@ -1,8 +1,8 @@
-"""A repository as it was at a git revision: a whole tree of it in a temporary folder, gone afterwards.
+"""A repository at a git revision: its whole tree in a temporary folder, removed afterwards.
 
-    revision -> an index of its own -> git checkout-index -> TREE      the repository itself is not touched
+    revision -> an index of its own -> git checkout-index -> TREE      the repository itself is unchanged
 
-The package that is installed renders both, so what differs is what the revision's files say.
+The installed package renders both, so that only the revision's files differ.
 """
 
 from __future__ import annotations
@@ -21,9 +21,12 @@ from sonic_bullet.records.errors import CompareError
 
 @contextmanager
 def at_revision(path: str, revision: str) -> Iterator[tuple[str, RevisionTree]]:
-    """The same file or folder as it was at that revision, and the tree that it lies in, while this lasts.
+    """Check out a file or folder at that revision within the block; yield it and its tree.
 
-    Raises CompareError: no git, no such revision, not in it.
+    Raises
+    ------
+    CompareError
+        git or the revision is missing, or the file is not in it.
     """
     place = Path(path).resolve()
     folder = place if place.is_dir() else place.parent
@@ -48,7 +51,7 @@ def at_revision(path: str, revision: str) -> Iterator[tuple[str, RevisionTree]]:
 
 
 def _link_untracked(top: Path, tree: Path, commit: str) -> tuple[str, ...]:
-    """Give the tree what git does not know, by links: generated files, data, modules of other repositories."""
+    """Link untracked files to the tree: generated files, data, modules of other repositories."""
     listed = _git(top, "ls-files", "--others", "--directory", "--no-empty-directory", "-z", error="").split("\0")
     entries = _git(top, "ls-tree", "-r", "-z", commit, error="").split("\0")
     modules = [entry.partition("\t")[2] for entry in entries if entry.startswith("160000")]
@@ -76,7 +79,7 @@ def _git(folder: Path, *words: str, error: str, settings: dict[str, str] | None 
 
 
 def head(folder: Path) -> str:
-    """The commit that is checked out there; "": none is known."""
+    """Return the commit that is checked out; "": none is known."""
     try:
         return _git(folder, "rev-parse", "HEAD", error="none")
     except CompareError:
@@ -84,7 +87,7 @@ def head(folder: Path) -> str:
 
 
 def changed_files(folder: Path) -> bool:
-    """Whether anything in that folder is other than in its commit, or there is none."""
+    """Tell whether any file of that folder differs from its commit, or there is none."""
     try:
         return bool(_git(folder, "status", "--porcelain", "--", ".", error="none"))
     except CompareError:

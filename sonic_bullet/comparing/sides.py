@@ -1,9 +1,8 @@
-"""What is compared: a scene that is run, a contact log, a recording; each becomes a `Side`, its sound and all that is
-known of where it comes from.
+"""The two sides of a comparison: a scene that is run, a contact log, or a recording.
 
-    scene  -> run, calls seen -> Side(calls, log, sound)
-    log    -> rendered        -> Side(log, sound)
-    recording                 -> Side(sound)
+scene  -> run, calls recorded -> Side(calls, log, sound)
+log    -> rendered            -> Side(log, sound)
+recording                     -> Side(sound)
 """
 
 from __future__ import annotations
@@ -31,14 +30,15 @@ from sonic_bullet.session.wanted_bodies import WantedBody
 
 Say = Callable[[str], None]
 OF_WHOM = ("body", "links", "parts", "own_shapes")
-"""Fields of a `WantedBody` that say who it is and how it looks; all others are inputs."""
+"""Fields of a `WantedBody` that identify it and its shape; all others are inputs."""
 REMEDY = "give a scene (.py), a contact log (.npz), a recording, or a folder of them"
 
 
 @dataclass(frozen=True, slots=True)
 class SceneSide:
-    """A scene to be run, with what `render_scene` is given of it; None: the scene's own. revision: the tree that it
-    lies in, where it is that of a git revision.
+    """A scene to be run, with options of `render_scene`; None: the scene's own.
+
+    revision: the tree of a git revision that it is in.
     """
 
     path: str | Path
@@ -53,9 +53,22 @@ class SceneSide:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """One of the two. sound (channels, n) at sr; log, calls, scene: where they are known; names: of bodies and links
-    in calls; frames: a digest of each as it came, for runs that are to be the same. notes: what a user should read;
-    read: absolute paths of the files that its run has opened.
+    """One side of a comparison.
+
+    Parameters
+    ----------
+    sound, sr
+        Sound (channels, n), and its rate.
+    log, calls, scene
+        Where they are known.
+    names
+        Of bodies and links in calls.
+    frames
+        A digest of each frame, for runs that are to be the same.
+    notes
+        For the user.
+    read
+        Absolute paths of the files that its run opened.
     """
 
     name: str
@@ -71,12 +84,12 @@ class Side:
 
 
 class OtherSound(SonicBulletError):
-    """A run sounds otherwise than the one that it is held against; its step says since when."""
+    """A run sounds different from its reference, since the step named."""
 
 
 @dataclass(slots=True, eq=False)
 class _Run:
-    """Who watches a run: calls, what is added, frames. plan: what is asked instead; like: frames that it must have."""
+    """Hook of a run: records calls, added bodies, frames. plan: substitutions; like: frames that it must have."""
 
     side: str
     plan: Plan | None = None
@@ -124,7 +137,7 @@ class _Run:
         return Call("add", self.calls.steps, arguments, who, own=one)
 
     def _of_the_other(self, calls: Sequence[Call]) -> Iterator[WantedBody]:
-        """Bodies of the other scene that are added here; all its other calls among them are made."""
+        """Yield bodies of the other scene that are added here, after making its other calls before them."""
         for call in calls:
             if call.name == "add":
                 yield replace(call.own, body=self.calls.ids[call.who])
@@ -132,7 +145,7 @@ class _Run:
                 self.calls.make([call])
 
     def look(self) -> None:
-        """Before each step: the frame of the one before."""
+        """Record, before each step, the frame of the last one."""
         if self.listener is None or not self.calls.steps:
             return
         number = len(self.frames)
@@ -142,12 +155,12 @@ class _Run:
 
 
 def frame_digest(frame: Array) -> bytes:
-    """What tells one frame from another."""
+    """Hash a frame."""
     return hashlib.blake2b(frame.tobytes(), digest_size=8).digest()
 
 
 def _changed(one: WantedBody, before: Any, after: Any) -> WantedBody:
-    """The body as it is to be added instead."""
+    """Return the body with the substituted arguments."""
     given = {
         x.name: after[x.name] for x in fields(one) if x.name in after and x.name not in (*OF_WHOM, "model", "links")
     }
@@ -166,8 +179,9 @@ def run(
     like: Sequence[bytes] | None = None,
     say: Say | None = None,
 ) -> Side:
-    """A scene run, its calls seen; plan: with what asked instead; like: frames that it must have, else OtherSound is
-    raised. Raises what `render_scene` does.
+    """Run a scene and record its calls; raises what `render_scene` does.
+
+    plan: substitutions; like: frames that it must have, else raise OtherSound.
     """
     from sonic_bullet.listener.pybullet.clients import clear_file_cache
     from sonic_bullet.listener.pybullet.interception import Interception
@@ -189,7 +203,13 @@ def run(
 
 
 def as_side(given: Any, side: str, say: Say | None = None) -> Side:
-    """What is given, run or read. Raises CompareError and what running and reading raises."""
+    """Run or read a side.
+
+    Raises
+    ------
+    CompareError
+        It is not a scene, log or recording; and what running and reading raise.
+    """
     if isinstance(given, Side):
         return given
     if isinstance(given, SceneSide):
@@ -213,7 +233,7 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
 
 
 def of_log(log: ContactLog, name: str) -> Side:
-    """A log and its sound. Raises CompareError where there is nothing in it."""
+    """Render a log as a side; CompareError where it is empty."""
     if not len(log.steps):
         raise CompareError(f"{name} is an empty log: it has no step", "simulate the scene for longer")
     return Side(name, render_kept(log), log.sr, log)

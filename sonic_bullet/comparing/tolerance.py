@@ -1,7 +1,7 @@
-"""What two sounds must have in common where samples need not be equal, and what was compared, in words.
+"""Tolerance of two sounds whose samples need not be equal, and what was compared, in words.
 
 Octave levels within so many decibels, as many onsets, the same length and channels. Bands 60 dB below the loudest do
-not count: T60 calls a sound that has fallen so far silent [ISO 3382-1].
+not count: T60 is the time after which a sound counts as silent [ISO 3382-1].
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_NAMES = 6
 
 @dataclass(frozen=True, slots=True)
 class SoundMeasures:
-    """Of a sound. band_db: octave levels, dB re 1 Pa², None: silent."""
+    """Measures of a sound. band_db: octave levels, dB re 1 Pa², None: silent."""
 
     seconds: float
     channels: int
@@ -46,18 +46,18 @@ class Closeness:
 
 
 def as_tolerance(value: object) -> float:
-    """A tolerance in dB. Raises CompareError."""
+    """Return a tolerance in dB; raises CompareError."""
     return as_number(value, "tolerance_db", "give decibels, 0 or more", least=0, most=200, error=CompareError)
 
 
 def measure_sound(x: Array, sr: int) -> SoundMeasures:
-    """x (channels, n) in Pa."""
+    """Measure a sound x (channels, n) in Pa."""
     levels = tuple(float(v) if np.isfinite(v) else None for v in band_levels(x, sr))
     return SoundMeasures(x.shape[1] / sr, len(x), len(onsets_s(x, sr)), levels)
 
 
 def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closeness:
-    """Whether b is within that of a."""
+    """Check whether b is within that tolerance of a."""
     faults = []
     if abs(a.seconds - b.seconds) > 1e-6 or a.channels != b.channels:
         faults.append(f"length {a.seconds:.4g} → {b.seconds:.4g} s, channels {a.channels} → {b.channels}")
@@ -82,25 +82,25 @@ def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closen
 
 
 def found_closeness(a: Side, b: Side, tolerance_db: float) -> Closeness:
-    """Whether one side is within that of the other; sounds of two rates are compared at the lower."""
+    """Check whether b is within that tolerance of a; sounds of two rates are compared at the lower one."""
     one, other, sr = at_common_rate(a.sound.samples(), b.sound.samples(), a.sr, b.sr)
     return closeness(measure_sound(one, sr), measure_sound(other, sr), as_tolerance(tolerance_db))
 
 
 def passes(same: bool, within: Closeness | None, audible: Audibility | None) -> bool:
-    """Whether two sounds count as the same: equal samples, or within the tolerance or the chance that was asked for."""
+    """Tell whether two sounds count as the same: equal samples, or within the tolerance or chance asked for."""
     return same or (within is not None and within.within) or (audible is not None and not audible.beyond_chance)
 
 
 def sameness_words(within: Closeness | None) -> str:
-    """How two sounds are the same that count as the same but have other samples."""
+    """Describe how two sounds with different samples count as the same."""
     if within is None or not within.within:
         return "the same but for chance"
     return f"the same within {within.tolerance_db:g} dB"
 
 
 def compared_words(side: Side, same: bool, within: Closeness | None) -> str:
-    """What was looked at, in one line: bodies, events, seconds, tolerance."""
+    """Describe what was compared in one line: bodies, events, seconds, tolerance."""
     tolerance_db = None if same or within is None else within.tolerance_db
     x = side.sound.samples()
     names: Sequence[str] = [] if side.log is None else [one.name for one in side.log.bodies if one.material is not None]

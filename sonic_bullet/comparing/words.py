@@ -1,4 +1,4 @@
-"""Findings in words: one line each, in physics and with units."""
+"""Text of findings: one line each, in physics and with units."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ PLAIN = {
     "until_step": "gone in step",
 }
 COUNTS = ("seed", "since_step", "until_step")
-"""Numbers of which no share is told."""
+"""Numbers without a relative change."""
 SHAPES = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
 
 
 def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
-    """Who, and a line: "steel ball: friction 0.5 → 0.45 (−10 %)"."""
+    """Return the body, and a line: "steel ball: friction 0.5 → 0.45 (−10 %)"."""
     who = name_of(a, b, one.who, one.link) if one.who is not None else ""
     if isinstance(one.a, Call) or isinstance(one.b, Call):
         return who, f"{who}: is {'missing in' if one.b is None else 'only in'} B"
@@ -78,14 +78,14 @@ def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
 
 
 def logged_words(one: Logged) -> str:
-    """The same of an input of two logs."""
+    """Return the line of an input of two logs."""
     if one.what == "body":
         return f"{one.who}: is {'missing in' if one.b is None else 'only in'} B"
     return f"{f'{one.who}: ' if one.who else ''}{change_words(one.what, one.a, one.b)}"
 
 
 def change_words(what: str, a: Any, b: Any) -> str:
-    """ "density 7850 → 7929 kg/m³ (+1.0 %)"."""
+    """Describe a change: "density 7850 → 7929 kg/m³ (+1.0 %)"."""
     last = what.rsplit(maxsplit=1)[-1]
     key = last if last in PLAIN else what
     name, unit = PLAIN.get(key, what), UNITS.get(key, "")
@@ -109,7 +109,7 @@ def change_words(what: str, a: Any, b: Any) -> str:
 
 
 def _places(name: str, a: Any, b: Any) -> str:
-    """Where what listens has gone."""
+    """Describe how sensors moved."""
     if len(a) != len(b):
         return f"{name}: {len(a)} → {len(b)}"
     moved = []
@@ -123,7 +123,7 @@ def _places(name: str, a: Any, b: Any) -> str:
 
 
 def _distance(vector_m: Any) -> str:
-    """A length of a vector (3,) in m, in mm below 1 cm and in cm below 1 m."""
+    """Format the length of a vector (3,) in m, in mm below 1 cm and in cm below 1 m."""
     length_m = float(np.linalg.norm(vector_m))
     factor, unit = (1000, "mm") if length_m < 0.01 else (100, "cm") if length_m < 1 else (1, "m")
     return f"{length_m * factor:.3g} {unit}"
@@ -134,7 +134,7 @@ def _point(place_m: Any) -> str:
 
 
 def name_of(a: Side, b: Side, who: Who, link: int) -> str:
-    """What people call a body: its name, or what it is made of and its shape; a joint by whom it holds."""
+    """Name a body: its name, or its material and shape; a joint by the body it holds."""
     if who.kind == "constraint":
         made = next((call for side in (b, a) for call in side.calls if who in call.made), None)
         held = made.arguments.get("parentBodyUniqueId") if made is not None else None
@@ -163,7 +163,7 @@ def _made_of(side: Side, who: Who) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as a line holds it."""
+    """Format a value for a line."""
     if value is None:
         return "not set"
     if isinstance(value, bool):
@@ -191,7 +191,7 @@ def _array(value: Any) -> Any:
 
 
 def verdict(found: Comparison) -> str:
-    """What the comparison comes to, in one line."""
+    """Summarise the comparison in one line."""
     rest = [one for one in found.differences if not one.cause]
     if found.same:
         tail = (

@@ -1,1 +1,1 @@
-"""Inputs of two versions: side by side, put back, and the smallest set that is the cause."""
+"""Inputs of two versions: paired, substituted, and the smallest set that is the cause."""

@@ -1,11 +1,11 @@
-"""The calls of two runs side by side: which call of one is which of the other, and what only one of them makes.
+"""Pair the calls of two runs: which call of one corresponds to which of the other, and which only one makes.
 
-    A: create a, create b, friction a        a with a: two that ask the same of the same body
+    A: create a, create b, friction a        a with a: two of the same arguments about the same body
     B: create a, friction a                  b, and all about it: of A alone
 
-Bodies are matched first, by what they are made as, in their order: the alignment of least cost [Needleman and Wunsch,
-J. Mol. Biol. 48 (1970) 443], which finds the body that is missing among equal ones. Then calls are, a step at a time:
-the same function about the same body, in order.
+Bodies are matched first, by the calls that make them, in their order: the alignment of least cost [Needleman and
+Wunsch, J. Mol. Biol. 48 (1970) 443], which finds the body that is missing among equal ones. Then calls are matched, a
+step at a time: the same function about the same body, in order.
 """
 
 from __future__ import annotations
@@ -20,26 +20,27 @@ from sonic_bullet.listener.calls import ABSENT, Call, Who, leaves, mapped, same
 
 One = TypeVar("One")
 GAP = 0.6
-"""Cost of a body that has no partner; two that share nothing cost 1, less than two without partners."""
+"""Cost of a body without a partner; two that share nothing cost 1, less than two without partners."""
 MOST_CELLS = 4_000_000
-"""Beyond this many pairs of calls, what is the same in one order is looked for in the middle by place alone."""
+"""Most pairs of calls that are aligned; beyond, calls that differ are paired by position alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CallPair:
-    """A call of A, of B, or of both that are the same one; arguments of A with B's bodies where those are matched."""
+    """A call of A, of B, or of both that correspond; arguments of A name B's bodies where those are matched."""
 
     a: Call | None
     b: Call | None
 
     @property
     def step(self) -> int:
+        """Step of the calls."""
         one = self.b or self.a
         return one.step if one is not None else 0
 
 
 def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], dict[Who, Who]]:
-    """All calls of both in an order that is that of each, and whom of A is whom of B."""
+    """Return all calls of both, paired in an order that keeps that of each, and the match of A's bodies to B's."""
     match = matched_bodies(a, b)
     renamed = [_renamed(call, match) for call in a]
     pairs: list[CallPair] = []
@@ -50,7 +51,7 @@ def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], 
 
 
 def matched_bodies(a: Sequence[Call], b: Sequence[Call]) -> dict[Who, Who]:
-    """From the bodies and constraints of A to those of B that are the same ones."""
+    """Match the bodies and constraints of A to those of B."""
     makers = [[call for call in calls if call.made] for calls in (a, b)]
     return {
         one: other
@@ -63,7 +64,7 @@ def matched_bodies(a: Sequence[Call], b: Sequence[Call]) -> dict[Who, Who]:
 def aligned(
     a: Sequence[One], b: Sequence[One], unlike: Callable[[One, One], float], gap: Callable[[One], float]
 ) -> list[tuple[One | None, One | None]]:
-    """Both in their order, partners together, at the least sum of ``unlike`` (inf: never) and gaps."""
+    """Align two sequences at the least sum of ``unlike`` (inf: never paired) and gaps."""
     start = 0
     while start < min(len(a), len(b)) and unlike(a[start], b[start]) == 0:
         start += 1
@@ -109,7 +110,7 @@ def _middle(
 
 
 def differing(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any, Any]]:
-    """Leaves of two calls that are not the same: (A's, B's), ABSENT where one has none."""
+    """Return the leaves of two calls that differ: (A's, B's), ABSENT where one has none."""
     one, other = dict(leaves(a.arguments) if a else ()), dict(leaves(b.arguments) if b else ())
     return {
         path: (one.get(path, ABSENT), other.get(path, ABSENT))
@@ -119,7 +120,7 @@ def differing(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any
 
 
 def about(call: Call) -> tuple[Any, ...]:
-    """What a call must share with another to be the same one: function, body, link or joint."""
+    """Return what corresponding calls share: function, body, link or joint."""
     places = (call.arguments.get(name) for name in ("linkIndex", "jointIndex", "jointIndices", "links"))
     return (call.name, call.who, *places)
 
@@ -139,7 +140,7 @@ def _unlike_bodies(a: Call, b: Call) -> float:
 
 
 def _share(a: Call, b: Call) -> float:
-    """Of all leaves of both, the share that differs."""
+    """Compute the fraction of all leaves of both calls that differ."""
     most = len({path for call in (a, b) for path, _ in leaves(call.arguments)})
     return len(differing(a, b)) / max(most, 1)
 
@@ -152,7 +153,7 @@ def _by_step(calls: Iterable[Call]) -> dict[int, list[Call]]:
 
 
 def _renamed(call: Call, match: Mapping[Who, Who]) -> Call:
-    """The call with B's bodies in the place of A's where they are matched."""
+    """Replace A's bodies in a call by B's where they are matched."""
 
     def other(value: Any) -> Any:
         return match.get(value, value) if isinstance(value, Who) else value

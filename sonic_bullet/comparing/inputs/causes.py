@@ -1,14 +1,14 @@
-"""Which inputs are the causes: the smallest set whose return in B gives A's samples, to the bit.
+"""Causes: the smallest set of inputs whose substitution in B gives A's samples, to the bit.
 
-    one by one: is it A?  yes: that one          all put back: is it A?  no: something is not put back
+    one by one: is it A?  yes: that one          all substituted: is it A?  no: another input differs
     else: all but one, ever fewer, while it is A -> a set of which none can be left out
 
 A run that is not A ends at the first frame that differs, most of them early. A single cause costs one run for each
-input; a set of several costs as many again. Where every input only adds to what differs, a set of which none can be
+input; a set of several costs as many again. Where every input only adds to the difference, a set of which none can be
 left out is the smallest there is.
 
-Shares of several causes, where contacts are equal: Shapley values [Shapley 1953, eq. 12] of what is closed,
-v(S) = 1 − d(B with S put back, A)/d(B, A), d the distance of log spectra. They sum to 1 − what is left.
+Shares of several causes, where contacts are equal: Shapley values [Shapley 1953, eq. 12] of the reduction,
+v(S) = 1 − d(B with S substituted, A)/d(B, A), d the distance of log spectra. They sum to 1 − the remaining fraction.
 """
 
 from __future__ import annotations
@@ -25,14 +25,22 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 
 MOST_SHARED = 4
-"""Causes whose shares are determined: 2^4 runs."""
+"""Most causes whose shares are determined: 2^4 runs."""
 WINDOW, FLOOR_DB = 1024, -100.0
-"""Of log spectra: samples of a frame, and what is silent below the loudest value of A."""
+"""Log spectra: samples of a frame, and floor re the loudest value of A."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Causes:
-    """found: indices; exact: whether they put back give A; broken: inputs whose return breaks the scene, and how."""
+    """Causes among inputs, by index.
+
+    Parameters
+    ----------
+    exact
+        Whether their substitution gives A.
+    broken
+        Inputs whose substitution breaks the scene, and how.
+    """
 
     found: tuple[int, ...] = ()
     exact: bool = False
@@ -42,14 +50,14 @@ class Causes:
 
 
 def same_sound(a: KeptSound, b: KeptSound) -> bool:
-    """Whether two sounds are the same samples, to the bit."""
+    """Tell whether two sounds have the same samples, to the bit."""
     return a.shape == b.shape and all(
         np.array_equal(x.view(np.int64), y.view(np.int64)) for x, y in zip(a.blocks(), b.blocks(), strict=True)
     )
 
 
 def find_causes(count: int, sounds_as_a: Callable[[Sequence[int]], bool]) -> Causes:
-    """The causes among ``count`` inputs. Interrupted, what is known."""
+    """Find the causes among ``count`` inputs; when interrupted, return those known."""
     broken: dict[int, str] = {}
 
     def is_a(chosen: Sequence[int]) -> bool:
@@ -79,7 +87,7 @@ def find_causes(count: int, sounds_as_a: Callable[[Sequence[int]], bool]) -> Cau
 def shapley_shares(
     found: Sequence[int], a: KeptSound, b: KeptSound, put_back: Callable[[Sequence[int]], KeptSound]
 ) -> dict[int, float]:
-    """The share of each cause; none where there are too many, or the sounds are not of one length."""
+    """Compute the share of each cause; none for too many causes, or sounds of different lengths."""
     n = len(found)
     if not 1 < n <= MOST_SHARED or a.shape != b.shape:
         return {}
@@ -106,7 +114,7 @@ def shapley_shares(
 
 
 def log_distance(a: Array, b: Array) -> float:
-    """Root mean square difference of levels in dB, over windows and frequencies, of sounds (channels, n)."""
+    """Compute the rms difference of levels in dB, over windows and frequencies, of sounds (channels, n)."""
     one, other = _levels(a), _levels(b)
     floor = float(one.max(initial=-300.0)) + FLOOR_DB
     change = np.maximum(one, floor) - np.maximum(other, floor)

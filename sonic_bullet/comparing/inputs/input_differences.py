@@ -1,10 +1,10 @@
-"""Which inputs differ: of two runs, by what they ask of the simulator and of the listener.
+"""Inputs that differ between two runs, by their calls to the simulator and the listener.
 
-    pairs of calls -> leaves that differ -> Asked: one quantity of one body, and all places where it is asked for
+    pairs of calls -> leaves that differ -> Asked: one quantity of one body, and all places where it is set
 
-A quantity that a scene asks for in two ways (a mass when a body is made, and later by changeDynamics) is one. What only
-one scene asks about a body that both have is one input for each argument; a body that only one has is one input with
-all that is asked about it.
+A quantity that a scene sets in two ways (a mass when a body is made, and later by changeDynamics) is one input. For a
+body that both runs have, each argument that only one sets is an input; a body that only one run has is one input with
+all its calls.
 """
 
 from __future__ import annotations
@@ -55,17 +55,27 @@ ONE_QUANTITY = {
     "alpha_per_s": "damping",
     "beta_s": "damping",
 }
-"""What several arguments are one of, by one name."""
+"""Quantity of an argument; several arguments may mean one."""
 BY_ARGUMENT = ("changeDynamics", "setPhysicsEngineParameter", "changeConstraint")
-"""Functions whose arguments can be given one by one; others are called whole or not at all."""
+"""Functions whose arguments can be substituted one by one; others are called whole or not at all."""
 DRIVES = ("apply", "setJointMotor")
-"""Functions that act anew each step: what they do is one input from the first step on; others set what then stays."""
+"""Functions that act anew each step: all their calls are one input; others set a lasting value."""
 
 
 @dataclass(slots=True, eq=False)
 class Asked:
-    """An input of two runs that differs. who: the body, None: engine or listener; places: where to put it back; later:
-    it is asked for after the first step; at_a, at_b: in which, where only one run asks for it in that step.
+    """An input that differs between two runs.
+
+    Parameters
+    ----------
+    who
+        The body; None: engine or listener.
+    places
+        Where to substitute it.
+    later
+        It is set after the first step.
+    at_a, at_b
+        Step of the call, where only one run makes it in that step.
     """
 
     who: Who | None
@@ -81,7 +91,7 @@ class Asked:
 
 
 def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
-    """Both runs' calls in pairs, and the inputs that differ, in the order of calls."""
+    """Pair the calls of both runs; return the pairs and the inputs that differ, in the order of calls."""
     pairs, match = side_by_side(a.calls, b.calls)
     lone = {one for call in a.calls for one in call.made} - set(match)
     lone |= {one for call in b.calls for one in call.made} - set(match.values())
@@ -106,7 +116,7 @@ def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
 
 
 def _orders(found: Mapping[Any, Asked]) -> list[Asked]:
-    """Two bodies that were made of the same, one in each run, are one that is made at another turn."""
+    """Merge two equal bodies, one in each run, to one body that is made in another order."""
     listed = list(found.values())
     for old in list(listed):
         new = next((x for x in listed if _is_same_body(old, x)), None)
@@ -124,7 +134,7 @@ def _is_same_body(old: Asked, new: Asked) -> bool:
 
 
 def _whose(pair: CallPair, lone: set[Who]) -> Any:
-    """The body that a pair's calls are about; one that only one run has, where one is among the arguments."""
+    """Return the body of a pair's calls, first of all one that only one run has."""
     for call in (pair.b, pair.a):
         if call is not None:
             known = [*call.made, *(value for _, value in leaves(call.arguments) if isinstance(value, Who))]
@@ -137,13 +147,13 @@ def _whose(pair: CallPair, lone: set[Who]) -> Any:
 
 
 def name_of(pair: CallPair) -> str:
-    """The function's name."""
+    """Return the function's name."""
     call = pair.b or pair.a
     return "" if call is None else call.name
 
 
 def _note(found: dict[Any, Asked], pair: CallPair, number: int, path: Path, old: Any, new: Any) -> None:
-    """A leaf that differs."""
+    """Record a leaf that differs."""
     call = pair.b or pair.a
     assert call is not None
     what = quantity(call, path)
@@ -156,12 +166,12 @@ def _note(found: dict[Any, Asked], pair: CallPair, number: int, path: Path, old:
     if what == "damping" and pair.a is not None and pair.b is not None:
         old, new = (damping(one.arguments["material"]) for one in (pair.a, pair.b))
     one = _entry(found, call, what)
-    one.a, one.b = _value(old), _value(new)  # the last that is asked holds
+    one.a, one.b = _value(old), _value(new)  # the last call holds
     one.places.append((number, path))
 
 
 def _note_whole(found: dict[Any, Asked], pair: CallPair, number: int) -> None:
-    """A call that only one run makes, and that is made whole or not at all."""
+    """Record a call that only one run makes, and that is made whole or not at all."""
     call = pair.b or pair.a
     assert call is not None
     inner = {path: value for path, value in leaves(call.arguments) if path[0] not in HANDLES}
@@ -184,7 +194,7 @@ def _entry(found: dict[Any, Asked], call: Call, what: str) -> Asked:
 
 
 def quantity(call: Call, path: Path) -> str:
-    """What the leaf of a call is, in words where it has some."""
+    """Name the quantity of a call's leaf."""
     name = path[-1]
     if path[0] == "baseCollisionShapeIndex" or path[0] == "linkCollisionShapeIndices":
         return "mesh" if name in ("fileName", "vertices", "indices") else f"shape {name}"
@@ -194,7 +204,7 @@ def quantity(call: Call, path: Path) -> str:
 
 
 def damping(material: Any) -> tuple[float, float] | None:
-    """Rayleigh's α and β, which are one input."""
+    """Return Rayleigh's α and β, which are one input."""
     return None if material is None else (material.alpha_per_s, material.beta_s)
 
 
@@ -209,7 +219,7 @@ def _value(value: Any) -> Any:
 
 
 def _options(a: Side, b: Side) -> list[Asked]:
-    """How the scenes are rendered."""
+    """List differing options of rendering."""
     found = []
     if a.scene is None or b.scene is None or a.log is None or b.log is None:
         return []

@@ -1,8 +1,8 @@
-"""Which inputs of two contact logs differ, read off their records, whatever fields these have.
+"""Inputs that differ between two contact logs, from all fields of their records.
 
     header, bodies, first poses -> leaves that differ -> one input a quantity -> where contacts are equal: exchange
 
-An inertia that grew with the mass, a volume with the shape, and modes with the material are no inputs of their own.
+An inertia that changed with the mass, a volume with the shape, and modes with the material are not inputs of their own.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
 from sonic_bullet.records import Array, Body
 
 OF_RUN = ("bodies", "steps", "events", "changes", "untouched", "versions", "engine")
-"""Fields of a log that are no settings of its sound."""
+"""Fields of a log that are not settings of its sound."""
 OF_MODES = ("density_kg_m3", "stiffness_pa", "alpha_per_s", "beta_s", "effects", "includes_radiation", "name")
-"""Of a material: what its modes are made of."""
+"""Fields of a material on which modes depend."""
 ONE_BODY = {
     ("mass_kg",): "mass",
     ("dynamics", "mass"): "mass",
@@ -31,7 +31,7 @@ ONE_BODY = {
     ("curvature_per_m",): "shape",
 }
 SHAPE_SHARE = 2e-3
-"""Of a volume: two meshes of one shape differ by less where elements are as large as this project's."""
+"""Relative tolerance of a volume: two meshes of one shape differ by less at this project's element sizes."""
 AS_POSES_TELL = "as first poses tell: a force or a joint, which a log does not hold, would look the same"
 
 Exchange = Callable[[ContactLog, ContactLog], ContactLog]
@@ -39,8 +39,14 @@ Exchange = Callable[[ContactLog, ContactLog], ContactLog]
 
 @dataclass(slots=True, eq=False)
 class Logged:
-    """An input of two logs that differs. exchange(a, b): b's log with a's input, None: it cannot be exchanged; silent:
-    it acts before the contacts alone, or after them alone ("sound").
+    """An input that differs between two logs.
+
+    Parameters
+    ----------
+    exchange
+        (a, b) -> b's log with a's input; None: it cannot be exchanged.
+    acts
+        On contacts, or on "sound" alone.
     """
 
     who: str
@@ -53,7 +59,7 @@ class Logged:
 
 
 def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
-    """Inputs that differ: the engine's, each body's, what listens, how it is rendered, versions."""
+    """List the inputs that differ: of the engine, each body, sensors, rendering, versions."""
     found = [*_engine(a, b)]
     for i, j in pairs:
         if i is None or j is None:
@@ -94,7 +100,7 @@ def _engine(a: ContactLog, b: ContactLog) -> list[Logged]:
 
 
 def _lone(a: ContactLog, b: ContactLog, i: int | None, j: int | None) -> list[Logged]:
-    """A body of one log alone; who sounds not and has met nobody in the other is there too, unseen."""
+    """Report a body of one log alone; a silent body that touched nothing in the other is there too."""
     body, other = (a.bodies[i], b) if i is not None else (b.bodies[j], a)  # type: ignore[index]
     if body.material is None and body.body_id in other.untouched:
         return []
@@ -124,7 +130,7 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
     if modes_differ and not any(path[0] in ("material", "options") and path[-1] != "source" for path in changed):
         found.setdefault("mesh", _mesh(one, other, i, j))
     _without_what_follows(found, one, other)
-    for what in ("since_step", "until_step"):  # in steps: of another length they are others
+    for what in ("since_step", "until_step"):  # in steps: not comparable where their length differs
         old_step, new_step = getattr(one, what), getattr(other, what)
         if old_step != new_step and a.steps[0].dt_s == b.steps[0].dt_s:
             found[what] = Logged(one.name, what, old_step, new_step)
@@ -132,7 +138,7 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
 
 
 def _quantity(path: Path) -> tuple[str, str]:
-    """What a leaf is, and whether it acts on contacts or on sound alone."""
+    """Name the quantity of a leaf, and whether it acts on contacts or on sound alone."""
     if path in ONE_BODY:
         return ONE_BODY[path], "contacts"
     acts = "sound" if path[0] in ("material", "options", "mounting") else "contacts"
@@ -140,7 +146,7 @@ def _quantity(path: Path) -> tuple[str, str]:
 
 
 def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> None:
-    """Take out what is no input of its own."""
+    """Remove quantities that follow from others."""
     if "mass" in found and "inertia" in found and one.mass_kg and other.mass_kg:
         grown = one.inertia_kg_m2 * (other.mass_kg / one.mass_kg)
         if np.allclose(grown, other.inertia_kg_m2, rtol=1e-6, atol=1e-18):
@@ -164,13 +170,14 @@ def _mesh(one: Body, other: Body, i: int, j: int) -> Logged:
 
 
 def same_model(one: Body, other: Body) -> bool:
-    """Whether two bodies have the same modes on the same surface."""
+    """Tell whether two bodies have the same modes on the same surface."""
     return (one.model is None) == (other.model is None) and (one.model is None or same(one.model, other.model))
 
 
 def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> list[Logged]:
-    """Where a body starts, and how fast, as its first poses and contacts tell. explained: something else differs that
-    moves it otherwise.
+    """Compare start and initial speed of a body by its first poses and contacts.
+
+    explained: another difference explains a different motion.
     """
     one, name = a.bodies[i], a.bodies[i].name
     first = [_pose(log, index, 0) for log, index in ((a, i), (b, j))]
@@ -198,7 +205,7 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> lis
 
 
 def _speeds(log: ContactLog, index: int) -> tuple[float, ...]:
-    """Slip of a body's contacts before the first step, m/s: its first velocity where it touches from the start."""
+    """Return the slip of a body's contacts before the first step, m/s: its initial velocity in contact."""
     rows = log.steps[0].contacts.row
     mine = rows[(rows["a"] == index) | (rows["b"] == index)]
     return tuple(np.round(mine["slip_m_s"], 6)[:1].ravel().tolist())
@@ -213,7 +220,7 @@ def _pose(log: ContactLog, index: int, step: int) -> tuple[Array, Array] | None:
 
 
 def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
-    """What was set otherwise under way."""
+    """List changes made after the first step that differ."""
     names = {j: a.bodies[i].name for i, j in pairs if i is not None and j is not None}
     listed: list[dict[tuple[str, str], list[Any]]] = []
     for log in (a, b):
@@ -233,7 +240,7 @@ def _changes(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | N
 
 
 def _setting(path: Path) -> Exchange:
-    """The whole setting of that name, or a part of it."""
+    """Return the exchange of a setting, or of a part of it."""
 
     def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
         value: Any = getattr(a, path[0])
@@ -254,7 +261,7 @@ def _leaf(path: Path, i: int, j: int) -> Exchange:
 
 
 def _of_modes(i: int, j: int) -> Exchange:
-    """A body's material and modes together: the one is made of the other."""
+    """Return the exchange of a body's material with its modes."""
 
     def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
         one = a.bodies[i]

@@ -1,6 +1,6 @@
-"""Two contact logs side by side: which body is which, and the first step whose contacts are others.
+"""Match the bodies of two contact logs, and find the first step whose contacts differ.
 
-names -> match; who has no name of his own -> what he is, in order          rows with A's indices -> first difference
+names -> match; bodies without a name -> by their properties, in order       rows with A's indices -> first difference
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from sonic_bullet.records import Array, Body
 from sonic_bullet.records.errors import CompareError
 
 NO_NAME = re.compile(r"^(body \d+|link\d+|baseLink)( #?\d+)?$")
-"""What a simulator calls who has no name."""
+"""Names that a simulator gives to bodies without one."""
 NO_INPUT = ("body_id", "link", "epoch", "name", "since_step", "until_step", "model")
-"""Fields of a body that say who and when it is; its modes follow from the rest."""
+"""Fields of a body that identify it and its lifetime; its modes follow from the rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class FirstDifference:
-    """step: the first whose contacts are others, None: none is; bodies: names of who touches otherwise there."""
+    """First step whose contacts differ, None: none does; bodies: names of those whose contacts differ there."""
 
     step: int | None
     at_s: float | None
@@ -34,7 +34,7 @@ class FirstDifference:
 
 
 def body_leaves(body: Body) -> dict[tuple[str, ...], Any]:
-    """All that is an input of a body, by place."""
+    """Return all inputs of a body, by path."""
     found: dict[tuple[str, ...], Any] = {}
     for one in fields(body):
         if one.name not in NO_INPUT:
@@ -43,8 +43,12 @@ def body_leaves(body: Body) -> dict[tuple[str, ...], Any]:
 
 
 def matched(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]:
-    """Indices into the bodies of both, partners together. Raises CompareError: names that two living bodies have, or
-    no body in common.
+    """Match the bodies of both logs by index.
+
+    Raises
+    ------
+    CompareError
+        Two living bodies have one name, or no body is in both.
     """
     one, other = _latest(a), _latest(b)
     pairs: list[tuple[int | None, int | None]] = [
@@ -66,7 +70,7 @@ def matched(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]
 
 
 def _latest(log: ContactLog) -> dict[str, int]:
-    """The last record of each name."""
+    """Return the last record of each name."""
     found: dict[str, int] = {}
     for index, body in enumerate(log.bodies):
         if body.name in found:
@@ -85,7 +89,7 @@ def _unlike(a: dict[tuple[str, ...], Any], b: dict[tuple[str, ...], Any]) -> flo
 
 
 def first_difference(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> FirstDifference:
-    """The first step whose contacts, or poses at its start, are not the same to the bit, bodies counted as in ``a``."""
+    """Find the first step whose contacts or step length differ, to the bit, bodies counted as in ``a``."""
     index = np.full(len(b.bodies) + 1, -1)
     for x, y in pairs:
         if x is not None and y is not None:
@@ -126,9 +130,7 @@ def _bodies(rows: Array, known: set[bytes]) -> Iterator[int]:
 
 
 def require_kin(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> None:
-    """Raise CompareError where less than half of the bodies have a partner that is like them in name, material, size,
-    mass or place: that is another scene altogether.
-    """
+    """Raise CompareError where under half of the bodies have a partner of like name, material, size, mass or place."""
     known = [(a.bodies[i], b.bodies[j]) for i, j in pairs if i is not None and j is not None]
     like = sum(_kin(x, y) for x, y in known)
     most = max(len(_latest(a)), len(_latest(b)))

@@ -1,4 +1,4 @@
-"""The second scene once more, with some of its inputs as the first has them.
+"""Substitute inputs of the first scene in the second.
 
 pairs + chosen places -> Plan: each call of B with A's arguments, calls of A where B has none, none where A has none
 """
@@ -13,22 +13,22 @@ from sonic_bullet.comparing.inputs.call_pairs import CallPair, about, differing
 from sonic_bullet.listener.calls import ABSENT, Call, Path, leaves, with_leaves
 
 HANDLES = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId", "body", "links", "linkIndex", "jointIndex")
-"""Arguments that say of whom a call is; they are never what differs."""
+"""Arguments that identify the body of a call; they are not inputs."""
 Place = tuple[int, Path | None]
-"""A number of a pair, and which of its leaves; None: the whole call."""
+"""Number of a pair, and one of its leaves; None: the whole call."""
 
 
 @dataclass(slots=True, eq=False)
 class PutBack:
-    """A `Plan`: places of pairs that are as A has them."""
+    """A `Plan` that gives places of pairs A's arguments."""
 
     pairs: Sequence[CallPair]
     chosen: frozenset[Place]
     _next: int = field(default=0)
 
     def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
-        """See `Plan`."""
-        if call.who is not None and call.who.side == "a":  # B's own loops find a body of A's: its calls come anyway
+        """Return calls of A before a call of B, and its substituted arguments, see `Plan`."""
+        if call.who is not None and call.who.side == "a":  # B's own loop finds a body of A: its calls are made anyway
             return [], None
         number = self._number(call)
         if number is None:
@@ -45,11 +45,11 @@ class PutBack:
         return first, made if pair.a is not None or _asks(made) else None
 
     def behind(self, step: int, name: str | None = None) -> list[Call]:
-        """See `Plan`."""
+        """Return the remaining calls of A in a step, see `Plan`."""
         end = self._next
         while end < len(self.pairs) and self.pairs[end].step <= step:
             pair = self.pairs[end]
-            gone = pair.a is None and (end, None) in self.chosen  # B does not come to ask it
+            gone = pair.a is None and (end, None) in self.chosen  # B does not make this call
             if name is not None and not gone and (pair.b is not None or pair.a is None or pair.a.name != name):
                 break
             end += 1
@@ -57,7 +57,7 @@ class PutBack:
         return found
 
     def _number(self, call: Call) -> int | None:
-        """Of the next pair whose call of B is this one."""
+        """Find the next pair whose call of B is this one."""
         for number in range(self._next, len(self.pairs)):
             pair = self.pairs[number]
             if pair.step > call.step:
@@ -67,7 +67,7 @@ class PutBack:
         return None
 
     def _of_a(self, start: int, stop: int) -> list[Call]:
-        """Calls of A alone that are chosen: whole, or with the arguments that are."""
+        """List the chosen calls that A alone makes: whole, or with the chosen arguments."""
         found = []
         for number, pair in enumerate(self.pairs[start:stop], start):
             if pair.a is None or pair.b is not None:
@@ -82,5 +82,5 @@ class PutBack:
 
 
 def _asks(arguments: Mapping[str, Any]) -> bool:
-    """Whether anything is asked of whom these arguments name."""
+    """Tell whether the arguments hold more than the body."""
     return any(name not in HANDLES for name in arguments)

@@ -1,1 +1,1 @@
-"""What inputs did: modes, levels, onsets, decays; what became of a recording."""
+"""Effects of inputs: modes, levels, onsets, decays; changes of a recording."""

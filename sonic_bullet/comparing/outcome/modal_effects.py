@@ -1,4 +1,4 @@
-"""What became of the modes of a body: frequencies in cents, decays in per cent, shapes by modal assurance.
+"""Changes of a body's modes: frequencies in cents, decays in per cent, shapes by modal assurance.
 
 cents = 1200 log2(f_B/f_A)        MAC = (φ_Aᵀφ_B)² / (φ_Aᵀφ_A · φ_Bᵀφ_B) [Allemang and Brown 1982]
 """
@@ -14,11 +14,11 @@ from sonic_bullet.records import ModalModel
 from sonic_bullet.records.counts import format_count
 
 ASSURED = 32
-"""Modes whose shapes are compared."""
+"""Number of modes whose shapes are compared."""
 
 
 def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Consequence]:
-    """One effect a body whose modes are others."""
+    """Return one effect for each body whose modes differ."""
     found = []
     for i, j in pairs:
         if i is not None and j is not None and not same_model(a.bodies[i], b.bodies[j]):

@@ -1,12 +1,12 @@
-"""What became of a recording, told from the samples alone: no cause is named, for a recording has no inputs.
+"""Changes of a recording, from the samples alone, without causes, as a recording has no inputs.
 
-    channels in which order -> delay, polarity, gain by cross-correlation -> transfer function H = S_ab/S_aa -> what is
-    left: noise, tones, clipping, gaps; two that correlate no more than chance have nothing in common
+    order of channels -> delay, polarity, gain by cross-correlation -> transfer function H = S_ab/S_aa -> the residual:
+    noise, tones, clipping, gaps; two that correlate no more than chance have nothing in common
 
 Chance: c(k) = Σ a(t) b(t + k) of two unrelated sounds has the variance Σ a²b² · Σ ρ_a ρ_b [Bartlett, J. R. Stat. Soc.
 Suppl. 8 (1946) 27], a² and b² their envelopes; of M lags the largest is below √(2 ln(2M/α)) of its root but for α.
-H and its coherence: Bendat and Piersol, Random Data (2010), eq. 6.37 and 6.39. Coherence near 1 says one linear filter
-did it; what it does not explain is left over.
+H and its coherence: Bendat and Piersol, Random Data (2010), eq. 6.37 and 6.39. A coherence near 1 means one linear
+filter; the rest is the residual.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from sonic_bullet.records.counts import format_count
 
 DELAY_MOST_S = 0.5
 GROUP_DELAY = 16
-"""Samples that a filter may be late by."""
+"""Largest group delay of a filter in samples."""
 FILTER_DB = 0.1
-"""Response that is flatter than this is a gain."""
+"""A flatter response is a gain."""
 LEFT_DB = -90.0
-"""What is left below this, re the recording, is rounding of 16 bits."""
+"""A residual below this, re the recording, is rounding of 16 bits."""
 CLIPPED_RUN = 4
 """Samples in a row at one extreme value: a sine at 1 kHz has two at 48 kHz."""
 GAP_S = 0.002
 CHANCE, COMMON_SHARE = 0.01, 0.25
-"""α; and what of B's power A must explain so as not to be asked whether by chance: a tone correlates with any other."""
+"""α; and the fraction of B's power that A explains beyond chance in any case: a tone correlates with any other."""
 ENVELOPE_S = 0.02
 OFFSET_ERRORS = 4
 """Standard errors of a mean that noise does not reach, but for 6 in 100 000."""
@@ -39,7 +39,7 @@ GAIN_DB = 0.005
 
 
 def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
-    """Effects of two recordings (channels, n) at one rate."""
+    """Find the changes between two recordings (channels, n) at one rate."""
     if a.shape[0] != b.shape[0] or not a.size or not b.size:
         return []
     if not a.any() or not b.any():
@@ -68,13 +68,13 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
 
 
 def _only_delayed(a: Array, b: Array, delay: int) -> bool:
-    """Whether little but a gain is left to explain at that delay; else it is that of a filter."""
+    """Tell whether little but a gain is left at that delay; else it is the delay of a filter."""
     x, y = _overlap(a, b, delay)
     return _db(y - float((x * y).sum() / np.square(x).sum()) * x, y) < -40
 
 
 def _order(a: Array, b: Array) -> tuple[int, ...]:
-    """Which channel of A is which of B: the permutation whose spectra agree best."""
+    """Find the permutation of channels whose spectra agree best."""
     if not 1 < len(a) <= 4:
         return tuple(range(len(a)))
     n = max(a.shape[1], b.shape[1])
@@ -99,8 +99,9 @@ def _offset(a: Array, b: Array) -> list[Consequence]:
 
 
 def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
-    """(samples by which B is later, sign) of the largest cross-correlation of all channels together; the share of B's
-    power that it explains, and what chance would.
+    """Find B's delay in samples and sign by the largest cross-correlation of all channels together.
+
+    Also returns the fraction of B's power that it explains, and that explained by chance.
     """
     n = 1 << int(np.ceil(np.log2(a.shape[1] + b.shape[1])))
     one, other = np.fft.rfft(a, n, axis=1), np.fft.rfft(b, n, axis=1)
@@ -119,7 +120,7 @@ def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
 
 
 def _meeting(x: Array, y: Array, n: int, window: int) -> Array:
-    """Σ x²(t) y²(t + k) of envelopes, by k: how much of two sounds is there at once."""
+    """Compute Σ x²(t) y²(t + k) of envelopes, by k."""
     box = np.fft.rfft(np.full(window, 1 / window), n)
     one, other = np.fft.rfft(np.square(x), n), np.fft.rfft(np.square(y), n)
     return np.fft.irfft(np.conj(one) * other * np.abs(box) ** 2, n)
@@ -140,7 +141,7 @@ def _clipping(a: Array, b: Array) -> list[Consequence]:
 
 
 def _flat_tops(x: Array) -> tuple[int, float]:
-    """Samples at an extreme value in runs, and that value."""
+    """Count the samples at an extreme value in runs, and return that value."""
     top = float(np.abs(x).max())
     at = np.abs(x) >= top * (1 - 1e-6)
     count = 0
@@ -152,7 +153,7 @@ def _flat_tops(x: Array) -> tuple[int, float]:
 
 
 def _gaps(x: Array, y: Array, sr: int) -> list[Consequence]:
-    """Where B is exactly nothing and A is not."""
+    """Find where B is exactly zero and A is not."""
     silent = (y == 0).all(axis=0) & (np.abs(x).max(axis=0) > 1e-6 * np.abs(x).max())
     edges = np.flatnonzero(np.diff(np.concatenate([[0], silent.astype(np.int8), [0]])))
     runs = [(start, stop) for start, stop in zip(edges[::2], edges[1::2], strict=True) if stop - start >= GAP_S * sr]
@@ -164,7 +165,7 @@ def _gaps(x: Array, y: Array, sr: int) -> list[Consequence]:
 
 
 def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
-    """Gain or filter, and what neither explains."""
+    """Find a gain or filter, and the residual of both."""
     gain = float((x * y).sum() / np.square(x).sum())
     left = y - gain * x
     level = _db(left, y)
@@ -193,9 +194,10 @@ def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
 
 
 def _response(x: Array, y: Array, sr: int) -> tuple[Array, Array, float]:
-    """(centre frequencies, response in dB, share of B's power that it explains), by octave bands where A has power.
+    """Compute the response in octave bands where A has power.
 
-    The share is of a least-squares filter of 64 taps, fitted on all samples: noise has none.
+    Returns centre frequencies, response in dB, and the fraction of B's power that a least-squares filter of 64 taps
+    explains, fitted on all samples: noise has none.
     """
     from scipy.linalg import solve_toeplitz
 
@@ -222,7 +224,7 @@ def _response(x: Array, y: Array, sr: int) -> tuple[Array, Array, float]:
 
 
 def _left(left: Array, level: float, sr: int) -> Consequence:
-    """What is left after a gain: a tone, or noise."""
+    """Classify the residual after a gain: a tone, or noise."""
     spectrum = (np.abs(np.fft.rfft(left * np.hanning(left.shape[1]), axis=1)) ** 2).sum(axis=0)
     k = int(np.argmax(spectrum))
     share = spectrum[max(0, k - 3) : k + 4].sum() / spectrum.sum()
@@ -235,7 +237,7 @@ def _left(left: Array, level: float, sr: int) -> Consequence:
 
 
 def _added_level(level_db: float) -> str:
-    """How strong something is that is added."""
+    """Describe the level of an addition."""
     return f"{abs(level_db):.1f} dB {'above' if level_db > 0 else 'below'} A as a whole"
 
 

@@ -1,4 +1,4 @@
-"""What two sounds differ in, as one hears it: first sample, levels by band and time, onsets, decay, loudness.
+"""Audible differences of two sounds: first sample, levels by band and time, onsets, decay, loudness.
 
 level_dB(band) = 10 lg ∫ |B|² df / ∫ |A|² df over an octave band [IEC 61260-1]
 T60: the slope of the backward integral of p² between −5 and −25 dB [Schroeder, J. Acoust. Soc. Am. 37 (1965) 409]
@@ -17,15 +17,15 @@ from sonic_bullet.records.counts import format_count
 
 OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
 QUIET_DB = -80.0
-"""Below the loudest band: what is as quiet in both has no level of its own to compare."""
+"""Level re the loudest band below which bands are not compared."""
 FRAME_S, RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
-"""An onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; flams closer than that are one."""
+"""Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one."""
 FLOOR_DB = -50.0
-"""Onsets are looked for down to here below the loudest moment."""
+"""Lowest level of an onset re the loudest moment."""
 
 
 def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Array, int]:
-    """Both sounds (channels, n) at the lower of their rates."""
+    """Resample both sounds (channels, n) to the lower of their rates."""
     low = min(sr_a, sr_b)
 
     def lowered(x: Array, sr: int) -> Array:
@@ -40,7 +40,7 @@ def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Arr
 
 
 def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
-    """Effects of sounds (channels, n) at one rate, first difference first."""
+    """Find the differences of sounds (channels, n) at one rate, first difference first."""
     found: list[Consequence] = []
     n = min(a.shape[1], b.shape[1])
     if a.shape[0] != b.shape[0]:
@@ -57,7 +57,7 @@ def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
 
 
 def band_levels(x: Array, sr: int) -> Array:
-    """(bands,) mean square in octave bands, all channels together, dB re 1 Pa²; −inf where there is none."""
+    """Return mean squares (bands,) in octave bands, all channels together, dB re 1 Pa²; −inf where silent."""
     n = max(x.shape[1], 1)
     power = (np.abs(np.fft.rfft(x, axis=1)) ** 2).sum(axis=0) * 2 / n**2
     freq = np.fft.rfftfreq(n, 1 / sr)
@@ -86,12 +86,12 @@ def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
 
 
 def level_words(change_db: float, unit: str = "dB", digits: int = 2) -> str:
-    """A change of level from A to B, as one says it: "5 dB quieter"."""
+    """Describe a change of level from A to B: "5 dB quieter"."""
     return f"{abs(change_db):.{digits}g} {unit} {'louder' if change_db >= 0 else 'quieter'}"
 
 
 def onsets_s(x: Array, sr: int) -> list[float]:
-    """When something begins to sound, in s."""
+    """Return the times of onsets, in s."""
     hop = max(1, round(FRAME_S * sr / 2))
     square = np.square(x).sum(axis=0)
     count = len(square) // hop
@@ -129,7 +129,7 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
 
 
 def t60_s(x: Array, sr: int) -> float | None:
-    """Time in which the sound after its loudest moment falls by 60 dB; None: it does not fall by 25."""
+    """Return the time in which the sound after its loudest moment falls by 60 dB; None: it does not fall by 25."""
     square = np.square(x).sum(axis=0)
     if not square.any():
         return None
