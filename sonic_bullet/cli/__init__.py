@@ -11,11 +11,10 @@
     compare A B               -> Comparison   -> words, JSON, page
     cache                     -> table, JSON
 
-Exit 0: done. 2: one line on stderr says what is wrong and how to mend it, and no file stands under its final name
-half-written; a scene that ends its process or never steps is named with its line. 130 (Ctrl-C), 143 (terminated):
-within a second; what was rendered so far is closed as a valid file and named. With --json
-and no path only JSON goes to stdout, whatever a scene prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Everything heavy
-is imported by the command that needs it.
+Exit 0: done. 2: one line on stderr states the fault and the remedy, and no half-written file has its final name; a
+scene that ends its process or never steps is named with its line. 130 (Ctrl-C), 143 (terminated): within a second; the
+sound so far is closed as a valid file and named. With --json and no path only JSON goes to stdout, whatever a scene
+prints. SONIC_BULLET_DEBUG=1 shows tracebacks. Each command imports what it needs.
 """
 
 from __future__ import annotations
@@ -114,7 +113,7 @@ cli.add_command(bake)
     help="Also write the modal model: frequencies, decays, shapes on the surface.",
 )
 def modes(**options: Any) -> None:
-    """Vibration modes of a mesh: the elastic ones, ascending."""
+    """Compute the elastic vibration modes of a mesh, ascending."""
     from sonic_bullet.cli.solid_commands import run_modes
 
     run_modes(**options)
@@ -141,7 +140,7 @@ def materials(json_to: str | None) -> None:
 )
 @json_option
 def doctor(scene: str, seconds: float, json_to: str | None) -> None:
-    """Name the settings of a scene that would ruin its sound, and how to mend them."""
+    """Name the settings of a scene that would spoil its sound, and their remedies."""
     from sonic_bullet.cli.scenes.scene_commands import run_doctor
 
     run_doctor(scene, seconds, json_to)
@@ -160,7 +159,7 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
 @csv_option
 @json_option
 def features(**options: Any) -> None:
-    """The damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
+    """List the damped sinusoids of a recorded impact: frequency, decay, amplitude, each with its spread."""
     from sonic_bullet.cli.features_command import run_features
 
     run_features(**options)
@@ -206,7 +205,7 @@ def fit(**options: Any) -> None:
 )
 @json_option
 def residual(**options: Any) -> None:
-    """What the modes of recorded strikes leave unsaid, into a preset that sounds it with every contact."""
+    """Store the non-modal part of recorded strikes in a preset that plays it with every contact."""
     from sonic_bullet.cli.residual_command import run_residual
 
     run_residual(**options)
@@ -239,7 +238,7 @@ def residual(**options: Any) -> None:
     help="Seed of what is left out in turn, and of the null effects.",
 )
 def diagnose(**options: Any) -> None:
-    """Say which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
+    """Find which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
     from sonic_bullet.cli.diagnose_command import run_diagnose
 
     run_diagnose(**options)
@@ -247,7 +246,7 @@ def diagnose(**options: Any) -> None:
 
 @cli.group(epilog=CASE_EPILOG)
 def case() -> None:
-    """Make and check a case: a folder of recorded strikes with a case.json that says what was struck."""
+    """Make and check a case: a folder of recorded strikes with a case.json that describes them."""
 
 
 @case.command("new", epilog=CASE_EPILOG)
@@ -299,7 +298,7 @@ def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **
 @case.command("check")
 @click.argument("folder", metavar="CASE_DIR")
 def case_check(folder: str) -> None:
-    """Say what a case holds, or the first thing that a fit would stop at."""
+    """Describe what a case holds, or the first thing that a fit would stop at."""
     from sonic_bullet.cli.case_command import run_case_check
 
     run_case_check(folder)
@@ -314,5 +313,5 @@ def case_schema() -> None:
 
 
 def main() -> None:
-    """The console script: run a command, turn every error into one line on stderr, and exit."""
+    """Run a command as the console script: turn every error into one line on stderr, and exit."""
     run_and_exit(cli)

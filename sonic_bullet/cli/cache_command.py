@@ -1,4 +1,4 @@
-"""`cache`: what is kept between runs, by kind; bounded and cleared."""
+"""Command `cache`: list, bound or clear what is kept between runs."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
 
 
 def by_kind(files: Iterable[KeptFile]) -> list[dict[str, Any]]:
-    """What there is of each kind: how many files and bytes, and when the one unused for longest was used."""
+    """Summarise each kind: number of files and bytes, and the last use of the one unused for longest."""
     kinds: dict[str, list[KeptFile]] = {}
     for one in files:
         kinds.setdefault(one.kind, []).append(one)
@@ -75,7 +75,7 @@ def by_kind(files: Iterable[KeptFile]) -> list[dict[str, Any]]:
 
 
 def _said(result: dict[str, Any], asked: bool) -> str:
-    """The result in words. asked: something was to be removed."""
+    """Format the result. asked: a removal was asked for."""
     from sonic_bullet.cli.output import table
 
     def total_mb(kinds: list[dict[str, Any]]) -> float:

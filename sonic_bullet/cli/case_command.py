@@ -1,8 +1,8 @@
-"""`case`: a folder of recordings to a case.json that `fit` and `diagnose` read; and whether one can be read.
+"""Command `case`: make a case.json, which `fit` and `diagnose` read, of a folder of recordings; and check one.
 
-new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied beside it; recordings
-        of several strikes are cut into takes where that is asked for; responses of UFF files become recordings
-check   FOLDER -> what the case holds, and what of it is not read; or one line that says what is wrong
+new     FOLDER, mesh, recordings, guess -> FOLDER/case.json     files from elsewhere are copied to it; recordings
+        of several strikes are cut into takes where asked for; responses of UFF files become recordings
+check   FOLDER -> what the case holds, and what of it is not read; or one line with its fault
 schema  JSON Schema of case.json
 """
 
@@ -50,8 +50,7 @@ def run_case_new(
     sensor_direction: Point | None,
     medium: str | None,
 ) -> None:
-    """The `case new` command: case.json, and copies of files from elsewhere, whole or not at all; nothing is
-    overwritten.
+    """Run `case new`: write case.json and copy files from elsewhere, whole or not at all, without overwriting.
 
     Raises SonicBulletError.
     """
@@ -115,7 +114,7 @@ def run_case_new(
 
 
 def _drawing(picture: str | None, split: bool) -> Path | None:
-    """Where the picture goes. Raises FileError."""
+    """Return the picture's path; raises FileError."""
     if picture is not None and not (split and picture.endswith((".png", ".pdf", ".svg"))):
         wrong = "pictures are .png, .pdf or .svg" if split else "there is nothing to draw without --split"
         raise FileError(f"cannot write {picture}: {wrong}", "end the name with .png, and give --split too")
@@ -124,7 +123,7 @@ def _drawing(picture: str | None, split: bool) -> Path | None:
 
 
 def _new_place(folder: str) -> Path:
-    """The case's folder, which may be there, without a case.json. Raises FileError."""
+    """Return the case's folder, which may exist without a case.json; raises FileError."""
     place = Path(folder)
     if place.exists() and not place.is_dir():
         raise FileError(f"{folder} is no folder", "name the case's folder first, then its files")
@@ -134,7 +133,7 @@ def _new_place(folder: str) -> Path:
 
 
 def _check_recordings(folder: str, sounds: Sequence[Path], option: str) -> None:
-    """Raise FileError where there are none, or UFF files among audio or beside an option that cuts audio."""
+    """Raise FileError where there are none, or UFF files among audio or with an option that cuts audio."""
     if not sounds:
         raise FileError(f"{folder} holds no recordings", "name them: --recordings a.wav b.wav")
     responses = [sound for sound in sounds if sound.suffix.lower() in UFF]
@@ -146,7 +145,7 @@ def _check_recordings(folder: str, sounds: Sequence[Path], option: str) -> None:
 
 
 def _say_missing(case: dict[str, Any], force_newton: float | None) -> None:
-    """Print what of the strikes is to be filled in; nothing where all is known."""
+    """Print what of the strikes is to be filled in, if anything."""
     strikes = [recording["strike"] for recording in case["recordings"]]
     where = any(strike["position"] is None for strike in strikes)
     hard = force_newton is None and any(strike["impulse"] is None for strike in strikes)
@@ -177,7 +176,7 @@ def _check_options(
 
 
 def _inside(place: Path) -> list[Path]:
-    """The recordings in a folder: audio, or UFF files where there is none."""
+    """List the recordings in a folder: audio, or UFF files where there is none."""
     files = sorted(place.glob("*"))
     for suffixes in (FORMATS, UFF):
         if found := [file for file in files if file.suffix.lower() in suffixes]:
@@ -186,7 +185,7 @@ def _inside(place: Path) -> list[Path]:
 
 
 def _doubts(sound: Path) -> list[str]:
-    """What is odd about a recording. Raises FileError, AudioError."""
+    """List what is unusual about a recording; raises FileError, AudioError."""
     from sonic_bullet.estimator.lines.onset import clipped_samples, span
 
     signal, sr, which = read_channel(sound)
@@ -197,7 +196,7 @@ def _doubts(sound: Path) -> list[str]:
 
 
 def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any]:
-    """What the case says of its object, the mesh's name aside; nothing where nothing is known. Raises MaterialError."""
+    """Describe the case's object, without the mesh's name; empty where it is unknown; raises MaterialError."""
     if material is None:
         return {}
     from sonic_bullet.presets import load_material
@@ -214,7 +213,7 @@ def _object(mesh: str | None, units: str, material: str | None) -> dict[str, Any
 
 
 def _names(place: Path, files: Sequence[Path]) -> dict[Path, str]:
-    """The name of each file inside the folder, its own or its copy's. Raises FileError where two would be one."""
+    """Map each file to its name inside the folder, its own or its copy's; FileError where two would be one."""
     inner = os.path.realpath(place)
     named: dict[Path, str] = {}
     for file in files:
@@ -241,7 +240,7 @@ def _described(
     sensor_direction: Point | None,
     medium: str | None,
 ) -> dict[str, Any]:
-    """What case.json holds: every field one may want to fill, null where it is not known."""
+    """Return the content of case.json: every field that a user may fill in, null where unknown."""
     strike = {"position": None, "direction": None, "impulse": None}
     of = {"object": "object"} if thing else {}
     return {
@@ -258,7 +257,7 @@ def _described(
 
 
 def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> None:
-    """Copies of what lies elsewhere, then case.json; with an error all of it vanishes again. Raises FileError."""
+    """Copy files from elsewhere, then write case.json; an error removes all of it; raises FileError."""
     made: list[Path] = []
     fresh = not place.exists()
     try:
@@ -285,7 +284,7 @@ def _written(place: Path, name_of: dict[Path, str], case: dict[str, Any]) -> Non
 
 
 def run_case_check(folder: str) -> None:
-    """The `case check` command: what a case holds. Raises SonicBulletError where `fit` would stop."""
+    """Run `case check`: print what a case holds; raise SonicBulletError where `fit` would stop."""
     from sonic_bullet.estimator.fit.takes.usable_take import refuse_clipped, refuse_short
 
     case = read_case(folder)
@@ -314,7 +313,7 @@ def run_case_check(folder: str) -> None:
 
 
 def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
-    """An object's line of the table. Raises SonicBulletError."""
+    """Return an object's row of the table; raises SonicBulletError."""
     from sonic_bullet.presets import load_material, material_names
 
     thing = case.objects[name]
@@ -344,5 +343,5 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
 
 
 def run_case_schema() -> None:
-    """The `case schema` command."""
+    """Run `case schema`."""
     print(json_bytes(case_schema(), indent=2).decode(), end="")

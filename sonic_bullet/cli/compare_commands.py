@@ -1,9 +1,9 @@
-"""`compare` and `baseline`: two versions of a scene, log or recording; what a version sounds like, kept.
+"""Commands `compare` and `baseline`: compare two versions of a scene, log or recording; store a version's baseline.
 
     A, B (or a revision of A) -> Comparison, or one a name of two folders -> words, JSON, one page
 
-Exit 0: samples equal, or --audible was given and nothing stands out; 1: samples differ, or a partner is missing; 2:
-wrong use, or something that cannot be compared; 130: stopped, and what was known by then is printed.
+Exit 0: samples equal, or --audible was given and B is within chance; 1: samples differ, or a partner is missing; 2:
+wrong use, or a side that cannot be compared; 130: interrupted, and the results so far are printed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Examples:
 @click.option("--sr", type=click.IntRange(8000, 384000), metavar="HZ", help="Rate of both scenes. [default: 48000]")
 @json_option
 def compare(a: str, b: str | None, **options: Any) -> None:
-    """Say whether two versions sound the same, and if not, which input is the cause.
+    """Tell whether two versions sound the same, and if not, which input is the cause.
 
     A, B: scenes (.py), contact logs (.npz), recordings, or folders of them whose files are paired by name; A may be a
     baseline (.json) of the scene B.
@@ -90,7 +90,7 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
 
 
 def _check_options(a: str, b: str | None, options: Any) -> None:
-    """Raise CompareError for an option that says nothing of what is given."""
+    """Raise CompareError for an option that does not apply to the sides."""
     of_scenes = [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]
     scenes = _of_scenes(a, b)
     if a.lower().endswith(".json"):
@@ -103,12 +103,12 @@ def _check_options(a: str, b: str | None, options: Any) -> None:
 
 
 def _of_scenes(a: str, b: str | None) -> bool:
-    """Whether what is compared may hold a scene."""
+    """Tell whether a side may hold a scene."""
     return a.lower().endswith(".py") or (b or a).lower().endswith(".py") or Path(a).is_dir()
 
 
 def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
-    """All that was compared, one entry a pair; whether it was stopped."""
+    """Compare all pairs; return one entry a pair, and whether it was interrupted."""
     from sonic_bullet.comparing.compared_sides import compare as compare_both
     from sonic_bullet.comparing.folders import Paired, compare_folders
     from sonic_bullet.comparing.sides import SceneSide
@@ -144,7 +144,7 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
 
 
 def _kept(found: Any, page: bool) -> dict[str, Any]:
-    """What is printed and written of a comparison; its sounds go."""
+    """Return what is printed and written of a comparison, without its sounds."""
     kept = {"lines": found.lines(), "described": found.described(), "passed": found.passed, "stopped": found.stopped}
     if page:
         from sonic_bullet.report.compare_page import page_entry
@@ -154,7 +154,7 @@ def _kept(found: Any, page: bool) -> dict[str, Any]:
 
 
 def _against_baseline(a: Path, b: Path, tell: Callable[[str], None], tolerance_db: float | None) -> dict[str, Any]:
-    """A scene held against what it sounded like."""
+    """Compare a scene with its baseline."""
     from sonic_bullet.comparing.baselines import check_baseline, read_baseline
     from sonic_bullet.comparing.tolerance import sameness_words
 
@@ -190,7 +190,7 @@ def _say(say: Callable[[str], None], found: list[Any], stopped: bool) -> None:
 
 
 def _described(found: list[Any], stopped: bool) -> dict[str, Any]:
-    """What JSON holds."""
+    """Return the content of the JSON."""
     return {
         "compared": sum(one.kept is not None for one in found),
         "stopped": stopped,
@@ -202,7 +202,7 @@ def _described(found: list[Any], stopped: bool) -> dict[str, Any]:
 
 
 def _exit(found: list[Any]) -> None:
-    """0, 1 or, where something could not be compared, the error that ends with 2."""
+    """Exit with 1 where samples differ, or raise the error of a pair that could not be compared."""
     for one in found:
         why = one.kept["refused"] if one.kept is not None else "" if one.missing else one.error
         if why:
@@ -223,7 +223,7 @@ Example:
 @click.option("--reason", default="", metavar="WHY", help="Why it is to sound so, for whoever reads the file.")
 @click.option("--runs", type=click.IntRange(0, 9999), default=99, show_default=True, help="Of the ensemble; 0: none.")
 def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int) -> None:
-    """Keep what scenes sound like now as small files, for tests to hold them against."""
+    """Store the present sound of scenes as small files, for tests to compare with."""
     for scene in scenes:
         if not Path(scene).is_file() or not scene.lower().endswith(".py"):
             raise CompareError(f"there is no scene {scene}", "give the paths of scenes (.py)")

@@ -1,4 +1,4 @@
-"""From a command line to an exit code: what a shell sees of this package besides results.
+"""Run a command line and convert its result to an exit code.
 
 0 done | 2 a named error, in one line | 130 Ctrl-C | 143 terminated | 141 the reader left
 """
@@ -17,11 +17,11 @@ from sonic_bullet.machine.worker import stop_word
 from sonic_bullet.records.errors import SonicBulletError, interrupts
 
 QUICK = ("cache", "case", "materials")
-"""Commands that take long on a busy machine alone, which is no reason to speak."""
+"""Commands that take long only on a busy machine, and report no progress."""
 
 
 def run_and_exit(cli: click.Group) -> NoReturn:
-    """Run the command that the command line asks for, in a process that is waited for, and exit."""
+    """Run the command that the command line asks for, in a child process, and exit."""
     word = "" if {"-h", "--help"} & set(sys.argv) or not cli.commands.keys() & set(sys.argv[1:2]) else sys.argv[1]
     ending = supervised(lambda: _run(cli), command="" if word in QUICK else word)
     if ending.words:
@@ -30,19 +30,19 @@ def run_and_exit(cli: click.Group) -> NoReturn:
 
 
 def _run(cli: click.Group) -> int:
-    """Run the command, turn every error into one line on stderr; the exit code."""
+    """Run the command, turn every error into one line on stderr; return the exit code."""
     import logging
     import warnings
 
     debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
     if not debug:
-        warnings.simplefilter("ignore")  # a library's warning is no line of ours
-        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor that it found no home for its fonts
+        warnings.simplefilter("ignore")  # a library's warning is not for the user
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor a missing folder for its fonts
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its table
     try:
-        # cli.main() would swallow what an interrupt says
+        # cli.main() would drop the message of an interrupt
         with interrupts(), cli.make_context("sonic-bullet", _settled(sys.argv[1:]) or ["--help"]) as context:
             cli.invoke(context)
         _say_what_is_not_kept()
@@ -67,8 +67,8 @@ def _run(cli: click.Group) -> int:
 
 
 def _failed(error: Exception) -> int:
-    """Say what is wrong; the exit code."""
-    if stop_word():  # what an interrupt became on its way out of a library
+    """Report an error; return the exit code."""
+    if stop_word():  # an interrupt that became another exception
         return _stopped()
     if isinstance(error, SonicBulletError):
         _say(str(error))
@@ -81,16 +81,14 @@ def _failed(error: Exception) -> int:
 
 
 def _stopped(words: str = "") -> int:
-    """Say that the command was interrupted; the exit code."""
+    """Report that the command was interrupted; return the exit code."""
     words = words or stop_word() or "stopped"
     _say(words)
     return 143 if "terminated" in (stop_word(), words.partition(";")[0]) else 130
 
 
 def _settled(words: list[str]) -> list[str]:
-    """The command line with every --json that no name ending in .json follows as --json=-: what follows is another
-    argument then.
-    """
+    """Replace every --json that no name ending in .json follows by --json=-, as another argument follows it then."""
     follows = [*words[1:], ""]
     return [
         "--json=-" if word == "--json" and not after.lower().endswith(".json") else word
@@ -99,9 +97,7 @@ def _settled(words: list[str]) -> list[str]:
 
 
 def _say_what_is_not_kept() -> None:
-    """One note where there was no folder for compiled code and computed models: each run then takes a minute that the
-    next could do without.
-    """
+    """Report, once, that there is no folder for compiled code and models, which costs each run a minute."""
     folder = sys.modules.get("sonic_bullet.machine.user_folder")
     if folder is not None and folder.NOTES:
         _say(
@@ -111,5 +107,5 @@ def _say_what_is_not_kept() -> None:
 
 
 def _say(text: str) -> None:
-    """One line on stderr."""
+    """Print one line on stderr."""
     print("sonic-bullet: " + " ".join(text.split()), file=sys.stderr)

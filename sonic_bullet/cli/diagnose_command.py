@@ -1,6 +1,6 @@
-"""`diagnose`: a case to what its model lacks.
+"""Command `diagnose`: find what the model of a case lacks.
 
-Exit 0: a verdict; 1: a result that says no, as the baseline is farther from the recordings than silence.
+Exit 0: a verdict; 1: the baseline is farther from the recordings than silence.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SIDES = ("before", "after")  # the folders of --predict
 def run_diagnose(
     source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int
 ) -> None:
-    """The `diagnose` command. Raises SonicBulletError."""
+    """Run `diagnose`; raises SonicBulletError."""
     if output is not None and not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if report is not None and not report.endswith((".html", ".htm")):
@@ -58,7 +58,7 @@ def run_diagnose(
 
 
 def _predicted(found: Any, folder: str) -> int:
-    """Every strike's WAV before and after; how many strikes. Raises FileError."""
+    """Write every strike's WAV before and after; return the number of strikes; raises FileError."""
     from sonic_bullet.diagnosis.diagnose import predictions
     from sonic_bullet.files import write_audio
 
@@ -78,7 +78,7 @@ def _predicted(found: Any, folder: str) -> int:
 
 
 def _summary(found: Any) -> str:
-    """For people."""
+    """Format the diagnosis for a terminal."""
     from sonic_bullet.diagnosis.deciding_measurement import next_measurement
     from sonic_bullet.diagnosis.remainder import NOTHING
     from sonic_bullet.diagnosis.selection.stepwise import NothingCompared

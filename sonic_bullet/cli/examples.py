@@ -1,4 +1,4 @@
-"""The examples under each command's help."""
+"""Examples in each command's help."""
 
 RENDER_EPILOG = """\b
 Examples:

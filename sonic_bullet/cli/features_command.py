@@ -1,4 +1,4 @@
-"""`features`: the damped sinusoids of a recording, each with its spread."""
+"""Command `features`: the damped sinusoids of a recording, each with its spread."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def run_features(
     csv_to: str | None,
     picture: str | None,
 ) -> None:
-    """The `features` command. Raises SonicBulletError."""
+    """Run `features`; raises SonicBulletError."""
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     picture, json_to, csv_to = places(picture, json_to, csv_to)
@@ -53,10 +53,7 @@ def run_features(
 
 
 def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
-    """Features as JSON-able values; null for a spread that is not known.
-
-    doubtful: whether a note speaks against them.
-    """
+    """Convert features to JSON values; null for a spread that is not known. doubtful: a note puts them in doubt."""
     rows = feature_rows(found)
     verdict = "features" if rows and not doubtful else "doubtful" if rows else "no features"
     return {
@@ -70,7 +67,7 @@ def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
 
 
 def feature_rows(found: Features) -> list[dict[str, float | int | None]]:
-    """A row a feature, strongest first: what was found, and T60, η and Q of its decay; None for a spread not known."""
+    """Return a row a feature, strongest first, with T60, η and Q of its decay; None for a spread not known."""
     columns = [getattr(found, name) for name in NUMBERS]
     return [
         {name: finite(column[k]) for name, column in zip(NUMBERS, columns, strict=True)}
@@ -98,7 +95,7 @@ def _summary(recording: str, found: Features) -> str:
 
 
 def _draw(path: str, sound: Array, sr: int, found: Features) -> None:
-    """Spectrogram with a line a feature, as long as it takes to fall by 60 dB; the (f, d) plane beside it."""
+    """Draw the spectrogram with a line a feature, as long as its decay by 60 dB, and the (f, d) plane."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

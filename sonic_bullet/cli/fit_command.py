@@ -1,6 +1,6 @@
-"""`fit`: a recorded strike, or a case of them, to a preset.
+"""Command `fit`: fit a preset to a recorded strike, or a case of them.
 
-Exit 0: fitted; 1: a result that says no, as what is fitted is farther from the takes than silence; 2: as ever.
+Exit 0: fitted; 1: the fit is farther from the takes than silence; 2: as for all commands.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def run_fit(
     tolerance_percent: float | None,
     **one: Any,
 ) -> None:
-    """The `fit` command. Raises SonicBulletError."""
+    """Run `fit`; raises SonicBulletError."""
     if not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
@@ -99,7 +99,7 @@ def run_fit(
 
 
 def _with_tolerance(case: Case, percent: float | None) -> Case:
-    """The case with the dimensions' tolerance that an option gives, in place of its own. Raises FileError."""
+    """Return the case with the dimension tolerance of an option in place of its own; raises FileError."""
     if percent is None:
         return case
     tolerance = dimension_tolerance(percent / 100, "--dimension-tolerance")
@@ -108,7 +108,13 @@ def _with_tolerance(case: Case, percent: float | None) -> Case:
 
 
 def as_case(source: str, one: dict[str, Any]) -> Case:
-    """The case in a folder, or the one the options describe. Raises FileError."""
+    """Return the case in a folder, or the one the options describe.
+
+    Raises
+    ------
+    FileError
+        The source cannot be read, or options are missing or wrong.
+    """
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
         given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in ONE if one[name] not in (None, ())]
@@ -165,7 +171,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
 
 
 def _unit(name: str, one: dict[str, Any]) -> Point | None:
-    """An option's direction, of length 1. Raises FileError."""
+    """Normalise an option's direction; raises FileError."""
     direction: Point | None = one[name]
     if direction is None:
         return None
@@ -176,7 +182,7 @@ def _unit(name: str, one: dict[str, Any]) -> Point | None:
 
 
 def described(found: Any) -> dict[str, Any]:
-    """What --json writes: the fit, no NaN (None where not identifiable)."""
+    """Convert the fit to JSON values, None where not identifiable."""
     from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
     fit = found.fit
@@ -202,9 +208,9 @@ def described(found: Any) -> dict[str, Any]:
 
 
 def line_rows(found: Any) -> list[dict[str, Any]]:
-    """A row an observed line, object by object: frequency, decay, T60, η and Q with spreads, and the fitted mode it is.
+    """Return a row an observed line, by object: frequency, decay, T60, η and Q with spreads, and its fitted mode.
 
-    mode_hz is None where the line is no mode.
+    mode_hz is None where no mode is paired with the line.
     """
     rows = []
     shaped = {o.evidence.thing.name: o for o in found.objects}
@@ -226,7 +232,7 @@ def line_rows(found: Any) -> list[dict[str, Any]]:
 
 
 def _summary(found: Any, preset: Any) -> str:
-    """What a fit and the preset of it say, for people."""
+    """Format a fit and its preset for a terminal."""
     from sonic_bullet.estimator.fit.dimension_tolerance import GAMMA_PER_SCALE, lines_sd
     from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 

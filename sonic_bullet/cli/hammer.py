@@ -1,4 +1,4 @@
-"""Recordings of which one channel is a hammer's force, parted into sound and force.
+"""Split recordings with a hammer's force in one channel into sound and force.
 
 take (channels, n) -> NAME-sound.wav, its other channels; NAME-force.wav -> pulse (hammer_pulse.py) -> strike.force and,
 where newton at full scale are known and the pulse can be trusted, strike.impulse
@@ -21,7 +21,7 @@ FORCE_COLUMNS = ("force", "impulse", "peak", "contact", "")
 
 @dataclass(frozen=True, slots=True)
 class StrikeFiles:
-    """A take's sound, and its force with the impulse in N·s, None where it is not known."""
+    """Files of a take's sound and force, and its impulse in N·s, None where it is not known."""
 
     sound: Path
     force: Path
@@ -31,7 +31,7 @@ class StrikeFiles:
 def part_force(
     takes: Sequence[Path], channel: int, newton: float | None, to: Path
 ) -> tuple[list[StrikeFiles], list[tuple[str, ...]]]:
-    """Part takes into sound and force.
+    """Split takes into sound and force.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def part_force(
     channel : int
         Of the force, counted from 0.
     newton : float, optional
-        At full scale; None: not known, and no impulse is.
+        At full scale; None: not known, as is then the impulse.
     to : Path
         Folder for the files made.
 
@@ -54,9 +54,9 @@ def part_force(
     Raises
     ------
     FileError
-        A file without that channel, or with no other.
+        A file lacks that channel, or another one.
     AudioError
-        A force or a sound that is dead.
+        A force or a sound is dead.
     """
     made: list[StrikeFiles] = []
     rows: list[tuple[str, ...]] = []

@@ -1,4 +1,4 @@
-"""Damped sinusoids as rows: what of a decay d an acoustician reads, with its spread.
+"""Damped sinusoids as rows: acoustic quantities of a decay d, with their spreads.
 
 T60 = ln(1000)/d,  η = 2d/ω,  Q = 1/η                                               [Cremer, Heckl & Petersson 2005]
 """
@@ -16,8 +16,9 @@ Row = dict[str, float | int | None]
 
 
 def decay_values(freq_hz: float, decay_per_s: float, decay_sd_per_s: float) -> Row:
-    """T60 in s, loss factor η and quality factor Q of a line, each with its spread; None for what is not known, as of
-    a decay within its spread of none.
+    """Return T60 in s, loss factor η and quality factor Q of a line, each with its spread.
+
+    None for an unknown value, as of a decay not larger than its spread.
     """
     known = math.isfinite(decay_per_s) and decay_per_s > (decay_sd_per_s if math.isfinite(decay_sd_per_s) else 0)
     values = {
@@ -35,12 +36,12 @@ def decay_values(freq_hz: float, decay_per_s: float, decay_sd_per_s: float) -> R
 
 
 def finite(value: float) -> float | None:
-    """A number, or None for NaN and infinity, which JSON has no word for."""
+    """Return a number, or None for NaN and infinity, which JSON lacks."""
     return float(value) if math.isfinite(value) else None
 
 
 def decay_cells(row: Row) -> tuple[str, str, str]:
-    """T60, η and Q as a table shows them."""
+    """Format T60, η and Q for a table."""
 
     def shown(name: str) -> str:
         return "?" if row[name] is None else f"{row[name]:.3g}"
@@ -49,7 +50,7 @@ def decay_cells(row: Row) -> tuple[str, str, str]:
 
 
 def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> None:
-    """Rows with a header line; nothing stands for None. Nowhere for a path of None. Raises FileError."""
+    """Write rows with a header line, None as an empty field; a path of None: nowhere; raises FileError."""
     if path is None:
         return
     import csv
@@ -65,7 +66,7 @@ def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequenc
 
 
 def take_tables(takes: Any) -> list[str]:
-    """How far the prediction of each take is, in a table; nothing where no take could be compared."""
+    """Format how near the prediction of each take is; empty where no take could be compared."""
     from sonic_bullet.estimator.fit.case_fit import NO_GAIN
 
     if not takes:

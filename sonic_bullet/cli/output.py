@@ -1,4 +1,4 @@
-"""What the commands say: JSON, tables and progress, each where it belongs.
+"""Output of the commands: JSON, tables and progress.
 
 result -> JSON  -> PATH, or stdout and nothing else there
        -> text  -> stdout
@@ -36,9 +36,7 @@ __all__ = [
 
 @contextmanager
 def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
-    """A printer to stdout; with JSON to stdout, what anything else prints meanwhile (a scene, a C library) goes to
-    stderr.
-    """
+    """Yield a printer to stdout; with JSON to stdout, send other output (a scene, a C library) to stderr."""
     if json_to != "-":
         yield print
         return
@@ -54,14 +52,14 @@ def clean_stdout(json_to: str | None) -> Iterator[Callable[[str], None]]:
 
 
 def warn(lines: Iterable[str]) -> None:
-    """A line of stderr each: what a user should know of a result that stands all the same."""
+    """Print a warning a line on stderr."""
     for line in lines:
         print("sonic-bullet: warning: " + " ".join(line.split()), file=sys.stderr)
 
 
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
-    """Nothing reaches stderr meanwhile, from C neither: PyBullet says when it was built as soon as it is imported."""
+    """Discard stderr within the block, also from C: PyBullet prints its build time when it is imported."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
@@ -74,7 +72,7 @@ def quiet_stderr() -> Iterator[None]:
 
 
 def places(*asked: str | None) -> tuple[str | None, ...]:
-    """Each output's absolute path, resolved once and tried before anything runs: what is run may change the folder.
+    """Return each output's absolute path, tried before anything runs, as a scene may change the folder.
 
     None (not asked for) and "-" (stdout) stay as they are. Raises FileError where one cannot be written or two are one
     file.
@@ -88,11 +86,9 @@ def places(*asked: str | None) -> tuple[str | None, ...]:
 
 
 def folder_place(asked: str, *inside: str) -> str:
-    """The absolute path of a folder for outputs, tried: it and the folders ``inside`` can be made and take files.
+    """Return the absolute path of a folder for outputs, after a trial of it and the folders ``inside``.
 
-    Nothing of that is left.
-
-    Raises FileError.
+    The trial leaves nothing behind. Raises FileError.
     """
     from sonic_bullet.files import cannot, check_output
 
@@ -114,7 +110,7 @@ def folder_place(asked: str, *inside: str) -> str:
 
 
 def write_json(json_to: str | None, value: Any) -> None:
-    """``value`` as strict JSON to a path, to stdout for "-", nowhere for None. Raises FileError."""
+    """Write ``value`` as strict JSON to a path, to stdout for "-", nowhere for None; raises FileError."""
     if json_to is None:
         return
     from sonic_bullet.machine.json_text import json_bytes
@@ -132,9 +128,7 @@ def write_json(json_to: str | None, value: Any) -> None:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
-    """A function of the share done and one of what is being done before that, drawn on a terminal's stderr; in a
-    pipe, lines as of `status`.
-    """
+    """Yield functions for the fraction done and for the current task, shown on stderr; in a pipe as of `status`."""
     if not (is_shown() and on_terminal()):
         with status(label) as say:
             yield percent(say), say
@@ -167,7 +161,7 @@ def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable
 
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    """Columns padded with spaces; all but the first column right-aligned, the last left as it is."""
+    """Format columns padded with spaces, right-aligned except the first and the last."""
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     last = len(head) - 1
 
@@ -187,7 +181,7 @@ def described_render(
     notes: tuple[str, ...],
     lifted: Mapping[str, tuple[int, int]] | None = None,
 ) -> dict[str, Any]:
-    """What was rendered, as JSON. lifted: see `Listener.lifted`; None: not counted."""
+    """Convert a render to JSON values. lifted: see `Listener.lifted`; None: not counted."""
     return {
         "output": report.path,
         "format": report.format,

@@ -14,11 +14,11 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # gener
         self.name, self.count = metavar, metavar.count(",") + 1
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """What help calls the value."""
+        """Return the value's name in help."""
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """The numbers in ``value``; click's usage error where there are not ``count`` finite ones."""
+        """Return the numbers in ``value``; click's usage error where there are not ``count`` finite ones."""
         if isinstance(value, tuple):
             return value
         try:
@@ -62,7 +62,7 @@ channel_option = click.option(
 
 
 def scene_options(command: Any) -> Any:
-    """The options that say how a scene is listened to."""
+    """Add the options of sensors, seed and materials."""
     for option in reversed(
         (
             click.option(
@@ -95,7 +95,7 @@ def scene_options(command: Any) -> Any:
 
 
 def strike_options(command: Any) -> Any:
-    """The options that say how one recording was struck and recorded; a case says it itself."""
+    """Add the options that describe one recorded strike, as a case does."""
     for option in reversed(
         (
             click.option("--mesh", metavar="M", help="Mesh of what was struck."),

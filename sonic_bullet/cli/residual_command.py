@@ -1,4 +1,4 @@
-"""`residual`: recorded strikes to a preset that sounds what its modes do not say."""
+"""Command `residual`: a preset with the non-modal part of recorded strikes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "s
 
 
 def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
-    """The `residual` command. Raises SonicBulletError."""
+    """Run `residual`; raises SonicBulletError."""
     if not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
@@ -42,7 +42,7 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
 
 
 def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
-    """Preset and strikes of a case, or of a recording of a known shape; how near its takes are with the residual."""
+    """Return preset, strikes and take distances, with the residual, of a case or a recording of a known shape."""
     import msgspec
 
     from sonic_bullet.estimator.fit.fitted_preset import preset_of
@@ -66,9 +66,7 @@ def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, 
 
 
 def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
-    """Preset and strikes of a recording without a shape: a named material, the recording's features in place
-    of modes.
-    """
+    """Return preset and strikes of a recording without a shape: a named material, with features in place of modes."""
     import msgspec
 
     from sonic_bullet.estimator.residual.recorded_strikes import recording_strikes
@@ -98,7 +96,7 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
 
 
 def described(residual: Residual) -> dict[str, Any]:
-    """What --json writes: figures of the residual."""
+    """Convert the figures of the residual to JSON values."""
     lines = zip(residual.line_freq_hz, residual.line_decay_per_s, residual.line_amplitude, strict=True)
     share = residual.share_of_clip
     return {

@@ -1,10 +1,10 @@
-"""Responses of UFF files as takes of a case: a recording each, where its strike was and along what.
+"""Convert responses of UFF files to takes of a case: a recording each, with place and direction of its strike.
 
 responses -> those of one sensor, as a case has one -> recordings (impulse_response.py), one common factor
     -> NAME-01.wav and so on, strike {place, direction, impulse}, sensor, onset, band
 
-What hangs on a force is played as struck with J N·s, J such that the loudest take peaks at PEAK: then files are in m/s
-or Pa. Responses at many points to one exciter are turned round: H_ij = H_ji of motion.     [Maxwell-Betti]
+Responses per force are written as struck with J N·s, J such that the loudest take peaks at PEAK: then files are in m/s
+or Pa. For responses at many points to one exciter, both ends are exchanged: H_ij = H_ji of motion.     [Maxwell-Betti]
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ PEAK = 0.5
 
 @dataclass(frozen=True, slots=True)
 class ResponseTakes:
-    """Takes made of UFF files: sounds and strikes (JSON) in order, rows by `RESPONSE_COLUMNS`, and what a case says of
-    all. warnings: one line each.
+    """Takes made of UFF files: sounds and strikes (JSON) in order, rows by `RESPONSE_COLUMNS`, and the case's fields.
+
+    warnings: one line each.
     """
 
     sounds: tuple[Path, ...]
@@ -57,12 +58,12 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
     Returns
     -------
     ResponseTakes
-        What was written, and what of it a case says.
+        The files written, and fields for a case.
 
     Raises
     ------
     FileError
-        A file that cannot be read or holds nothing that is understood.
+        A file cannot be read or holds nothing that is understood.
     """
     read = {file: read_uff(file) for file in files}
     warnings = [f"{file}: {note}" for file, one in read.items() for note in one.notes]
@@ -105,7 +106,7 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
 def with_responses(
     case: dict[str, Any], made: ResponseTakes, sensor_at: Point | None, sensor_direction: Point | None
 ) -> dict[str, Any]:
-    """The case with what its UFF files say; what options say of the sensor comes first."""
+    """Return the case with the fields of its UFF files; options of the sensor take precedence."""
     surface = made.response == "velocity"
     sensor = {
         "response": made.response,
@@ -120,9 +121,7 @@ def with_responses(
 
 
 def _of_one_sensor(responses: list[Response]) -> tuple[list[Response], bool]:
-    """The most responses of one kind that one sensor can have recorded, and whether exciter and sensor change places
-    for that.
-    """
+    """Find the largest group of responses that one sensor can have recorded, and whether its ends are exchanged."""
     groups: dict[tuple[Any, ...], list[Response]] = defaultdict(list)
     for response in responses:
         pressure = response.quantity == "pressure"
@@ -135,7 +134,7 @@ def _of_one_sensor(responses: list[Response]) -> tuple[list[Response], bool]:
 
 
 def _place(freedom: Freedom) -> str:
-    """A node with its direction and place, in words."""
+    """Format a node with its direction and position."""
     if not freedom.node:
         return "not said"
     axis = f" {'+-'[freedom.axis < 0]}{'XYZ'[abs(freedom.axis) - 1]}" if freedom.axis else ""
@@ -144,7 +143,7 @@ def _place(freedom: Freedom) -> str:
 
 
 def _done(response: Response, turned: bool) -> str:
-    """What was done with a response, in words."""
+    """Describe the conversion of a response."""
     change = {"acceleration": "integrated to velocity", "displacement": "derived to velocity"}
     parts = [change.get(response.quantity, ""), "exciter and sensor change places" * turned]
     return "; ".join(filter(None, parts))

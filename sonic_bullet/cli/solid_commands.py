@@ -1,4 +1,4 @@
-"""`modes` and `materials`: a mesh's elastic modes, and what bodies can be made of."""
+"""Commands `modes` and `materials`: a mesh's elastic modes, and the materials of the package."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ RECORDED_COLUMNS = (
     "licence",
     "what was struck",
 )
-"""Of the table of presets of recordings; takes fitted and held out are counts."""
+"""Columns of the table of recorded presets; takes fitted and held out are counts."""
 
 
 def run_modes(
@@ -52,7 +52,7 @@ def run_modes(
     uff_to: str | None,
     output: str | None,
 ) -> None:
-    """The `modes` command. Raises SonicBulletError."""
+    """Run `modes`; raises SonicBulletError."""
     if output is not None and not output.endswith(".npz"):
         raise FileError(f"cannot write {output}: modal models are npz files", "end the name with .npz")
     to, json_to, uff_to = places(output, json_to, uff_name(uff_to))
@@ -89,7 +89,7 @@ def run_modes(
 
 
 def _shapes(mesh: str, material: Material, model: ModalModel) -> ModalShapes:
-    """A model's modes at its vertices, at 1 kg."""
+    """Return a model's modes at its vertices, at a modal mass of 1 kg."""
     title = f"{Path(mesh).name}, {material.name}"
     return ModalShapes(model.vertex_m, model.shape, model.freq_hz, model.decay_per_s, 1.0, title)
 
@@ -97,9 +97,14 @@ def _shapes(mesh: str, material: Material, model: ModalModel) -> ModalShapes:
 def chosen_material(
     name: str | None, youngs_pa: float | None, poisson: float | None, density_kg_m3: float | None
 ) -> Material:
-    """The named material with the given constants in place of its own; without a name all three or none (then steel).
+    """Return the named material with the given constants in place of its own; without a name all three or none (steel).
 
-    A material of bare constants has no damping. Raises MaterialError.
+    A material of bare constants has no damping.
+
+    Raises
+    ------
+    MaterialError
+        The name is unknown, or constants are missing or unphysical.
     """
     from sonic_bullet.presets import load_material
 
@@ -123,7 +128,7 @@ def chosen_material(
 
 
 def run_materials(json_to: str | None) -> None:
-    """The `materials` command. Raises FileError."""
+    """Run `materials`; raises FileError."""
     from sonic_bullet.presets import load_material, named_preset, recorded_names, table_names
 
     found = [load_material(name) for name in table_names()]
@@ -157,7 +162,7 @@ def run_materials(json_to: str | None) -> None:
 
 
 def _recorded_row(preset: Preset) -> tuple[str, ...]:
-    """What the table of recorded presets says of one."""
+    """Return the table row of a recorded preset."""
     from sonic_bullet.effects.recorded_lines import RecordedLines
 
     origin = preset.provenance.origin if preset.provenance is not None else None
@@ -179,7 +184,7 @@ def _recorded_row(preset: Preset) -> tuple[str, ...]:
 
 
 def _described_origin(preset: Preset) -> dict[str, Any]:
-    """What a recorded preset was made of, for JSON: the fields of its origin."""
+    """Convert the origin of a recorded preset to JSON values."""
     import msgspec
 
     origin = preset.provenance.origin if preset.provenance is not None else None

@@ -1,8 +1,8 @@
-"""How loud a file is to be, how far it rings on, and what is said of it: the options of `render`, `film` and `score`.
+"""Level, fades and final decay of a file, and the messages about them: options of `render`, `film` and `score`.
 
 --fade -> --peak-dbfs | --lufs | --pascals, else a peak of -1 dBFS -> one gain, of mix and stems; a limiter, too, where
-loudness and true peak conflict -> the file, which says its scale; with --scale-json a JSON beside it
--> its loudness on stdout -> "0 dBFS = 63 Pa (peak 129 dB SPL)" and what a limiter takes off on stderr
+loudness and true peak conflict -> the file, which states its scale; with --scale-json also a JSON file
+-> its loudness on stdout -> "0 dBFS = 63 Pa (peak 129 dB SPL)" and the limiter's reduction on stderr
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files.rows.spool import KeptSound
 
 DEFAULT_PEAK_DBFS = -1.0
-"""Below full scale by what rebuilt waveforms of converters and lossy codecs overshoot [EBU R 128, sec. h]."""
+"""Peak level that leaves room for overshoots of converters and lossy codecs [EBU R 128, sec. h]."""
 TAIL_DB = -60.0
 OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json", "fade_s")
 
@@ -35,7 +35,7 @@ class Fade(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
     name = "[IN,]OUT"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
-        """Both durations; click's usage error where they are none."""
+        """Return both durations; click's usage error where they are not valid."""
         if isinstance(value, tuple):
             return value
         try:
@@ -48,7 +48,7 @@ class Fade(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 
 
 def level_options(command: Any) -> Any:
-    """The options of `LevelWish`."""
+    """Add the options of `LevelWish`."""
     for option in reversed(
         (
             click.option(
@@ -81,7 +81,7 @@ def level_options(command: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class LevelWish:
-    """What is asked for. tail_db: 0 none."""
+    """Options of the level. tail_db: 0 none."""
 
     peak_dbfs: float | None = None
     lufs: float | None = None
@@ -91,7 +91,7 @@ class LevelWish:
     fade_s: tuple[float, float] | None = None
 
     def check(self) -> None:
-        """Raise AudioError where it cannot be: before anything is rendered."""
+        """Raise AudioError where options are not valid, before anything is rendered."""
         from sonic_bullet.files import check_levels
         from sonic_bullet.render.ringing_on import as_tail_db
 
@@ -101,11 +101,11 @@ class LevelWish:
         as_tail_db(self.tail_db, "--tail")
 
     def json_path(self, output: str) -> str | None:
-        """Where the JSON goes, if it is asked for."""
+        """Return the path of the JSON, if it is asked for."""
         return f"{output}.json" if self.scale_json else None
 
     def faded(self, sound: KeptSound, sr: int) -> KeptSound:
-        """The sound with its fades. Raises AudioError where it is shorter than they are."""
+        """Return the sound with its fades; AudioError where it is shorter than they are."""
         from sonic_bullet.files.loudness.gain_curve import GainCurve
 
         if self.fade_s is None:
@@ -117,8 +117,9 @@ class LevelWish:
         return sound.shaped(GainCurve(sound.shape[1], fade_in, fade_out))
 
     def found(self, sound: KeptSound, sr: int, log: ContactLog, path: str) -> FileLevel:
-        """The level that `write_audio` and `make_film` take. What is silent is not scaled unless it is asked for, nor
-        what goes into a file that cannot say its scale (W64). Raises AudioError.
+        """Find the level for `write_audio` and `make_film`; raises AudioError.
+
+        By default silent sound is not scaled, nor sound for a file that cannot state its scale (W64).
         """
         from sonic_bullet.files.levels import find_level
         from sonic_bullet.render.silence import is_silent
@@ -130,8 +131,9 @@ class LevelWish:
         return find_level(self.faded(sound, sr), sr, peak_dbfs, self.lufs, 1.0)
 
     def say(self, path: str, level: FileLevel, peak: float, log: ContactLog, clipped: int = 0) -> dict[str, Any]:
-        """Say on stderr what full scale is, how loud the peak, and what a limiter takes off; write it beside the file
-        where that is asked for; the same as JSON. clipped: samples that the file could not hold.
+        """Print full scale, peak and limiter reduction on stderr; write them as JSON where asked for, and return them.
+
+        clipped: samples that the file could not hold.
         """
         from sonic_bullet.cli.output import write_json
         from sonic_bullet.plots.scene_plot import quantity
@@ -152,7 +154,7 @@ class LevelWish:
 
 
 def limited(level: FileLevel | AudioReport) -> str:
-    """What a limiter does to a sound."""
+    """Describe the reduction by a limiter."""
     return (
         f"loudness and true peak conflict: a limiter takes off up to {level.limited_db:.1f} dB, in all for "
         f"{level.limited_s:.3f} s; a lower --lufs needs less"
@@ -160,7 +162,7 @@ def limited(level: FileLevel | AudioReport) -> str:
 
 
 def level_warnings(report: AudioReport) -> tuple[str, ...]:
-    """What a user should know of samples beyond full scale."""
+    """Warn of samples beyond full scale."""
     if report.clipped:
         return (
             f"{format_count(report.clipped, 'sample was', 'samples were')} clipped at full scale: "

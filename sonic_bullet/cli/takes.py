@@ -1,4 +1,4 @@
-"""A recording of several strikes cut into takes of one each.
+"""Cut a recording of several strikes into takes of one each.
 
 recording (channels, n) -> strikes of its loudest channel (onset.py) -> from LEAD_S before each to LEAD_S before
 the next -> a file each
@@ -18,7 +18,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 
 LEAD_S = 0.05
-"""Of what precedes a strike, which tells the noise; less where the strike before it is nearer."""
+"""Sound kept before a strike, for the noise level; less where the previous strike is nearer."""
 TAKE_COLUMNS = ("take", "at", "length", "peak", "")
 
 
@@ -34,7 +34,7 @@ def cut_takes(
     to : Path
         Folder for the takes, `NAME-01.wav` and so on, every channel of them.
     force_channel : int, optional
-        Not listened to.
+        Not used to find strikes.
     picture : Path, optional
         .png, .pdf or .svg to draw the recordings to, with where they are cut.
 
@@ -48,7 +48,7 @@ def cut_takes(
     Raises
     ------
     AudioError
-        A recording that is silent, too short, not finite, or without a hit.
+        A recording is silent, too short, not finite, or without a hit.
     """
     made: list[Path] = []
     rows: list[tuple[str, ...]] = []
@@ -80,7 +80,7 @@ def cut_takes(
 
 
 def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
-    """Samples of each strike of a recording (n,), and of the start and the end of its take."""
+    """Return the samples of each strike of a recording (n,), and of the start and the end of its take."""
     from sonic_bullet.estimator.lines.onset import span
 
     found = span(signal, sr)
@@ -93,7 +93,7 @@ def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
 
 
 def _level(signal: Array) -> tuple[str, str]:
-    """The peak of a take in dB of full scale, and whether it is clipped."""
+    """Return the peak of a take in dB of full scale, and a note where it is clipped."""
     from sonic_bullet.estimator.lines.onset import clipped_samples
 
     clipped = clipped_samples(signal)

@@ -1,1 +1,1 @@
-"""Commands that run or replay a scene: `render`, `play`, `doctor`, and what `film` shares with them."""
+"""Commands that run or replay a scene: `render`, `play`, `doctor`, and code that `film` shares with them."""

@@ -1,4 +1,4 @@
-"""`play`: a scene or a contact log, out loud while it is made, paced by the card."""
+"""Command `play`: a scene or a contact log on a sound card while it runs, paced by the card."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
 
 
 class _Show:
-    """A playback, and the line on a terminal that says how far it is and how it goes."""
+    """A playback, and the line on a terminal that shows its progress."""
 
     def __init__(self, card: dict[str, Any], progress: Callable[[float], None], tell: Callable[[str], None]) -> None:
         self.card, self.tell, self._progress, self._drawn_s = card, tell, progress, 0.0
@@ -90,7 +90,7 @@ class _Show:
         return self.playback.report
 
     def __call__(self, share: float) -> None:
-        """A share is done. Drawn seldom, for that takes time from the physics. Raises why the card is gone."""
+        """Show the fraction done, seldom, as that takes time from the physics; raise the failure of the card."""
         if self.playback is not None and self.playback.failure is not None:
             failure = self.playback.failure
             raise AudioError(failure.what, f"{failure.remedy}; {self.report}")

@@ -1,4 +1,4 @@
-"""`render`: a scene or a contact log to a sound file."""
+"""Command `render`: a scene or a contact log to a sound file."""
 
 from __future__ import annotations
 

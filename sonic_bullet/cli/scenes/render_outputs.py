@@ -1,4 +1,4 @@
-"""What `render` writes of a result: log, sound, stems, session, picture, each whole or not at all.
+"""Outputs of `render`: log, sound, stems, session, picture, each written whole or not at all.
 
 result -> log -> stems and events, made -> level -> sound -> stems, film, session -> picture -> words, JSON
 """
@@ -31,8 +31,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RenderOutputs:
-    """Where it goes. output: the sound's name as the user gave it, to: its absolute path; others: absolute, None: not
-    asked for.
+    """Paths and options of the outputs.
+
+    Parameters
+    ----------
+    output, to
+        The sound's name as the user gave it, and its absolute path.
+    contacts, picture, events_to
+        Absolute; None: not asked for.
     """
 
     scene: str
@@ -49,7 +55,10 @@ class RenderOutputs:
     def write(
         self, result: RenderResult | Replay, standing: list[Standing], say: Callable[[str], None]
     ) -> dict[str, Any]:
-        """All of it; the same as JSON. standing: shapes of silent partners, for a film. Raises SonicBulletError."""
+        """Write all outputs; return them as JSON values; raises SonicBulletError.
+
+        standing: shapes of silent partners, for a film.
+        """
         made = self._made(result)
         found = find_level_of(result, self.level, self.to)
         report = replace(_written(self.to, result, found, made), path=self.output)
@@ -77,7 +86,7 @@ class RenderOutputs:
         return described | {"scale": scale, "loudness": asdict(loudness)} | (made.described if made else {}) | edited
 
     def _made(self, result: RenderResult | Replay) -> Soundtrack | None:
-        """Log written, stems and events made. Where that fails, the sound is kept beside its place."""
+        """Write the log, make stems and events; where that fails, keep the sound as a partial file."""
         try:
             if self.contacts is not None:
                 write_log(self.contacts, result.log, self.models or "included")
@@ -96,7 +105,7 @@ class RenderOutputs:
         report: AudioReport,
         standing: list[Standing],
     ) -> dict[str, Any]:
-        """The session, where one is asked for."""
+        """Write the session, where one is asked for."""
         if self.session.folder is None:
             return {}
         if Path(self.to) != Path(self.session.mix):
@@ -108,7 +117,7 @@ class RenderOutputs:
 
 
 def find_level_of(result: RenderResult | Replay, level: LevelWish, output: str) -> FileLevel:
-    """The level of the sound. Where silence keeps it from having one, the error says why it is silent."""
+    """Find the level of the sound; where silence prevents that, the error explains the silence."""
     from sonic_bullet.render import why_silent
 
     try:
@@ -119,7 +128,7 @@ def find_level_of(result: RenderResult | Replay, level: LevelWish, output: str) 
 
 
 def _written(output: str, result: RenderResult | Replay, level: FileLevel, made: Soundtrack | None) -> AudioReport:
-    """The sound as a file."""
+    """Write the sound."""
     cues: dict[str, Any] = {} if made is None else made.cues_for(result.sound.shape[1])
     return write_at_level(output, result.sound, result.sr, level, **cues)
 
@@ -127,9 +136,7 @@ def _written(output: str, result: RenderResult | Replay, level: FileLevel, made:
 def with_partial(
     error: SonicBulletError | KeyboardInterrupt, to: str, output: str, level: LevelWish
 ) -> SonicBulletError | KeyboardInterrupt:
-    """The error, its text naming NAME.partial.EXT as the user would, where what was rendered before it is written as a
-    valid file beside ``to``.
-    """
+    """Write the sound so far as a valid file NAME.partial.EXT; return the error with its name as the user gave it."""
     result: RenderResult | Replay | None = getattr(error, "partial", None)
     note_closing()
     said = ""
@@ -170,7 +177,7 @@ def _oversized(log: ContactLog) -> tuple[str, ...]:
 
 
 def summary(report: AudioReport, log: ContactLog) -> str:
-    """What was written, in one line."""
+    """Describe the file written in one line."""
     from sonic_bullet.plots.scene_plot import quantity
 
     channels = format_count(report.channels, "channel")

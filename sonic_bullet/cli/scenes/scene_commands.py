@@ -1,4 +1,4 @@
-"""`render` and `doctor`: check every output's place first, run, then write (render_outputs.py)."""
+"""Commands `render` and `doctor`: check every output's place first, run, then write (render_outputs.py)."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ def run_render(
     supports: bool | None,
     **others: Any,
 ) -> None:
-    """The `render` command. others: options of `LevelWish`, `SoundtrackWish` and `SessionWish`.
+    """Run `render`. others: options of `LevelWish`, `SoundtrackWish` and `SessionWish`.
 
-    Raises SonicBulletError, and KeyboardInterrupt whose text names the file with what was rendered so far.
+    Raises SonicBulletError, and KeyboardInterrupt whose text names the file with the sound so far.
     """
     rate = None if sr is None else check_sr(sr)
     level = LevelWish(**{name: others.pop(name) for name in OPTIONS})
@@ -108,7 +108,7 @@ def run_render(
 
 
 def _log_of(scene: str, wish: Wish) -> tuple[ContactLog, tuple[str, ...]]:
-    """The log of a scene that is run, or one that is there, as it is to be rendered; what a user should read of it."""
+    """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
     if is_log(scene):
         log, _, said = prepared(scene, wish)
         return log, said
@@ -125,7 +125,7 @@ def _check_takes_alone(outputs_given: dict[str, Any], others: dict[str, Any], se
 
 
 def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
-    """The `doctor` command. Raises SonicBulletError."""
+    """Run `doctor`; raises SonicBulletError."""
     (json_to,) = places(json_to)
     if is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
@@ -150,7 +150,7 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
 
 
 def check_request(scene: str, seconds: float | None, level: LevelWish) -> None:
-    """Raise what is wrong with what is asked of a scene or log, before anything runs."""
+    """Raise an error for wrong options of a scene or log, before anything runs."""
     if seconds is not None and not 0 < seconds < 1e6:
         raise AudioError(f"{seconds} seconds cannot be rendered", "give --seconds above 0")
     level.check()
@@ -158,10 +158,7 @@ def check_request(scene: str, seconds: float | None, level: LevelWish) -> None:
 
 
 def _check_places(output: str, *others: str | None) -> tuple[str, str | None, str | None, str | None, str | None]:
-    """Where all outputs go, absolute: each can be written, and no two are one file, before anything is simulated.
-
-    Raises FileError.
-    """
+    """Return the absolute paths of all outputs; FileError where one cannot be written or two are one file."""
     check_audio_output(output)
     contacts, picture, *_ = others
     if contacts is not None and not contacts.endswith(".npz"):

@@ -1,4 +1,4 @@
-"""What a command asks of a scene or a contact log, and the run or replay of it, for `render`, `film` and `play`."""
+"""Options of a scene or a contact log, and its run or replay, for `render`, `film` and `play`."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ class WantedMaterials:
 
     @classmethod
     def read(cls, material: tuple[str, ...], silent: tuple[str, ...]) -> WantedMaterials:
-        """Those of what was given as M or NAME=M; a file whose name holds an "=" is no NAME. Every M is read once, so
-        that a wrong one is said before anything runs. Raises MaterialError, FileError.
+        """Read M or NAME=M; a file whose name holds an "=" is not split.
+
+        Every M is read once, to report a wrong one before anything runs. Raises MaterialError, FileError.
         """
         from sonic_bullet.presets import load_material
 
@@ -53,11 +54,11 @@ class WantedMaterials:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Those of `render_scene` and `run_scene`."""
+        """Options of `render_scene` and `run_scene`."""
         return {"material": self.everyone, "materials": self.named, "silent": self.silent}
 
     def choice(self) -> MaterialChoice:
-        """The same, read."""
+        """Read the presets and return the choice."""
         from sonic_bullet.session.material_choice import as_choice
 
         return as_choice(self.everyone, self.named, self.silent)
@@ -65,7 +66,7 @@ class WantedMaterials:
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What the user asked of a render; None and empty: as the scene or the log has it."""
+    """Options of a render; None and empty: as the scene or the log has them."""
 
     seconds: float | None
     rate: int | None
@@ -81,7 +82,7 @@ class Wish:
 
 
 def is_log(scene: str) -> bool:
-    """Whether a scene is a contact log, by its name."""
+    """Tell by its name whether a scene is a contact log."""
     return Path(scene).suffix.lower() == ".npz"
 
 
@@ -96,7 +97,7 @@ def check_scene_file(scene: str, verb: str) -> None:
 
 
 def standing_collector(standing: list[Standing]) -> Callable[[Listener], None]:
-    """A function that, at a scene's end, puts the shapes of its silent partners into a list, for a film."""
+    """Return a function that, at a scene's end, lists the shapes of its silent partners, for a film."""
 
     def at_end(listener: Listener) -> None:
         from sonic_bullet.listener import PyBulletWorld
@@ -109,7 +110,7 @@ def standing_collector(standing: list[Standing]) -> Callable[[Listener], None]:
 
 
 def simulated(scene: str, wish: Wish) -> RenderResult:
-    """A scene, run."""
+    """Run a scene."""
     with quiet_stderr():
         from sonic_bullet.scene import render_scene
 
@@ -129,7 +130,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """A `RenderResult` of a log; that class lives beside PyBullet, which a replay does without."""
+    """A `RenderResult` of a log; that class needs PyBullet, a replay does not."""
 
     sound: KeptSound
     log: ContactLog
@@ -138,13 +139,13 @@ class Replay:
 
 
 def replayed(path: str, wish: Wish) -> Replay:
-    """A log's sound: bit for bit the render it came from, where no option changes it."""
+    """Render a log: bit for bit the render it came from, where no option changes it."""
     log, _, said = prepared(path, wish)
     return rendered(log, wish, said)
 
 
 def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
-    """A log as it is to be rendered, the wish, and what a user should read of it."""
+    """Return a log as it is to be rendered, the wish, and notes for the user."""
     import numpy as np
 
     from sonic_bullet.files import read_log
@@ -171,7 +172,7 @@ def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
 
 
 def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
-    """The sound of a log as it is."""
+    """Render a log as it is."""
     from sonic_bullet.render import render_kept, render_notes
 
     rate = wish.rate or log.sr

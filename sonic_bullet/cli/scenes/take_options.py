@@ -1,4 +1,4 @@
-"""`render --takes N`: what a log leaves open, drawn anew; and what of it is set by hand.
+"""Options of `render --takes N`: what a log does not determine, drawn anew; and values set by hand.
 
 TakesWish (options) -> checked -> log with --roughness and --gain -> take 1 … N (session/variation.py)
     -> NAME-01.wav … and a page of players
@@ -26,7 +26,7 @@ OPTIONS = ("takes", "take", "vary", "footprint_mm", "roughness", "gain", "page")
 
 
 def take_options(command: Any) -> Any:
-    """The options of `TakesWish`."""
+    """Add the options of `TakesWish`."""
     for option in reversed(
         (
             click.option(
@@ -69,7 +69,7 @@ def take_options(command: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class TakesWish:
-    """What is asked for. roughness_m: by names, "" all others."""
+    """Options of takes. roughness_m: by names, "" all others."""
 
     takes: int | None = None
     take: int | None = None
@@ -90,7 +90,7 @@ class TakesWish:
         gain: tuple[str, ...],
         page: str | None,
     ) -> TakesWish:
-        """Those of the options. Raises FileError where they contradict each other."""
+        """Read the options; FileError where they contradict each other."""
         if takes is None and take is None:
             for option, given in (("--vary", vary), ("--footprint", footprint_mm)):
                 if given is not None:
@@ -116,24 +116,25 @@ class TakesWish:
         )
 
     def __bool__(self) -> bool:
+        """Tell whether any is given."""
         return bool(self.takes or self.take or self.roughness_m or self.gain_db)
 
     @property
     def variation(self) -> Variation:
-        """As `make_take` has it."""
+        """Variation for `make_take`."""
         from sonic_bullet.session.variation import Variation
 
         return Variation(self.varied, self.footprint_m)
 
     def applied(self, log: ContactLog, where: str) -> ContactLog:
-        """The log with roughness and gains set. Raises SceneError."""
+        """Return the log with roughness and gains set; raises SceneError."""
         from sonic_bullet.session.variation import with_gains, with_roughness
 
         log = with_roughness(log, self.roughness_m, where) if self.roughness_m else log
         return with_gains(log, self.gain_db, where) if self.gain_db else log
 
     def changed(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
-        """The log as it is rendered where one sound is asked for, and what a user should read of it."""
+        """Return the log to be rendered as one sound, and notes for the user."""
         from sonic_bullet.session.variation import AS_SIMULATED, make_take
 
         log = self.applied(log, where)
@@ -143,14 +144,14 @@ class TakesWish:
         return take.log, (f"take {self.take}: {describe_draws(take) or 'the log itself'}; {AS_SIMULATED}",)
 
     def outputs(self, output: str) -> list[str]:
-        """The names of all takes."""
+        """Return the names of all takes."""
         count, name = self.takes or 1, Path(output)
         digits = max(2, len(str(count)))
         return [str(name.with_name(f"{name.stem}-{k:0{digits}d}{name.suffix}")) for k in range(1, count + 1)]
 
 
 def describe_draws(take: LogTake) -> str:
-    """The factors of a take's materials, in one line; empty where none was drawn."""
+    """Format the factors of a take's materials in one line; empty where none was drawn."""
     words = {"youngs_pa": "E", "density_kg_m3": "ρ", "loss_factor": "η", "roughness_m": "roughness"}
     return "; ".join(
         f"{name} " + ", ".join(f"{words.get(key, key)} × {factor:.3g}" for key, factor in factors.items())
@@ -161,8 +162,9 @@ def describe_draws(take: LogTake) -> str:
 def read_numbers(
     given: Collection[str], option: str, *, least: float, most: float, all_bodies: bool
 ) -> dict[str, float]:
-    """Numbers by body of NAME=X, and under "" of a plain X where that is of all. Raises FileError for what is none, or
-    is given twice.
+    """Return numbers by body of NAME=X, and under "" of a plain X for all bodies.
+
+    Raises FileError where one is not valid, or given twice.
     """
     found: dict[str, float] = {}
     for text in given:

@@ -1,6 +1,6 @@
-"""`render --takes N`: each take rendered, brought to its level and written, one after another; then the page.
+"""Outputs of `render --takes N`: each take rendered, levelled and written, one after another; then the page.
 
-Each is whole or not there: what ends the run leaves those before it.
+Each is whole or absent: an error or interrupt leaves those before it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ def write_takes(
     wish: Wish,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
-    """All takes of a log; the same as JSON. places: of each the name as the user gave it and the absolute path; page:
-    absolute. Raises SonicBulletError, KeyboardInterrupt.
+    """Write all takes of a log; return them as JSON values; raises SonicBulletError, KeyboardInterrupt.
+
+    places: name of each as the user gave it, and its absolute path; page: absolute.
     """
     from sonic_bullet.report.takes_page import take_entry, write_page
 

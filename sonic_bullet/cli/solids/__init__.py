@@ -1,1 +1,1 @@
-"""Commands on solids that are no scenes."""
+"""Commands on solids that are not scenes."""

@@ -1,4 +1,4 @@
-"""`bake`: a mesh, or the bodies of a scene or log, as a file that other engines play."""
+"""Command `bake`: a mesh, or the bodies of a scene or log, as a file that other engines play."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `bake` does: places first, then modes, then the file, whole or not at all."""
+"""Run `bake`: check places, compute modes, write the file, whole or not at all."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 MESH_MATERIAL = "steel"
 PROGRAMS, FEW_POINTS = (".dsp", ".h"), 64
-"""Points of programs, whose tables a compiler reads, unless others are asked for."""
+"""Default number of points of programs, whose tables a compiler reads."""
 SCENE_S = 0.1
-"""How long a scene runs until its bodies are known."""
+"""Length of the run that finds a scene's bodies."""
 STRIKE_RATE_HZ, LONGEST_STRIKE_S, STRIKE_FALL = 48_000, 10.0, 6.9
-"""Of a .wav: e^-6.9 is -60 dB."""
+"""Values of a .wav: e^-6.9 is -60 dB."""
 
 
 @dataclass(frozen=True, slots=True)
 class _StrikeWish:
-    """What was asked of a strike; None: by default."""
+    """Options of a strike; None: default."""
 
     strike: tuple[float, ...] | None
     direction: tuple[float, ...] | None
@@ -44,7 +44,7 @@ class _StrikeWish:
             raise FileError(f"--{option} is of a strike, and {end} holds none", "end the name with .wav")
 
     def write(self, path: str, model: BakedModel) -> str:
-        """Write the strike; what to say of it."""
+        """Write the strike; return its description."""
         import numpy as np
 
         from sonic_bullet.bake import choose_strike, render_strike
@@ -82,7 +82,7 @@ def run_bake(
     json_to: str | None,
     **strike: Any,
 ) -> None:
-    """The `bake` command. Raises SonicBulletError."""
+    """Run `bake`; raises SonicBulletError."""
     from sonic_bullet.bake.formats import ONE, check_baked_name
 
     end = check_baked_name(output)
@@ -143,7 +143,7 @@ def _mesh_model(
 def _scene_models(
     source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool
 ) -> list[BakedModel]:
-    """The bodies of a scene or log that ring, each once. one: whether the format holds no more."""
+    """Return the models of a scene's or log's bodies with modes, each once. one: the format holds a single body."""
     from sonic_bullet.bake import bake_body
 
     materials = WantedMaterials.read(material, ())
@@ -182,7 +182,7 @@ def _scene_models(
 def _log_of_scene(
     source: str, materials: WantedMaterials, progress: Callable[[float], None], say: Callable[[str], None]
 ) -> ContactLog:
-    """The first moments of a scene, which makes no sound."""
+    """Run the first moments of a scene, without sound."""
     with quiet_stderr():
         from sonic_bullet.scene import render_scene
 
@@ -191,7 +191,7 @@ def _log_of_scene(
 
 
 def _line(model: BakedModel) -> str:
-    """What a user is to know of a model, in a line."""
+    """Describe a model in a line."""
     low, high = model.freq_hz.min(), model.freq_hz.max()
     weight = "" if model.mass is None else f", {model.mass.mass_kg:.4g} kg"
     return (

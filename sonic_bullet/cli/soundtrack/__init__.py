@@ -1,1 +1,1 @@
-"""Films, scores, stems: one command a file, and what `render` writes besides the mix."""
+"""Films, scores, stems: one command a file, and outputs of `render` besides the mix."""

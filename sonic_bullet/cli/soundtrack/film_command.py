@@ -1,4 +1,4 @@
-"""`film`: a scene or a contact log as pictures with their sound."""
+"""Command `film`: a scene or a contact log as pictures with sound."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
     name = "WxH"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        """The two numbers; click's usage error where there are none."""
+        """Return the two numbers; click's usage error where they are not valid."""
         if isinstance(value, tuple):
             return value
         width, x, height = str(value).lower().partition("x")

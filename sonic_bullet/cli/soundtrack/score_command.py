@@ -1,4 +1,4 @@
-"""`score`: the sound of a baked animation."""
+"""Command `score`: the sound of a baked animation."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ materials and an export script for Blender."""
 @click.option("--seed", type=click.IntRange(0), default=0, help="Seed of the surfaces' roughness. [default: 0]")
 @json_option
 def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
-    """Give a baked animation (.glb .gltf .json .npz) its sound, or a scene that of bodies that it moves by hand."""
+    """Render a baked animation's sound (.glb .gltf .json .npz), or that of a scene's bodies that are moved by hand."""
     from sonic_bullet.cli.output import described_render
     from sonic_bullet.cli.scenes.render_outputs import summary, with_partial
     from sonic_bullet.files import check_audio_output, check_sr, write_at_level, write_log

@@ -1,4 +1,4 @@
-"""`render --session DIR`: a folder that an editor opens.
+"""Output of `render --session DIR`: a folder that an editor opens.
 
 SessionWish (options) -> checked -> mix, stems (soundtrack_outputs) and film in DIR -> Timeline
     -> session.otio, session.rpp
@@ -33,7 +33,7 @@ OPTIONS = ("folder", "film_fps", "film_size")
 
 
 def session_options(command: Any) -> Any:
-    """The options of `SessionWish`."""
+    """Add the options of `SessionWish`."""
     for option in reversed(
         (
             click.option(
@@ -59,14 +59,14 @@ def session_options(command: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class SessionWish:
-    """What is asked for."""
+    """Options of a session."""
 
     folder: str | None = None
     film_fps: str | None = None
     film_size: tuple[int, int] | None = None
 
     def checked(self, stems: str | None) -> SessionWish:
-        """The same with its folder absolute, tried and there. Raises FileError."""
+        """Return the same with its folder absolute, tried and made; raises FileError."""
         if self.folder is None:
             if self.film_fps is not None or self.film_size is not None:
                 raise FileError("--film and --film-size are of a session", "give --session DIR too, or use film")
@@ -89,7 +89,7 @@ class SessionWish:
 
     @property
     def mix(self) -> str:
-        """Where the session's mix goes."""
+        """Path of the session's mix."""
         from sonic_bullet.soundtrack.editing.timeline import MIX
 
         return str(Path(self.folder or "") / MIX)
@@ -103,8 +103,9 @@ class SessionWish:
         standing: list[Standing],
         progress: Callable[[float], None],
     ) -> tuple[str, dict[str, Any]]:
-        """Film and projects, once mix and stems are there; what to say of it, and as JSON. Raises FileError,
-        AudioError.
+        """Write film and projects after mix and stems; return a description and JSON values.
+
+        Raises FileError, AudioError.
         """
         from sonic_bullet.files import replacing
         from sonic_bullet.soundtrack.editing.otio_timeline import is_installed, otio_timeline

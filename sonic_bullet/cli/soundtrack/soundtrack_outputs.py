@@ -1,4 +1,4 @@
-"""What `render` writes besides the mix: stems, events, cue points.
+"""Outputs of `render` besides the mix: stems, events, cue points.
 
 SoundtrackWish (options) -> checked -> made (one more run of the log, body by body) -> Soundtrack -> written
 """
@@ -32,7 +32,7 @@ LATEST_S = 1e9
 
 
 def soundtrack_options(command: Any) -> Any:
-    """The options of `SoundtrackWish`."""
+    """Add the options of `SoundtrackWish`."""
     for option in reversed(
         (
             click.option("--stems", metavar="DIR", help="Also write a sound a body, which add up to the mix."),
@@ -64,7 +64,7 @@ def soundtrack_options(command: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class SoundtrackWish:
-    """What is asked for."""
+    """Options of stems, events and cues."""
 
     stems: str | None = None
     stem_peak_dbfs: float | None = None
@@ -74,7 +74,7 @@ class SoundtrackWish:
     time_reference_s: float | None = None
 
     def checked(self, output: str) -> SoundtrackWish:
-        """The same with the stems' folder absolute and tried. Raises FileError."""
+        """Return the same with the stems' folder absolute and tried; raises FileError."""
         if self.events is not None and Path(self.events).suffix.lower() not in (".json", ".csv"):
             raise FileError(f"cannot write {self.events}: events are JSON or CSV", "end the name with .json or .csv")
         if self.cues and Path(output).suffix.lower() not in WITH_CUES:
@@ -107,8 +107,9 @@ class SoundtrackWish:
         *,
         drawn: bool = False,
     ) -> Soundtrack | None:
-        """Stems and events of a render, as long as it is; None where nothing is asked for. drawn: events are wanted for
-        a picture. Raises SonicBulletError.
+        """Make stems and events of a render; None where nothing is asked for; raises SonicBulletError.
+
+        drawn: events are needed for a picture.
         """
         wanted = self.events is not None or self.cues or drawn
         if self.stems is None and not wanted:
@@ -127,7 +128,7 @@ class SoundtrackWish:
 
 @dataclass(slots=True)
 class Soundtrack:
-    """What was made; `write` puts it where it is to go, and then `words` and `described` say so."""
+    """Stems and events; `write` writes them, and fills `words` and `described`."""
 
     wish: SoundtrackWish
     log: ContactLog
@@ -140,12 +141,12 @@ class Soundtrack:
 
     @property
     def time_reference(self) -> int:
-        """In samples."""
+        """Time reference in samples."""
         begins_s = self.wish.time_reference_s
         return 0 if begins_s is None else round(begins_s * self.sr)
 
     def cues_for(self, frames: int, body: int | None = None) -> dict[str, Any]:
-        """Keywords of `write_audio` for a file of so many frames."""
+        """Return keywords of `write_audio` for a file of so many frames."""
         if not self.wish.cues:
             return {}
         from sonic_bullet.soundtrack.sound_events import cues_of
@@ -156,8 +157,9 @@ class Soundtrack:
         }
 
     def write(self, mix: AudioReport, fades: GainCurve | None, level: FileLevel) -> None:
-        """Events and stems, faded as the mix; limited as it, too, but for those of a level of their own. Raises
-        FileError, AudioError.
+        """Write events and stems; raises FileError, AudioError.
+
+        Stems have the fades of the mix, and its limiter, except those with a level of their own.
         """
         from sonic_bullet.soundtrack.event_tables import write_events
         from sonic_bullet.soundtrack.stems import write_stems
