@@ -1,10 +1,10 @@
-"""sonic_bullet: PyBullet scenes that sound, from physics alone.
+"""PyBullet scenes that sound, from physics alone.
 
     import sonic_bullet as sb
     listener = sb.attach(client)
     listener.add(body, material="porcelain")
 
-Heavy rooms are imported when first used.
+Packages are imported when first used.
 """
 
 from __future__ import annotations
@@ -85,4 +85,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
+    """List the public names."""
     return sorted(_HOME)

@@ -1,4 +1,4 @@
-"""``python -m sonic_bullet``: the command line."""
+"""The command line by ``python -m sonic_bullet``."""
 
 from sonic_bullet.cli import main
 

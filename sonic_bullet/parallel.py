@@ -1,12 +1,13 @@
-"""Work on several things at once: a second process takes every next one from the same list.
+"""Process a list of items in two processes, each of which takes the next item.
 
-    items -> [do(item), …] in their order, whoever did them
+    items -> [do(item), …] in their order, whichever process did them
 
-A fork, so that nothing has to be handed over but results; what the other process could not do or send is done here, and
-raises here. Where processes do not fork (Windows; macOS, whose libraries forbid it) or there is one core, all is done
-here. Work inside work stays where it is: here by _INSIDE, there because the helper is a daemon, which may have no
-children. Linear algebra has one thread in each: its own, waiting for each other on small matrices, had made two
-processes slower than one, and sums come in another order with every number of threads.
+The second process is a fork, so that only results are transferred. Items that it could not process or send are
+processed here, where their errors are raised. Where processes do not fork (Windows; macOS, whose libraries forbid it)
+or there is one core, all items are processed here. Nested calls do not fork: in this process by _INSIDE, in the other
+because it is a daemon, which may have no children. Linear algebra has one thread in each process: its own threads,
+waiting for each other on small matrices, made two processes slower than one, and the order of sums depends on the
+number of threads.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 ROOM_BYTES = 1 << 20
-"""Results that wait to be fetched: what Linux allows everybody."""
+"""Size of the pipe for results: what Linux allows every user."""
 HELD, AHEAD = 2, 4
-"""Arrays that the other process is asked for at once, and how far ahead of the one that is waited for this one works.
+"""Arrays requested of the other process at once, and how far this process works ahead of the one it waits for.
 """
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
 _OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
@@ -40,8 +41,10 @@ _OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Linear algebra on one thread while this lasts: as fast on matrices of hundreds, and the same bits on every
-    machine's number of cores and with every setting of its threads. Whatever turns recordings into numbers begins so.
+    """Run linear algebra on one thread within the block.
+
+    That is as fast on matrices of hundreds, and gives the same bits for every number of cores and every setting of
+    threads. All that converts recordings to numbers runs in such a block.
     """
     import scipy.linalg  # noqa: F401  its library has threads apart from numpy's, and must be there to be told
     from threadpoolctl import threadpool_limits
@@ -51,8 +54,9 @@ def one_thread() -> Iterator[None]:
 
 
 def said_here(say: Callable[[str], None]) -> Callable[[str], None]:
-    """``say`` for what runs in a `parallel_map`: what the other process says is said by this one, when it next listens.
-    A caller's function is then called where the caller is.
+    """Return ``say`` for code that runs in a `parallel_map`: messages of the other process are passed to this one.
+
+    A caller's function is thus called in the caller's process.
     """
     if isinstance(say, PipeSay):  # its pipe is every process's
         return say
@@ -71,10 +75,10 @@ def said_here(say: Callable[[str], None]) -> Callable[[str], None]:
 def parallel_map(
     do: Callable[[Item], Made], items: Iterable[Item], say: Callable[[str], None] = lambda text: None
 ) -> list[Made]:
-    """[do(item) for item in items], on two cores where there are two. ``do`` must not depend on what it did before.
+    """Return [do(item) for item in items], on two cores where there are two; raises whatever ``do`` raises.
 
-    say: is told what the other process says (`said_here`) once this one has nothing left to begin. Raises whatever do
-    raises.
+    ``do`` must not depend on earlier calls. say: gets messages of the other process (`said_here`) once this one has no
+    further item to begin.
     """
     listed = list(items)
     if _INSIDE.get():
@@ -84,8 +88,10 @@ def parallel_map(
 
 
 def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ...], dtype: Any) -> Iterator[Any]:
-    """make(0) … make(count - 1), arrays of one shape, on two cores where there are two, each as soon as all before it
-    are there; few are held at a time. ``make`` must not depend on what it did before. Raises whatever make raises.
+    """Yield make(0) … make(count - 1), arrays of one shape, on two cores where there are two.
+
+    Each is yielded as soon as all before it are; few are stored at a time. ``make`` must not depend on earlier calls.
+    Raises whatever it raises.
     """
     import numpy as np
 
@@ -133,7 +139,7 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
 
 
 def _sent(ours: Connection, what: Any) -> bool:
-    """Whether the other process is there to get it."""
+    """Send to the other process; return whether it is there."""
     try:
         ours.send(what)
     except OSError:
@@ -142,7 +148,7 @@ def _sent(ours: Connection, what: Any) -> bool:
 
 
 def _make_asked(make: Callable[[int], Any], room: Any, ours: Connection, theirs: Connection, parent: int) -> None:
-    """The other process of `arrays_in_order`: makes what it is asked for; what it cannot make ends it."""
+    """Run the other process of `arrays_in_order`: make the arrays requested; an error ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with(parent)
     ours.close()
@@ -179,13 +185,13 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
 
 
 def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
-    """The other process, where its results come out, and the count of what is taken. Raises OSError."""
+    """Start the other process; return it, the pipe of its results, and the count of items taken; raises OSError."""
     import fcntl
 
     context: Any = get_context("fork")
     taken = context.Value("i", 0)
     ours, theirs = context.Pipe(duplex=False)
-    with suppress(OSError):  # else the other process stands still with its first large result while this one works
+    with suppress(OSError):  # else the other process blocks on its first large result while this one works
         fcntl.fcntl(theirs.fileno(), fcntl.F_SETPIPE_SZ, ROOM_BYTES)
     other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
     try:
@@ -201,9 +207,7 @@ def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connectio
 
 @contextmanager
 def _nobody_compiles() -> Iterator[None]:
-    """While this thread forks: numba's lock, held by a thread that the other process does not have, would never be
-    free there.
-    """
+    """Hold numba's lock during the fork: held by another thread, it would never be released in the other process."""
     if "numba" not in sys.modules:
         yield
         return
@@ -225,10 +229,10 @@ def _next(taken: Any) -> int:
 
 
 def _received(ours: Connection) -> tuple[int | None, Any] | None:
-    """What the other process has sent; None at its end, or where it cannot be read: what is missing is done here."""
+    """Receive from the other process; None at its end, or where the message cannot be read."""
     try:
         found: tuple[int | None, Any] | None = ours.recv()
-    except Exception:  # the other process is gone, or has sent what no one can put together
+    except Exception:  # the other process is gone, or its message cannot be unpickled
         return None
     return found
 
@@ -236,12 +240,12 @@ def _received(ours: Connection) -> tuple[int | None, Any] | None:
 def _help(
     do: Callable[[Any], Any], items: list[Any], taken: Any, ours: Connection, theirs: Connection, parent: int
 ) -> None:
-    """The other process: results one by one, then None."""
+    """Run the other process: send results one by one, then None."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
     end_with(parent)
     ours.close()
     _OUT.set(theirs)
-    with suppress(OSError):  # nobody listens any more
+    with suppress(OSError):  # the pipe is closed
         while os.getppid() == parent and (i := _next(taken)) < len(items):
             try:
                 message = ForkingPickler.dumps((i, do(items[i])))
