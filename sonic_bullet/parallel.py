@@ -33,8 +33,7 @@ Made = TypeVar("Made")
 ROOM_BYTES = 1 << 20
 """Size of the pipe for results: what Linux allows every user."""
 HELD, AHEAD = 2, 4
-"""Arrays requested of the other process at once, and how far this process works ahead of the one it waits for.
-"""
+"""Arrays requested of the other process at once, and how far this process works ahead of the one it waits for."""
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
 _OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
 
@@ -46,7 +45,7 @@ def one_thread() -> Iterator[None]:
     That is as fast on matrices of hundreds, and gives the same bits for every number of cores and every setting of
     threads. All that converts recordings to numbers runs in such a block.
     """
-    import scipy.linalg  # noqa: F401  its library has threads apart from numpy's, and must be there to be told
+    import scipy.linalg  # noqa: F401  its library has threads of its own, and must be loaded to be limited
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, user_api="blas"):
@@ -241,7 +240,7 @@ def _help(
     do: Callable[[Any], Any], items: list[Any], taken: Any, ours: Connection, theirs: Connection, parent: int
 ) -> None:
     """Run the other process: send results one by one, then None."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first one stops, and ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process handles it, and ends this one
     end_with(parent)
     ours.close()
     _OUT.set(theirs)
@@ -249,7 +248,7 @@ def _help(
         while os.getppid() == parent and (i := _next(taken)) < len(items):
             try:
                 message = ForkingPickler.dumps((i, do(items[i])))
-            except Exception:  # done again where it can be told, or sent nowhere
+            except Exception:  # the first process does it again and raises the error
                 continue
             theirs.send_bytes(message)
         clear_stage()

@@ -204,7 +204,7 @@ class _Stage:
 
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SceneWarning)  # the result's notes say it
+            warnings.simplefilter("ignore", SceneWarning)  # they are in the result's notes
             run = _run_built if defines_build(self.path) else _run_plain
             with running_scene(self.path), choosing(self.choice):
                 return run(self, seconds, progress, say)
@@ -259,7 +259,7 @@ def _stage(path: str | Path, **options: Any) -> _Stage:
     name = as_path(path, "path", remedy, error=SceneError)
     try:
         place = Path(name).resolve(strict=True)
-    except (OSError, ValueError):  # not there, or no name that could be
+    except (OSError, ValueError):  # missing, or not a valid name
         raise SceneError(f"no scene file {shown(name)}", remedy) from None
     if not place.is_file():
         raise SceneError(f"{shown(name)} is no scene file", remedy)

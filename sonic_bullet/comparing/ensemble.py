@@ -34,7 +34,7 @@ SHIFT_M = 1e-4
 SLICES = 12
 FLOOR_DB = -90.0
 REST_M = 1e-5
-"""A body that moves less in the last tenth of a second rests."""
+"""Largest motion of a resting body in the last tenth of a second."""
 LONGEST = 4
 """Longest run to reach rest, as a multiple of the scene's own length."""
 Tell = Callable[[str], None]

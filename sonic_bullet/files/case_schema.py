@@ -114,7 +114,7 @@ ABOUT: dict[str, tuple[str, dict[str, str]]] = {
         },
     ),
 }
-"""A part of the file: what it is, and what each of its fields means."""
+"""Description of each part of the file and of its fields."""
 
 
 def case_schema() -> dict[str, Any]:
@@ -127,7 +127,7 @@ def case_schema() -> dict[str, Any]:
     """
     made = msgspec.json.schema(CaseFields)
     text = json_bytes(made).decode()
-    for name in made["$defs"]:  # the classes are called after the schema's parts and what they hold
+    for name in made["$defs"]:  # the classes have the names of the schema's parts with a suffix
         text = text.replace(f'"#/$defs/{name}"', f'"#/$defs/{_public(name)}"').replace(
             f'"title":"{name}"', f'"title":"{_public(name)}"'
         )

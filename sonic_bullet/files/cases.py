@@ -64,7 +64,7 @@ DIMENSION_TOLERANCE = 0.005
 """Relative standard error of a mesh's dimensions by default: ± 0.1 mm, any error in it as likely, has
 0.058 mm, 0.5 % of 12 mm. [ISO 2768-1, class f, 6 to 30 mm]
 """
-MOST_TOLERANCE = 0.2  # beyond it a shape is not known at all
+MOST_TOLERANCE = 0.2  # with a larger one the shape is unknown
 
 
 @dataclass(frozen=True, slots=True)

@@ -134,7 +134,7 @@ def read_container(
         It is cut, foreign, damaged or pickled.
     """
     with reading(path, what, LogError, REMEDY):
-        if not stat.S_ISREG(os.stat(path).st_mode):  # a pipe would be waited for without end
+        if not stat.S_ISREG(os.stat(path).st_mode):  # reading a pipe could block for ever
             raise FileError(f"cannot read {path}: it is not a regular file", f"name a {what}")
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
             arrays = {name: _array(archive, info, file, name in lazy) for name, info in _entries(archive)}
@@ -199,7 +199,7 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, lazy
         head = entry.read(HEAD_BYTES)
         dtype, shape, fortran, at = _npy_head(head, info.file_size, where)
         stays = lazy and info.file_size > LOADED_BYTES and info.compress_type == zipfile.ZIP_STORED
-        if not stays or (fortran and len(shape) > 1):  # in Fortran's order rows do not lie together
+        if not stays or (fortran and len(shape) > 1):  # in Fortran's order rows are not contiguous
             numbers = np.frombuffer(head + entry.read(), dtype, offset=at)
             return numbers.reshape(shape, order="F" if fortran else "C")
         while entry.read(LOADED_BYTES):

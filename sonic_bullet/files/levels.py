@@ -161,7 +161,7 @@ def as_sound(samples: object) -> KeptSound:
             if sound.ndim != 2:
                 raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
             return KeptSound.of(sound.astype(float, copy=False))
-    except ValueError:  # rows of several lengths
+    except ValueError:  # rows of different lengths
         pass
     raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
 

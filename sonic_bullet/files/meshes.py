@@ -23,7 +23,7 @@ from sonic_bullet.records.errors import FileError, MeshError
 MeshSurface = tuple[Array, Array]
 REMEDY = "repair the mesh, or export it again"
 ARCHIVES = {"zip", "bz2", "tar.gz", "tar.bz2"}
-SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may lie in files beside them
+SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may be in separate files
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
@@ -124,7 +124,7 @@ def _parsed_obj(path: Path) -> tuple[Array, list[list[tuple[int, int, int]]]]:
 
 
 def _vertex(words: list[str]) -> tuple[float, float, float]:
-    if len(words) < 4 or "_" in words[1] + words[2] + words[3]:  # an underscore is Python's own, nobody else's
+    if len(words) < 4 or "_" in words[1] + words[2] + words[3]:  # only Python allows an underscore in a number
         raise ValueError("a vertex is three numbers")
     return float(words[1]), float(words[2]), float(words[3])
 
@@ -159,7 +159,7 @@ def _other(path: Path) -> Iterator[MeshSurface]:
         if kind in SEVERAL_FILES:
             scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         else:
-            # a read of as many bytes as a header claims gives what there is, and takes no more memory
+            # a read of more bytes than the file has returns those there are, and allocates no more
             content = io.BytesIO(path.read_bytes())
             scene = trimesh.load_scene(content, file_type=kind, process=False, maintain_order=True, skip_materials=True)
     except ImportError:  # a parser of text asks for a package to guess its encoding: the file is not of its kind
@@ -180,7 +180,7 @@ def _check_off(path: Path) -> None:
     ]
     lines = [(number, words) for number, words in lines if words and words != ["OFF"]]
     if not lines or len(lines[0][1]) < 2 or not all(word.isdigit() for word in lines[0][1]):
-        return  # of another kind, or none: for trimesh to say
+        return  # of another kind, or none: trimesh reports it
     vertices, faces = (int(word) for word in lines[0][1][:2])
     for number, words in lines[1 + vertices : 1 + vertices + faces]:
         for word in words[1 : 1 + int(words[0])]:

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from sonic_bullet.files.atomic import cannot
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 
-# characters that may be a file's own: in all; of what is wrong and of the remedy, where it would be more
+# most characters from a file: in all; in the fault and in the remedy, where it would be more
 QUOTED, WHAT, REMEDY = 200, 120, 80
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # how every pointer begins, by Git LFS's specification
 

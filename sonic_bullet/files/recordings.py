@@ -23,7 +23,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
-# half a gibibyte as float64; or samples a byte of the file, which only packed silence passes
+# half a gibibyte as float64; or samples a byte of the file, which only packed silence exceeds
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
 BLOCK_SAMPLES = 1 << 18

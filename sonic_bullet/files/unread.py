@@ -14,8 +14,8 @@ import msgspec
 from sonic_bullet.records.counts import format_count
 
 FREE = frozenset({"note", "source", "licence", "license"})
-"""Words for people, which may stand at any place of a file."""
-MOST = 20  # lines; more of them tell nothing new
+"""Text fields for readers, allowed at any place of a file."""
+MOST = 20  # most lines
 QUOTED = 60  # characters of a name from a file
 
 

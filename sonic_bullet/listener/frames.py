@@ -26,7 +26,7 @@ MOTION = np.dtype(
 MOTION_NUMBERS = 13
 LINK_SPAN = 1 << 20
 BEYOND = 1e9
-"""Metres, m/s, rad/s, N·s: no scene of these sizes reaches it, and the products of such numbers are still numbers."""
+"""Bound of valid numbers in m, m/s, rad/s, N·s: no scene reaches it, and products of smaller ones stay finite."""
 NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
 
 

@@ -19,7 +19,7 @@ from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number
 
 VIEW_DEG = 40.0
-"""Height of a view, a 35 mm film's through a lens of 33 mm."""
+"""Angle of view along the height, that of a 35 mm film through a lens of 33 mm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

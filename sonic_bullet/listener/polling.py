@@ -114,7 +114,7 @@ def packed(contacts: Iterable[RawContact], count: int) -> Array:
     """
     buffer, at = bytearray(count * RAW_ROW.size), 0
     into, size = RAW_ROW.pack_into, RAW_ROW.size
-    # one pass over the tuples, nothing made on the way: half the time of columns (zip) and chains
+    # one pass over the tuples without intermediate objects: half the time of columns (zip) and chains
     for (
         _, a, b, m, n, (ax, ay, az), (bx, by, bz), (nx, ny, nz), gap, force, f1, (sx, sy, sz), f2, (tx, ty, tz)
     ) in contacts:  # fmt: skip
@@ -131,7 +131,7 @@ def stale(raw, i, before):
     """Tell whether row i, without normal force, has the friction of its row in `before`, to the bit."""
     row, k = raw[i], len(before)
     for j in range(k):
-        old = before[(i + j) % k]  # Bullet tells them in nearly the same order again
+        old = before[(i + j) % k]  # Bullet reports them in nearly the same order again
         if (
             old.friction_1_n == row.friction_1_n
             and old.friction_2_n == row.friction_2_n

@@ -20,8 +20,8 @@ from sonic_bullet.records.arrays import LARGEST
 SPAWN_DEPTH_M = 1e-4
 
 UNKNOWN, STRANGERS, ABSURD, UNUSUAL = -1, -2, -3, -4
-"""Instead of a number of rows: a touch of a link that is not in the roster; links that meet somebody for the first time
-(START.met); a number beyond `LARGEST`; what Python has to look at (`take_step`)."""
+"""In place of a number of rows: a contact of a link that is not in the roster; links in their first contact
+(START.met); a number beyond `LARGEST`; a case that Python has to handle (`take_step`)."""
 
 
 @njit(nogil=True, error_model="numpy")

@@ -30,11 +30,11 @@ START = np.dtype(
         *((name, MOTION[name]) for name in MOTION.names or ()),
         ("code", "i8"),  # frames.encode
         ("static", "i8"),  # 1 where its mass is 0
-        ("index", "i8"),  # into the bodies of the log; -1 where it has met nobody yet, LEFT_OUT
+        ("index", "i8"),  # into the bodies of the log; -1 without a contact yet, LEFT_OUT
         ("pose", "i8"),  # where index is not below 0: its row among the step's poses
         ("moved", "i8"),  # 1 where it was set elsewhere by hand since the step before
         ("born", "i8"),  # 1 in its first step
-        ("met", "i8"),  # 1 where it meets somebody for the first time
+        ("met", "i8"),  # 1 in its first contact
     ],
     align=True,
 )
@@ -137,7 +137,7 @@ def hooked_start(past: Motion | None, now: Motion, by_hand: Collection[int], dt_
         return start
     old = rows_of(past.roster, now.roster.code)
     begin(_earlier(past, now, old), now.row, dt_s, np.array(sorted(by_hand), np.int64), True, start)
-    if past.roster is not now.roster:  # whose id it was is not known
+    if past.roster is not now.roster:  # the id may have been reused
         set_motion(start, now.row, now.roster.static)
     start["born"] = old < 0
     start["moved"][old < 0] = 0

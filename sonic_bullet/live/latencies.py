@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 BIN_S = 1e-4
-BINS = 20_000  # two seconds: what is later counts as that
+BINS = 20_000  # two seconds: longer latencies count as that
 
 
 class Latencies:

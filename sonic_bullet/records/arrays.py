@@ -14,8 +14,7 @@ from sonic_bullet.records.errors import RecordError
 
 Array = NDArray[Any]
 LARGEST = 1e30
-"""Largest length, force, stiffness or frequency in SI units; fourth powers of such numbers are still finite.
-"""
+"""Largest length, force, stiffness or frequency in SI units; fourth powers of such numbers are still finite."""
 
 
 def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name: str, *, finite: bool = True) -> Array:
@@ -33,7 +32,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
     RecordError
         It holds no numbers, or none that ``dtype`` can hold (1.5 as an index), or the shape differs.
     """
-    # a record's own: read-only and nobody's view
+    # a record's own array: read-only and not a view
     kept = isinstance(value, np.ndarray) and not value.flags.writeable and value.base is None
     try:
         given = value if isinstance(value, np.ndarray) else np.asarray(value)

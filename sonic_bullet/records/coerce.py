@@ -30,7 +30,7 @@ _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
 _SHORT.maxlevel = 3
 LONGEST_NAME = 255
-"""Bytes of a file's name that file systems take."""
+"""Most bytes of a file's name in file systems."""
 LISTED = 8
 """Most names that a message lists."""
 

@@ -34,4 +34,4 @@ def analyse_body(shapes: Sequence[Shape], material: Material, **options: Any) ->
 
     solved = modal.analyse(tuple(shapes), material, **options)
     made = with_modes(solved, material)
-    return made if made is solved else replace(made, shape=rounded(made.shape))  # effects turn shapes
+    return made if made is solved else replace(made, shape=rounded(made.shape))  # effects rotate shapes

@@ -20,7 +20,7 @@ from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice, current_choice
 
 GROUND_M = 5.0
-"""A static, flat body longer than this is ground: no board that is struck to sound is as long."""
+"""Length above which a static, flat body is ground: no board that is struck to sound is as long."""
 FLATTEST = 0.5
 """Largest thickness of a flat body over its second side: pybullet_data's planes are 200 x 200 x 10 m."""
 HOW_IT_SOUNDS = "it sounds where the script attaches a listener and adds it with mesh="

@@ -176,7 +176,7 @@ def enter_bodies(
     asked: Sequence[WantedBody],
 ) -> list[tuple[ModalModel, ...]]:
     """Add links with their models to the world; return the models of each body in ``asked``, in turn."""
-    for one in wanted:  # all of them first: a number is given to who has no name of its own
+    for one in wanted:  # all given names first, as default names are numbered
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
             world.call(one.body, link, name)
     for one, mine in zip(wanted, models, strict=True):

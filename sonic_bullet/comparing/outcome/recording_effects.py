@@ -34,7 +34,7 @@ CHANCE, COMMON_SHARE = 0.01, 0.25
 """α; and the fraction of B's power that A explains beyond chance in any case: a tone correlates with any other."""
 ENVELOPE_S = 0.02
 OFFSET_ERRORS = 4
-"""Standard errors of a mean that noise does not reach, but for 6 in 100 000."""
+"""Standard errors of a mean that noise exceeds in 6 of 100 000 cases."""
 GAIN_DB = 0.005
 
 

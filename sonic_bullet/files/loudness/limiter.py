@@ -20,7 +20,7 @@ from sonic_bullet.records import Array
 AHEAD_S = 0.005
 """One period of 200 Hz: the descent is too slow to be audible as a click, and the strike after it masks it."""
 RELEASES_DB_S = (100.0, 400.0, 1600.0, 6400.0)
-"""6 dB in 60 ms, longer than a period of 20 Hz: a low tone is not bent within itself. Struck bodies die away faster;
+"""6 dB in 60 ms, longer than a period of 20 Hz: low tones are not distorted. Struck bodies decay faster;
 where their loudness asks for it, the next is taken."""
 MARGIN_DB = 0.25
 """Margin below the ceiling: excess that meters of other interpolations read, of noise up to half the rate."""

@@ -41,7 +41,7 @@ def sample_true_peaks(samples: Array) -> Array:
         first, stop = max(start - 2 * REACH, 0), min(start + BLOCK_FRAMES, frames)
         fine = np.abs(_between(samples[:, first : stop + 2 * REACH])).max(axis=0)
         fine = np.concatenate([np.zeros(OVERSAMPLING // 2), fine, np.zeros(OVERSAMPLING // 2)])
-        after = OVERSAMPLING * (np.arange(start, stop) - first)  # half a sample before each, then as much behind
+        after = OVERSAMPLING * (np.arange(start, stop) - first)  # half a sample before each, then as much after it
         made[start:stop] = np.maximum.reduce([fine[after + k] for k in range(OVERSAMPLING + 1)])
     return made
 

@@ -114,7 +114,7 @@ class Spool:
     def _refused(self, error: OSError) -> FileError:
         """Make the error of a refused write, with a remedy."""
         if self._file is not None:
-            os.ftruncate(self._file.fileno(), self._packed * self.row_bytes)  # what was written in part is room
+            os.ftruncate(self._file.fileno(), self._packed * self.row_bytes)  # frees a partial write
         said = cannot("keep more of the", self.what, error)
         larger = "set TMPDIR to a folder with more room"
         place = tempfile.tempdir or "the temporary folder"

@@ -163,7 +163,7 @@ def _understood(sets: list[tuple[int, dict[str, Any]]], kinds: list[int], path: 
 def _dataset(file: Any, number: int, kind: int) -> dict[str, Any]:
     """Read a dataset by pyuff; raises FileError."""
     try:
-        with np.errstate(all="ignore"):  # of values that are none: they are refused below
+        with np.errstate(all="ignore"):  # of NaN values, which are refused below
             found: dict[str, Any] = file.read_sets(number)
     except Exception as error:
         raise FileError(

@@ -145,7 +145,7 @@ class Interception:
         client = self.client = given.pop("physicsClientId", 0)
         call = self._by_value(name, given)
         if self.plan is None:
-            if name != "createCollisionShape":  # is part of what is made of it
+            if name != "createCollisionShape":  # is an argument of the call that uses it
                 self.calls.append(call)
             return self._made(call, self._real[name](*args, **kwargs))
         if name == "createCollisionShape":

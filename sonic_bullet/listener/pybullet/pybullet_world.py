@@ -49,7 +49,7 @@ class PyBulletWorld(facts.AskedLinks):
     """
 
     def __init__(self, client: Any, client_id: int) -> None:
-        # a client that is dropped is to disconnect
+        # a weak reference: a client that is dropped has to disconnect
         self._client = weakref.ref(client) if hasattr(client, "__weakref__") else lambda: client
         self.client_id = client_id
         self._log = SubstepLog(client_id)
@@ -230,7 +230,7 @@ class PyBulletWorld(facts.AskedLinks):
             self._uninstall()
             self._uninstall = None
         self._before = None
-        (self._log.abandon if self.client is None else self._log.close)()  # its id may be another's by now
+        (self._log.abandon if self.client is None else self._log.close)()  # its id may be reused by now
 
     def before_step(self) -> None:
         """Read poses and twists at the start of the step; SceneError where the connection is lost."""

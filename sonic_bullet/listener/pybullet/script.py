@@ -31,7 +31,7 @@ from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_
 
 ClientHook = Callable[[int], None]
 MOST_CLIENTS = 1024
-"""As many as PyBullet has room for (its MAX_PHYSICS_CLIENTS)."""
+"""Limit of PyBullet's clients (its MAX_PHYSICS_CLIENTS)."""
 
 
 class _TimeIsUp(BaseException):

@@ -89,7 +89,7 @@ def fills(
         corners.append((middle - side, middle + side))
     least, most = np.min([a for a, _ in corners], axis=0), np.max([b for _, b in corners], axis=0)
     sides = [np.abs(turn) @ (most - least) / 2]
-    if len(pieces) == 1 and not any(grown_m or ()):  # alone it is not boxed twice
+    if len(pieces) == 1 and not any(grown_m or ()):  # a single piece is not boxed twice
         sphere = pieces[0].kind == pybullet.GEOM_SPHERE
         sides.append(known[0][0] if sphere else np.abs(turn @ _turn(pieces[0].quaternion)) @ known[0][0])
     middle = turn @ (most + least) / 2 + position

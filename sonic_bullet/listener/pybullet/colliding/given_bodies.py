@@ -48,7 +48,7 @@ OF_SHAPE = {
 }
 """Arguments that determine the shape of a body in its own frame."""
 SAME_M, SAME_SHARE = 2e-3, 0.01
-"""How far boxes of one shape may differ: Bullet's margins of 1 mm, and what it rounds."""
+"""Tolerances of the boxes of one shape: Bullet's margins of 1 mm, and its rounding."""
 RIGID_BODY = 1
 """Last entry but one of getDynamicsInfo for a body in maximal coordinates."""
 

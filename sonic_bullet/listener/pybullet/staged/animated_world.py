@@ -24,7 +24,7 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
 
 TILT_M = 2e-3
-"""By how much the ends of a body are tilted to find the corners of a face that lies on another: Bullet's own perturbed
+"""Displacement of the ends of a tilted body, to find the corners of a face that lies on another: Bullet's own perturbed
 queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m)."""
 
 
@@ -138,7 +138,7 @@ class AnimatedStage:
         rows = [_raw(self.ids[a], self.ids[b], one[5], one[6], one[7], one[8]) for one in points]
         if self.round[a] or self.round[b]:
             return rows
-        # the corners: from poses tilted to four sides, carried back; the smaller one is tilted
+        # the corners: from poses of the smaller body tilted to four sides, rotated back
         low = a if self.extent_m[a] <= self.extent_m[b] else b
         normals: list[Array] = []
         for one in points:
@@ -239,7 +239,7 @@ class AnimatedStage:
             if not (fresh[a, b] and one[9] > 0 and one[8] < 0):
                 continue
             speed = -_point_speed(before[a], one[5]) @ one[7] + _point_speed(before[b], one[6]) @ one[7]
-            if speed > falls:  # what rests falls for a step at each pose
+            if speed > falls:  # a resting body falls for a step at each pose
                 early_s[[a, b]] = np.maximum(early_s[[a, b]], min(-one[8] / speed, dt_s))
         for row in np.flatnonzero((early_s > 0) & ~self.held).tolist():
             out = after[row]
@@ -339,7 +339,7 @@ class AnimatedWorld(PyBulletWorld):
         self._at += 1
         now = Motion(self._past.roster, rows)
         self._memory.poll(raw, stepped=True)
-        self._memory.touches = None  # nobody sleeps: what rests to the bit carries its weight
+        self._memory.touches = None  # no body sleeps: one that rests to the bit still bears its load
         step = self._usual(now, True) or self._unusual(now, True, None)
         self._past = now
         self.step_count += 1

@@ -28,7 +28,7 @@ FAR_AWAY = (0.0, 0.0, -1e5)
 SMOOTH = 0.001
 """Deviation of a simplified mesh, relative to its size: less than a pixel of a picture that it fills."""
 PLANE_M = 100.0
-"""Side of the square that is drawn of a plane."""
+"""Side of the square that is drawn for a plane."""
 
 
 class PyBulletPictures:
