@@ -1,6 +1,6 @@
-"""Events as tables for other programs: JSON and CSV, a row an impact, a roll or a slide that sounds, in order of time.
+"""Tables of events for other programs: JSON and CSV, a row an active impact, roll or slide, in order of time.
 
-Times in s, places in m, world frame; level in dB re 20 µPa at the first microphone. What is silent is not among them.
+Times in s, places in m, world frame; level in dB re 20 µPa at the first microphone. Silent events are left out.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ COLUMNS = (
 
 
 def rows_of(events: Sequence[SoundEvent], log: ContactLog) -> list[dict[str, Any]]:
-    """Those that sound, by column."""
+    """Return the active events, by column."""
     rows = []
     for one in events:
         if one.kind in SOUNDING and not one.reason:
@@ -54,7 +54,7 @@ def rows_of(events: Sequence[SoundEvent], log: ContactLog) -> list[dict[str, Any
 
 
 def write_events(path: str | os.PathLike[str], events: Sequence[SoundEvent], log: ContactLog) -> dict[str, int]:
-    """Write a .json or .csv, whole or not at all; how many there are of each kind. Raises FileError."""
+    """Write a .json or .csv, whole or not at all; return how many there are of each kind. Raises FileError."""
     rows = rows_of(events, log)
     if Path(path).suffix.lower() == ".csv":
         text = io.StringIO()

@@ -1,4 +1,4 @@
-"""A log as a film: its poses drawn, its sound beside them, on one clock (film_writer.py).
+"""A film of a log: its poses drawn, its sound beside them, on one clock (film_writer.py).
 
 ContactLog, KeptSound -> Staging (poses at k/fps) -> pictures, by two processes -> FilmWriter -> NAME.mp4
     + events -> drawn into each picture (overlay.py)
@@ -31,8 +31,14 @@ from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of,
 
 @dataclass(frozen=True, slots=True)
 class FilmLook:
-    """How a film looks. size: pixels, even. eye_m, target_m: of the camera, None: chosen. follow: name of the body
-    that the camera moves with. shadows: a third slower.
+    """Look of a film.
+
+    Attributes
+    ----------
+    size : pixels, even
+    eye_m, target_m : of the camera, None: chosen
+    follow : name of the body that the camera moves with
+    shadows : whether they are drawn, a third slower
     """
 
     fps: Fraction = Fraction(30)
@@ -61,8 +67,9 @@ class FilmReport:
 
 
 def pictures_in(log: ContactLog, fps: Fraction, seconds: float | None = None) -> int:
-    """Pictures that a film of a log has: the last one begins before its end. Raises AudioError where it is asked for
-    longer than the log lasts, or has no step.
+    """Count the pictures of a film of a log: the last one begins before its end.
+
+    Raises AudioError where it is to be longer than the log, or the log has no step.
     """
     lasts = duration_of(log)
     if not lasts:
@@ -93,13 +100,22 @@ def make_film(
     level: FileLevel | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmReport:
-    """A film of a log with its sound (channels, n) in pascals, whole or not at all; two processes draw.
+    """Make a film of a log with its sound (channels, n) in pascals, whole or not at all; two processes draw.
 
-    Where the sound goes on after the log's last step, the last picture does.
-    standing: shapes of the scene's world, where it is there; events: drawn in, where they are given. codec: of the
-    sound, None: the container's usual one. level: found before, in place of peak_dbfs and lufs. progress: given the
-    share done. Raises FileError, AudioError, SceneError; stopped or failed under way, the error names the film that is
-    finished so far.
+    Where the sound is longer than the log, the last picture stays.
+
+    Parameters
+    ----------
+    standing : shapes of the scene's world, where it is there
+    events : drawn in, where they are given
+    codec : of the sound, None: the container's usual one
+    level : found before, in place of peak_dbfs and lufs
+    progress : called with the fraction done
+
+    Raises
+    ------
+    FileError, AudioError, SceneError
+        Stopped or failed under way, the error names the film that is finished so far.
     """
     look = FilmLook() if look is None else look
     check_film_output(path, sr, sound.shape[0], codec)
@@ -142,7 +158,7 @@ def make_film(
 
 
 def _cameras(log: ContactLog, staging: Staging, look: FilmLook) -> list[Camera]:
-    """One camera, or one a picture where it goes with a body. Raises SceneError where there is no such body."""
+    """Return one camera, or one a picture where it follows a body. Raises SceneError where there is no such body."""
     first = chosen_camera(log, staging, look.eye_m, look.target_m)
     if look.follow is None:
         return [first]
@@ -155,7 +171,7 @@ def _cameras(log: ContactLog, staging: Staging, look: FilmLook) -> list[Camera]:
 
 
 def _touching(log: ContactLog, staging: Staging) -> list[dict[tuple[int, int], object]]:
-    """Where pairs touch, for each picture."""
+    """Return where pairs touch, for each picture."""
     found: list[dict[tuple[int, int], object]] = []
     for number, step in enumerate(log.steps):
         while len(found) < len(staging.step) and staging.step[len(found)] == number:

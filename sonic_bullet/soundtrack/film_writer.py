@@ -1,20 +1,19 @@
-"""Pictures and sound into one film file, on one clock.
+"""Pictures and sound in one film file, on one clock.
 
     picture k -> shown from k/fps on, counted in the stream's own unit 1/fps, a fraction: nothing is summed or rounded
     sample i  -> heard at i/sr, counted in 1/sr
     the file's clock: both begin at 0, and both end at the end of the last picture
 
-n pictures last n/fps seconds: `samples_of` of them are heard, silence where the sound is shorter. Lossy codecs begin
-with samples that are no sound (aac 1024, opus 312, mp3 1105): the encoder gives them times before 0 and the container
-says that they are left out (an edit list in mp4 and mov, CodecDelay in mkv), so players and decoders begin with ours.
-Those of aac and mp3 code blocks of 1024 and 1152 samples, and silence would fill the last, which decoders play: as many
-samples go before time 0 besides the codec's own that the last block is full (`lead_of`; the edit list leaves them out
-as it does the codec's, mkv has no such list), and blocks after the end stay out of the file. No picture waits for a
-later one (no B-frames), so that pictures need no such list. mkv tells times in whole milliseconds, each rounded by
-itself; the number of its pictures and samples is exact.
+n pictures last n/fps seconds: `samples_of` of them are played, silence where the sound is shorter. Lossy codecs begin
+with samples that are no sound (aac 1024, opus 312, mp3 1105). The encoder gives them times before 0 and the container
+leaves them out (an edit list in mp4 and mov, CodecDelay in mkv). aac and mp3 code blocks of 1024 and 1152 samples, and
+decoders play the silence that fills the last. So as many samples go before time 0 besides the codec's own that the last
+block is full (`lead_of`; not in mkv, which has no edit list), and blocks after the end stay out of the file. No picture
+waits for a later one (no B-frames), so that pictures need no such list. mkv stores times in whole milliseconds, each
+rounded by itself; the number of its pictures and samples is exact.
 
-Written beside, then named: NAME.EXT is the whole film, or what it was before. Left with an error or Ctrl-C, what is
-finished is a film of its own, NAME.partial.EXT.
+Written to a temporary file, then renamed: NAME.EXT is the whole film, or what it was before. Left with an error or
+Ctrl-C, what is finished is a film of its own, NAME.partial.EXT.
 """
 
 from __future__ import annotations
@@ -43,10 +42,7 @@ from sonic_bullet.soundtrack.frame_rates import fraction_of
 
 
 class _Codec(NamedTuple):
-    """An audio codec by ffmpeg's name, its sample format, and bits a second a channel, 0: as many as it takes.
-
-    block: of samples, 0 where the last may be short; delay: of samples, before the first of ours.
-    """
+    """Audio codec of ffmpeg: bits a second a channel, 0: any; block, 0: the last may be short, and delay in samples."""
 
     name: str
     sample: str
@@ -71,7 +67,7 @@ SOUND_BLOCK_S = 0.5
 
 
 def as_fps(text: object) -> Fraction:
-    """Pictures a second, as a fraction: 30, "30000/1001", "29.97". Raises FileError."""
+    """Parse pictures a second, as a fraction: 30, "30000/1001", "29.97". Raises FileError."""
     remedy = "give pictures a second, 24, 25, 30000/1001 or 60 say"
     try:
         fps = fraction_of(str(text))
@@ -88,17 +84,17 @@ def as_fps(text: object) -> Fraction:
 
 
 def samples_of(pictures: int, fps: Fraction, sr: int) -> int:
-    """Samples until the end of so many pictures: the nearest to n·sr/fps, by whole numbers."""
+    """Count the samples until the end of so many pictures: the nearest to n·sr/fps, by whole numbers."""
     return math.floor(pictures * sr / fps + Fraction(1, 2))
 
 
 def pictures_of(samples: int, fps: Fraction, sr: int) -> int:
-    """The fewest pictures that last so many samples: the inverse of `samples_of`."""
+    """Count the fewest pictures that last so many samples: the inverse of `samples_of`."""
     return math.ceil((samples - Fraction(1, 2)) * fps / sr)
 
 
 def lead_of(codec: str, samples: int) -> int:
-    """Silent samples before time 0 with which delay, lead and sound are whole blocks."""
+    """Count the silent samples before time 0 with which delay, lead and sound are whole blocks."""
     chosen = CODECS[codec]
     return -(chosen.delay + samples) % chosen.block if chosen.block else 0
 
@@ -106,9 +102,9 @@ def lead_of(codec: str, samples: int) -> int:
 def check_film_output(
     path: str | os.PathLike[str], sr: int, channels: int, codec: str | None = None
 ) -> tuple[Path, str]:
-    """Real path and audio codec of a film, before anything is drawn.
+    """Check a film's path and audio codec before anything is drawn; return the real path and the codec.
 
-    Raises FileError (place, extension, codec, no PyAV) and AudioError (a rate or channels that the codec has not).
+    Raises FileError (place, extension, codec, no PyAV), AudioError (a rate or channels that the codec has not).
     """
     extension = Path(path).suffix.lower()
     if extension not in CONTAINERS:
@@ -134,7 +130,7 @@ def check_film_output(
 
 
 def pyav() -> Any:
-    """The library that writes films. Raises FileError where it is not installed."""
+    """Import the library that writes films. Raises FileError where it is not installed."""
     try:
         import av
     except ImportError as error:
@@ -143,12 +139,11 @@ def pyav() -> Any:
 
 
 class FilmWriter:
-    """A film that grows picture by picture; a context manager.
+    """Film that grows picture by picture, each with its sound; a context manager.
 
-    sound: (channels, n) pascals, all at once because it is there before the pictures are; gain_per_pa: file units a
-    pascal, what is beyond 1 is clipped and counted. size: width and height, even numbers. pictures: how many there will
-    be, None: as many as the sound lasts; with fewer or more the last block of aac or mp3 ends in silence. Each picture
-    brings the sound that belongs to it.
+    sound: (channels, n) pascals; gain_per_pa: file units a pascal, more than 1 is clipped and counted; size: width and
+    height, even numbers; pictures: how many there will be, None: as many as the sound lasts (with another number the
+    last block of aac or mp3 ends in silence).
     """
 
     def __init__(
@@ -212,7 +207,7 @@ class FilmWriter:
                 self._hear(due)
 
     def _hear(self, stop: int, end: int | None = None) -> None:
-        """Sound up to sample ``stop``; end: where it stops for good, once that is known."""
+        """Write sound up to sample ``stop``; end: where it stops for good, once that is known."""
         av = pyav()
         if stop <= self.samples:
             return
@@ -227,7 +222,7 @@ class FilmWriter:
         self.samples = stop
 
     def _mux_sound(self, packets: Any, end: int | None = None) -> None:
-        """Coded sound into the file. end: the sample where all of it does: what begins later is left out."""
+        """Write coded sound into the file. end: the sample where all of it ends: what begins later is left out."""
         block = CODECS[self.codec].block
         for packet in packets:
             # counted here: lame's last packet has a time before its place
@@ -242,11 +237,13 @@ class FilmWriter:
         return _Refusal(self.path, self.partial)
 
     def __enter__(self) -> FilmWriter:
+        """Return the writer."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Finish the film, or keep what is finished as NAME.partial.EXT."""
         kept = False
         if error is not None:
             note_closing()
@@ -276,7 +273,7 @@ class FilmWriter:
             raise KeyboardInterrupt(f"{str(error) or 'stopped'}; {saved}") from error
 
     def _finish(self) -> None:
-        """Bring all that encoders hold into the file, and close it. Raises FileError."""
+        """Write all that encoders hold into the file, and close it. Raises FileError."""
         with self._disk():
             end = samples_of(self.pictures, self.fps, self.sr)
             self._hear(end, end)
@@ -287,21 +284,23 @@ class FilmWriter:
 
 
 _X264 = {"preset": "veryfast", "crf": "18", "bf": "0"}
-"""What pictures cost: 3 to 8 ms of 1280×720 on one core, and no visible loss [x264's own scale: 18]."""
+"""Cost of pictures: 3 to 8 ms of 1280×720 on one core, and no visible loss [x264's own scale: 18]."""
 
 
 class _Refusal:
-    """An error of the library that is the disk's is said as the disk's."""
+    """Context that reports a disk's error as the disk's, not as the library's."""
 
     def __init__(self, path: str, partial: PartialFile) -> None:
         self.path, self.partial = path, partial
 
     def __enter__(self) -> None:
+        """Enter the context."""
         return None
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Raise the disk's error, or one of the format, in place of the library's."""
         if not isinstance(error, Exception) or isinstance(error, SonicBulletError):
             return
         reason = self.partial.refusal()
@@ -317,7 +316,7 @@ def _nothing() -> Any:
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Width and height of a picture, even numbers. Raises FileError."""
+    """Check width and height of a picture, even numbers. Raises FileError."""
     width, height = (int(side) for side in size)
     if not all(16 <= side <= SIDE_MOST and side % 2 == 0 for side in (width, height)):
         raise FileError(f"pictures of {width}x{height}", f"give even numbers from 16 to {SIDE_MOST}, 1280x720 say")
@@ -336,10 +335,10 @@ def write_film(
     gain_per_pa: float = 1.0,
     each: Callable[[int], None] | None = None,
 ) -> FilmWriter:
-    """A film of all pictures (height, width, 3) uint8 with the sound (channels, n) in pascals, whole or not at all.
+    """Write a film of pictures (height, width, 3) uint8 with the sound (channels, n) in pascals, whole or not at all.
 
-    each: called with the number of those written. Raises FileError, AudioError; those, and KeyboardInterrupt, name the
-    film that was finished so far.
+    each: called with the number written. Raises FileError, AudioError; those, and KeyboardInterrupt, name the finished
+    film.
     """
     with FilmWriter(path, sound, sr, fps=fps, size=size, codec=codec, gain_per_pa=gain_per_pa) as film:
         for picture in pictures:

@@ -1,4 +1,4 @@
-"""Frame rates that texts and times mean."""
+"""Frame rates from texts and times."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from sonic_bullet.records import Array
 LONGEST = 20
 USUAL_FPS = 30.0
 UNEVEN = 4e-4
-"""By which share the median distance of keys may be off: less than half of what is between n and n·1000/1001."""
+"""Relative error allowed in the median distance of keys: less than half of what is between n and n·1000/1001."""
 EXACT = 1e-5
-"""By which share a rate that was measured over all of an animation may be off."""
+"""Relative error allowed in a rate that was measured over all of an animation."""
 
 
 def fraction_of(text: str) -> Fraction:
-    """24, 29.97, 30000/1001. Raises ValueError, ZeroDivisionError; powers of ten are none, as ten digits of one would
-    take all memory.
+    """Parse 24, 29.97, 30000/1001. Raises ValueError, ZeroDivisionError.
+
+    Powers of ten are refused, as ten digits of one would take all memory.
     """
     if len(text) > LONGEST or "e" in text.lower():
         raise ValueError(text)
@@ -27,16 +28,16 @@ def fraction_of(text: str) -> Fraction:
 
 
 def nearest_rate(rate: float, within: float = EXACT) -> float:
-    """The whole number n, or n·1000/1001 [SMPTE ST 12-1, sec. 4], that a measured rate is by a share of it, else the
-    rate.
-    """
+    """Round a measured rate to a near whole number n, or n·1000/1001 [SMPTE ST 12-1, sec. 4], else keep it."""
     usual = [whole * share for share in (1.0, 1000 / 1001) for whole in (round(rate / share),)]
     return min((one for one in usual if abs(rate / one - 1) < within), key=lambda one: abs(rate - one), default=rate)
 
 
 def rate_of_keys(times: Sequence[Array]) -> float:
-    """Frames a second of baked keys: of the sampler that has most, over all of it, where they are even but for float32;
-    else the median of all distances. `USUAL_FPS` where they are sparse.
+    """Estimate frames a second of baked keys; `USUAL_FPS` where they are sparse.
+
+    From the sampler that has most keys, over all of it, where they are even but for float32; else the median of all
+    distances.
     """
     gaps = np.concatenate([np.diff(t) for t in times])
     if len(gaps) < 8:

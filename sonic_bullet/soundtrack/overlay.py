@@ -1,4 +1,4 @@
-"""Contacts drawn into a picture as they are heard, and those that stay silent with the reason why.
+"""Contacts drawn into a picture when they sound, and silent ones with the reason.
 
     SoundEvent + where the pair touches now -> pixel (the camera's projection) -> ring, dot or cross, a line of words
 
@@ -25,13 +25,13 @@ COLOURS = {
     UNCAUSED: (110, 110, 110),
 }
 SHOWN_S = 0.25
-"""How long an impact stays: what lasts a millisecond would be in no picture."""
+"""How long an impact is shown: one of a millisecond would be in no picture."""
 LINES, SILENT_LINES = 7, 4
 QUIETEST_DB, PIXELS_A_DB = 40.0, 0.5
 
 
 def pixel(place_m: Array, camera: Camera, size: tuple[int, int]) -> tuple[float, float] | None:
-    """Where a point of the world is in a picture, x from the left and y from the top; None behind the camera."""
+    """Project a point of the world to a picture, x from the left and y from the top; None behind the camera."""
     x, y, z = camera.seen(place_m)
     if z <= 0:
         return None
@@ -47,7 +47,7 @@ def with_contacts(
     time_s: float,
     camera: Camera,
 ) -> Array:
-    """The picture (height, width, 3) with the events that are under way at a time. touching: where pairs touch then."""
+    """Draw the events under way at a time into the picture (height, width, 3). touching: where pairs touch then."""
     from PIL import Image, ImageDraw
 
     size = picture.shape[1], picture.shape[0]
@@ -70,7 +70,7 @@ def with_contacts(
 
 
 def shown_at(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
-    """Those to be seen at a time: lasting ones while they last, the others for `SHOWN_S`."""
+    """Return the events shown at a time: lasting ones while they last, the others for `SHOWN_S`."""
     return [
         one
         for one in events
@@ -80,16 +80,14 @@ def shown_at(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
 
 
 def _worded(events: Sequence[SoundEvent]) -> list[SoundEvent]:
-    """Those that a picture has words for: what lasts, the latest impacts, and then what is silent."""
+    """Choose the events that are described in words: what lasts, the latest impacts, and then what is silent."""
     sounds = sorted((x for x in events if not x.reason), key=lambda x: (x.kind == IMPACT, -x.start_s))
     silent = sorted((x for x in events if x.reason), key=lambda x: (x.kind == SUPPORT, -x.start_s))
     return sounds[:LINES] + silent[:SILENT_LINES]
 
 
 def _mark(draw: Any, event: SoundEvent, at: tuple[float, float], unit: float, time_s: float) -> None:
-    """An impact is a ring that opens, as large as it is loud; what rolls or slides a dot; what is silent a cross or a
-    square.
-    """
+    """Draw a mark: a ring that opens for an impact, larger if louder; a dot for friction; cross or square if silent."""
     colour, (x, y) = COLOURS[event.kind], at
     loud = max((event.level_db or QUIETEST_DB) - QUIETEST_DB, 4.0)
     if event.kind == IMPACT:

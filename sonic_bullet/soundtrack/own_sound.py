@@ -1,12 +1,11 @@
-"""What one contact sends by itself: not what else its bodies ring with at that time.
+"""Sound of one contact alone, without what else its bodies ring with at that time.
 
     strike: PULSE + Uᵀj -> p(t) = Σ Re(w a e^{s t}) / r,   a = share Uᵀj |F̂(fτ)| (1 + i d/ω)
         + the rigid body's click
     friction: force of a step on modes at rest before the pair's first -> p(t), its energy
 
 The closed form of the bank (synth.bank), with its poles and weights as they are in that step; r from the body's centre,
-as the path has it [render.resonator says where the click comes from]. Not in it: noise of residuals, and what a
-partner passes on.
+as in the path [render.resonator explains the click]. Not included: noise of residuals, and transmission to a partner.
 """
 
 from __future__ import annotations
@@ -21,12 +20,13 @@ from sonic_bullet.synth.pulse import SPECTRUM_CELLS_PER_F_TAU, cumulated, pulse_
 from sonic_bullet.synth.strikes import SPAN
 
 GROUP = 64
-"""Samples whose powers of the poles are made once."""
+"""Samples whose powers of the poles are computed once."""
 
 
 class _Voice(NamedTuple):
-    """A body as a row of modes, its motion towards the microphone the last: pole, weight over distance, what a unit of
-    impulse leaves; and the way there.
+    """A body as a row of modes, its motion towards the microphone the last.
+
+    pole, weight over distance, response to a unit of impulse; and the direction and distance.
     """
 
     pole: Array
@@ -37,15 +37,16 @@ class _Voice(NamedTuple):
 
 
 class OwnSound:
-    """Of a log's contacts at its first microphone, step by step; keeps what rubs ringing between its steps."""
+    """Sound of a log's contacts at its first microphone, step by step; friction rings on between its steps."""
 
     def __init__(self, microphone: Microphone, sound_speed_m_s: float) -> None:
         self._place_m, self._speed_m_s = np.asarray(microphone.position_m, float), sound_speed_m_s
         self._friction: dict[tuple[int, int], tuple[int, Array]] = {}  # step, and state, of a pair's side
 
     def strike_pa(self, state: State, number: int, at: int, frames: int) -> Array:
-        """(frames,) pressure from when pulse ``at`` of a step is first heard on, of both bodies. number: of the step
-        in which it strikes.
+        """Compute the pressure (frames,) of pulse ``at`` of a step, from its first arrival on, of both bodies.
+
+        number: of the step in which it strikes.
         """
         pulse, sr = state.scratch.pulse[at], state.bank.sr
         table, flat, length_s = pulse_table(), int(pulse["flat"]), float(pulse["length_s"])
@@ -66,7 +67,7 @@ class OwnSound:
         return total
 
     def friction_pa2(self, state: State, number: int, drives: int, frames: int) -> dict[int, float]:
-        """Sum of p² over a step's samples of each pair that rubs in it, by its place among the pairs."""
+        """Sum p² over a step's samples of each pair with friction, by its place among the pairs."""
         found, scratch, sr = {}, state.scratch, state.bank.sr
         for d in range(drives):
             force = scratch.force[d * frames : (d + 1) * frames] / sr
@@ -124,7 +125,7 @@ def _spectrum(f_tau: Array, flat: int) -> Array:
 
 
 def _free(pole: Array, amplitude: Array, frames: int) -> Array:
-    """(frames,) Re Σ amplitude · poleⁿ."""
+    """Compute Re Σ amplitude · poleⁿ (frames,)."""
     if frames <= 0 or not len(pole):
         return np.zeros(max(frames, 0))
     near, far = np.arange(GROUP), np.arange(-(-frames // GROUP))

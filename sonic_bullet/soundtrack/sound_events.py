@@ -1,15 +1,15 @@
-"""When what sounds, and why: impacts, rolling and sliding as the run time takes them, and contacts that stay silent.
+"""Sound events: impacts, rolling and sliding as the run time plays them, and silent contacts, with the reason.
 
     ContactLog -> render_apart, step by step -> EventWitness: PULSE (strikes that are accepted), drives (friction), PAIR
-        -> one impact of all pulses that a strike was told in; steps of one kind -> one span -> SoundEvent
-        + what each sends by itself (own_sound.py) -> level at the first microphone
+        -> one impact of all pulses of a strike; steps of one kind -> one span -> SoundEvent
+        + the sound of each alone (own_sound.py) -> level at the first microphone
 
 Table, cues, overlay and picture show this one list.
 
 Nothing is judged here a second time: an impact is a pulse that the run time plays (render.strike_pulses), a roll or a
-slide a pair whose surface voice makes a force (render.friction). Which of both is by slip: a contact that slips faster
-than it must to be heard slides. What carries load and does neither is support; a load that leaps and is not accepted
-is a strike without a cause.
+slide a pair whose contact oscillator makes a force (render.friction). Slip decides which of both: a contact slides
+where it slips faster than the least audible sweep. What carries load and does neither is support; a load that leaps and
+is not accepted is a strike without a cause.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from sonic_bullet.synth.strikes import NOW, SPAN
 IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED = "impact", "roll", "slide", "support", "uncaused strike"
 SOUNDING = (IMPACT, ROLL, SLIDE)
 LEVEL_S = 0.05
-"""How long after an impact arrives its peak is looked for: the ear's integration time for loudness is of that order,
-and the latest mode's first swing is over."""
+"""Time after an impact's arrival in which its peak is searched: the ear's integration time for loudness is of that
+order, and the latest mode's first swing is over."""
 CARRIES = "it carries weight: nothing strikes, and no surface sweeps past"
 NO_CAUSE = "nothing approached faster than gravity brings it while it rests"
 NO_VOICE = "neither body has modes, nor moves freely"
@@ -48,12 +48,16 @@ NO_VOICE = "neither body has modes, nor moves freely"
 class SoundEvent:
     """A contact of two bodies, from start_s to end_s (of an impact the start of its last pulse), physics time.
 
-    low, high: indices into the log's bodies. place_m (3,): world frame, where it begins. impulse_n_s: of an impact the
-    magnitude that the run time plays, else the load's time integral. speed_m_s: of an impact the approach, of a slide
-    the slip, of a roll the sweep, means by load. arrival_s: when its first sound is at the first microphone. level_db:
-    re 20 µPa there, of what this event alone makes both bodies send (`own_sound`), whatever else they ring with: the
-    peak within `LEVEL_S` of an impact, the rms of a roll or slide; None where it sends nothing, or it is no pressure.
-    reason: why it is silent, empty where it sounds.
+    Attributes
+    ----------
+    low, high : indices into the log's bodies
+    place_m : (3,) world frame, where it begins
+    impulse_n_s : of an impact the magnitude that the run time plays, else the load's time integral
+    speed_m_s : of an impact the approach, of a slide the slip, of a roll the sweep, means by load
+    arrival_s : when its first sound is at the first microphone
+    level_db : re 20 µPa there, of this event alone (`own_sound`), without what else its bodies ring with
+        The peak within `LEVEL_S` of an impact, the rms of a roll or slide; None where it is silent, or no pressure.
+    reason : why it is silent, empty where it sounds
     """
 
     kind: str
@@ -100,8 +104,9 @@ class _Moment(NamedTuple):
 
 @dataclass(slots=True)
 class _Run:
-    """Steps of a pair and a kind, from the first on; step: the last of `steps`, travel: sum of speeds times loads, own:
-    sum of p².
+    """Steps of a pair and a kind, from the first on.
+
+    step: the last of `steps`; travel: sum of speeds times loads; own: sum of p².
     """
 
     first: _Moment
@@ -118,14 +123,14 @@ class _Run:
         return cls(one, one.step, one.end_s, 1, one.impulse_n_s, travel, one.own)
 
     def add(self, other: _Run) -> None:
-        """Go on with what came next."""
+        """Append the next run."""
         self.step, self.end_s, self.steps = other.step, other.end_s, self.steps + other.steps
         self.load_n_s, self.travel = self.load_n_s + other.load_n_s, self.travel + other.travel
         self.own += other.own
 
 
 class EventWitness:
-    """Sees every step of a log's run; `events` are what it saw."""
+    """Observer of every step of a log's run; `events` are what it observed."""
 
     def __init__(self, log: ContactLog) -> None:
         self._log, self._steps, self._sr = log, iter(log.steps), log.sr
@@ -189,7 +194,7 @@ class EventWitness:
                 runs.append(_Run.of(moment))
 
     def _peak_pa(self, state: State, number: int, start_s: float, at: int, who: tuple[int, int]) -> float:
-        """Of the strike whose pulse this is, as far as it is known: what follows a step later is added to it."""
+        """Compute the peak of the strike that has this pulse, as far as it is known; later pulses are added to it."""
         if self._own is None:
             return 0.0
         sr = state.bank.sr
@@ -204,14 +209,14 @@ class EventWitness:
         return float(np.abs(sound).max())
 
     def _touching(self, number: int) -> Mapping[tuple[int, int], _Touch]:
-        """The pairs that touch in a step of the log; behind its last nobody does."""
+        """Return the pairs that touch in a step of the log; none after its last."""
         while number not in self._known:
             step, at = next(self._steps, None), max(self._known, default=-1) + 1
             self._known = {k: v for k, v in self._known.items() if k >= at - SPAN} | {at: touching_pairs(step)}
         return self._known[number]
 
     def events(self) -> tuple[SoundEvent, ...]:
-        """All of them in the order of their times, with their levels."""
+        """Return all events in the order of their times, with their levels."""
         order = sorted(self._seen, key=lambda one: (one.low, one.high, one.step, one.start_s))
         found: list[SoundEvent] = []
         for _, mine in groupby(order, key=lambda one: one[:2]):
@@ -244,7 +249,7 @@ class EventWitness:
 
 
 def touching_pairs(step: Step | None) -> Mapping[tuple[int, int], _Touch]:
-    """Each pair's contacts of a step as one: means by load."""
+    """Merge each pair's contacts of a step: means by load."""
     if step is None or not len(step.contacts.row):
         return {}
     row = step.contacts.row
@@ -266,7 +271,8 @@ def touching_pairs(step: Step | None) -> Mapping[tuple[int, int], _Touch]:
 
 
 def _strikes(pulses: list[_Moment], apart: int) -> list[list[_Moment]]:
-    """Pulses of one pair, those of one strike together: what a strike lacks when it is found follows a step later.
+    """Group the pulses of one pair by strike: what a strike lacks when it is found follows a step later.
+
     apart: steps within which one belongs to the one before.
     """
     groups: list[list[_Moment]] = []
@@ -279,8 +285,10 @@ def _strikes(pulses: list[_Moment], apart: int) -> list[list[_Moment]]:
 
 
 def _spans(runs: Sequence[_Run]) -> list[_Run]:
-    """Runs of one pair as spans of one kind; a kind that lasts less than `SPAN` steps, as manifolds flicker, belongs to
-    what was before it, and a gap of as much ends none.
+    """Merge runs of one pair to spans of one kind.
+
+    A kind that lasts less than `SPAN` steps, as manifolds flicker, belongs to the span before it, and a gap as short
+    ends none.
     """
     spans: list[_Run] = []
     for run in runs:
@@ -295,7 +303,7 @@ def _spans(runs: Sequence[_Run]) -> list[_Run]:
 
 
 def level_db(pressure_pa: float) -> float:
-    """Level re 20 µPa."""
+    """Compute the level re 20 µPa."""
     return 20 * float(np.log10(pressure_pa / REFERENCE_PRESSURE_PA))
 
 
@@ -306,7 +314,10 @@ def find_sound_events(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> tuple[SoundEvent, ...]:
-    """All events of a log, whose sound is made for it and not kept. Arguments, errors: as `render_apart` has them."""
+    """Find all events of a log, whose sound is rendered for it and not kept.
+
+    Arguments, errors: as of `render_apart`.
+    """
     witness = EventWitness(log)
     for _ in render_apart(log, sr=sr, witness=witness, progress=progress, say=say):
         pass
@@ -316,7 +327,7 @@ def find_sound_events(
 def cues_of(
     events: Sequence[SoundEvent], log: ContactLog, sr: int, frames: int, body: int | None = None
 ) -> tuple[Cue, ...]:
-    """Cue points where events are heard, of one body or all; those that the sound is too short for are left out."""
+    """Make cue points where events are heard, of one body or all; those after the end of the sound are left out."""
     return tuple(
         Cue(
             at,
@@ -330,10 +341,10 @@ def cues_of(
 
 
 def name_pair(event: SoundEvent, log: ContactLog) -> str:
-    """Both bodies' names."""
+    """Join both bodies' names."""
     return f"{log.bodies[event.low].name} - {log.bodies[event.high].name}"
 
 
 def _size(event: SoundEvent) -> str:
-    """In letters that every reader of RIFF knows."""
+    """Format an event's size in letters that every reader of RIFF knows."""
     return f"{event.impulse_n_s * 1e3:.3g} mN s" if event.kind == IMPACT else f"{event.speed_m_s:.3g} m/s"

@@ -1,11 +1,11 @@
-"""Who is seen in a film, and where at each of its pictures.
+"""Bodies of a film, and their poses at each of its pictures.
 
     ContactLog: models -> figures;  poses at step starts -> poses at k/fps, between two steps on the line (and the
         shorter arc) from one to the other
-    Standing (the scene's world at its end): what the log has no shape of
+    Standing (the scene's world at its end): shapes that the log lacks
 
-What sounds is drawn as its modes see it. A silent partner is in the log from its first touch on, and drawn where it was
-then before; who is never in the log stands where it is at the end.
+A body with modes is drawn as its model's surface. A silent partner is in the log from its first touch on, and before
+that drawn where it was then; a body that is never in the log is drawn where it is at the end.
 """
 
 from __future__ import annotations
@@ -37,16 +37,22 @@ COLOURS = {
 OTHER_COLOUR = (0.75, 0.72, 0.66)
 HOW_IT_IS_DRAWN = "film the scene, or, of an animation that was scored, give it a material in the table of score"
 WIDE_M = 20.0
-"""A figure wider than this is ground, which a camera need not take in."""
+"""A figure wider than this is ground, which need not be in view."""
 ELEVATION_RAD = np.radians(30)
 CLOSER = 0.8
-"""Share of the sphere around all that moves that the picture's height shows at least: its ends are air."""
+"""Fraction of the sphere around all that moves that the picture's height shows at least: its ends are air."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Staging:
-    """k figures in n pictures: position_m (n, k, 3), quaternion_xyzw (n, k, 4), shown (n, k); body (k,): index in the
-    log, -1 for who is not in it; step (n,): the physics step that each picture lies in. notes: what is not drawn.
+    """Figures (k) in n pictures.
+
+    Attributes
+    ----------
+    position_m, quaternion_xyzw, shown : (n, k, 3), (n, k, 4), (n, k)
+    body : (k,) index in the log, -1 for bodies that are not in it
+    step : (n,) the physics step that each picture lies in
+    notes : what is not drawn
     """
 
     figures: tuple[Figure, ...]
@@ -59,13 +65,13 @@ class Staging:
 
     @property
     def still(self) -> Array:
-        """(k,) who stands in one place in all pictures."""
+        """Which figures (k,) do not move in any picture."""
         stays = [(poses == poses[0]).all(axis=(0, 2)) for poses in (self.position_m, self.quaternion_xyzw)]
         return np.asarray(stays[0] & stays[1] & (self.shown == self.shown[0]).all(axis=0))
 
 
 def duration_of(log: ContactLog) -> Fraction:
-    """How long a log lasts, exactly."""
+    """Compute how long a log lasts, exactly."""
     clock = Clock()
     for block in log.blocks():
         for dt_s, steps in ((dt_s, len(list(same))) for dt_s, same in itertools.groupby(block.step["dt_s"].tolist())):
@@ -76,7 +82,7 @@ def duration_of(log: ContactLog) -> Fraction:
 
 
 def staged(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Standing] = ()) -> Staging:
-    """All figures at each picture. Raises SceneError where there is nothing to draw."""
+    """Stage all figures at each picture. Raises SceneError where there is nothing to draw."""
     places = {(one.body_id, one.link): one for one in standing}
     figures: list[Figure] = []
     index: list[int] = []
@@ -107,7 +113,7 @@ def _stack(rows: Sequence[Array], size: int) -> Array:
 
 
 def _figure(body: Body) -> Figure | None:
-    """What a body's model looks like; None where it has no surface."""
+    """Make a figure of a body's model; None where it has no surface."""
     if body.model is None or not len(body.model.face):
         return None
     name = body.material.name.lower() if body.material is not None else ""
@@ -116,7 +122,7 @@ def _figure(body: Body) -> Figure | None:
 
 
 def _poses(log: ContactLog, fps: Fraction, pictures: int, who: Array) -> tuple[Array, Array, Array, Array]:
-    """Poses (n, k, 3), (n, k, 4) of the bodies (k,), whether they are there, and each picture's step (n,)."""
+    """Compute poses (n, k, 3), (n, k, 4) of the bodies (k,), whether they are there, and each picture's step (n,)."""
     start_s = log.start_s
     time_s = np.arange(pictures) * float(1 / fps)
     step = np.maximum(np.searchsorted(start_s, time_s + 1e-9, side="right") - 1, 0)
@@ -144,7 +150,7 @@ def _poses(log: ContactLog, fps: Fraction, pictures: int, who: Array) -> tuple[A
 def _between(
     here: Step, after: Step | None, share: float, who: Array, position: Array, turned: Array
 ) -> tuple[Array, Array, Array]:
-    """Whether each is there, and its pose at a share of the step."""
+    """Interpolate whether each body is there, and its pose, at a fraction of the step."""
     at = np.minimum(np.searchsorted(here.body, who), max(len(here.body) - 1, 0))
     there = (here.body[at] == who) if len(here.body) else np.zeros(len(who), bool)
     position, turned = position.copy(), turned.copy()
@@ -163,7 +169,7 @@ def _between(
 def chosen_camera(
     log: ContactLog, staging: Staging, eye_m: Sequence[float] | None = None, target_m: Sequence[float] | None = None
 ) -> Camera:
-    """The camera asked for, or one that takes in what moves, from where the first microphone is, seen from above."""
+    """Return the camera asked for, or one that shows what moves, from the first microphone's side, seen from above."""
     radius = np.array([_radius_m(figure) for figure in staging.figures])
     moves = np.ptp(staging.position_m, axis=0).max(axis=1) > 1e-3
     small = radius < WIDE_M

@@ -2,8 +2,8 @@
 
     ContactLog -> render_apart -> (b, channels, n) -> a KeptSound a body -> NN-NAME.wav, all with the mix's gain
 
-A body without a model sends nothing and has no stem. The sum over all stems is the mix to rounding, of double numbers
-in memory and of 32-bit ones in files.
+A body without a model is silent and has no stem. The sum over all stems is the mix to rounding, of double numbers in
+memory and of 32-bit ones in files.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ NAME_LENGTH = 60
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stem:
-    """What one body of a log sends: its index there, the name that its file has, its sound (channels, n) in pascals."""
+    """Stem of one body of a log: its index there, its file's name, its sound (channels, n) in pascals."""
 
     index: int
     name: str
@@ -48,10 +48,10 @@ def render_stems(
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> tuple[Stem, ...]:
-    """The sound of every body that can sound, all in one run; its sum is `render_log`'s. Beyond a few seconds it lies
-    in nameless temporary files.
+    """Render the sound of every body with a model, all in one run; the sum is `render_log`'s.
 
-    Arguments, errors: as `render_apart` has them; AudioError where there is no microphone.
+    Beyond a few seconds it lies in nameless temporary files. Arguments, errors: as of `render_apart`; AudioError where
+    there is no microphone.
     """
     if not log.sensors:
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
@@ -66,9 +66,7 @@ def render_stems(
 
 
 def stem_name(index: int, name: str) -> str:
-    """A file's name, without ending, for a body's: its number in the log keeps two of one name apart, and what no file
-    system takes becomes a line.
-    """
+    """Make a file's name, without ending, of a body's: its number in the log, and letters that file systems take."""
     plain = re.sub(r"[^\w-]+", "_", name.encode("utf-8", "replace").decode()).strip("_")
     return f"{index:02d}-{plain[:NAME_LENGTH] or 'body'}"
 
@@ -84,12 +82,17 @@ def write_stems(
     cues: Callable[[int], Sequence[Cue]] | None = None,
     time_reference: int = 0,
 ) -> Iterator[AudioReport]:
-    """Write a float32 WAV a stem into a folder, made where it is missing, one after another; each is whole or not
-    there.
+    """Write a float32 WAV a stem into a folder, made where it is missing, one after another; each whole or not at all.
 
-    gain_per_pa: of all, so that they add up; peak_dbfs, lufs: each to a level of its own instead, those as they are
-    that are silent, or too short or faint to have a loudness.
-    cues: a stem's own, by its body's index. Raises FileError, AudioError.
+    Parameters
+    ----------
+    gain_per_pa : of all, so that they add up
+    peak_dbfs, lufs : each to its own level instead; silent ones, or too short or faint for a loudness, stay as they are
+    cues : a stem's own, by its body's index
+
+    Raises
+    ------
+    FileError, AudioError
     """
     place = Path(folder)
     try:
@@ -104,7 +107,7 @@ def write_stems(
 
 
 def _own_level(sound: KeptSound, sr: int, peak_dbfs: float | None, lufs: float | None) -> FileLevel | None:
-    """The level asked for, None where it cannot be given or none is."""
+    """Find the level asked for, None where it cannot be reached or none is asked for."""
     if peak_dbfs is None and lufs is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""A Timeline as OpenTimelineIO has it: tracks of one clip each, times in samples at the rate, pictures at theirs.
+"""A Timeline for OpenTimelineIO: tracks of one clip each, times in samples at the rate, pictures at theirs.
 
 SoundItem -> Track(Audio)[Clip(source_range 0, frames @ sr, ExternalReference path)]
 FilmItem  -> Track(Video)[Clip(source_range 0, pictures @ fps)]
@@ -14,14 +14,14 @@ from sonic_bullet.soundtrack.editing.timeline import Timeline
 
 
 def is_installed() -> bool:
-    """Whether OpenTimelineIO is there, an extra."""
+    """Return whether OpenTimelineIO is installed, an extra."""
     from importlib.util import find_spec
 
     return find_spec("opentimelineio") is not None
 
 
 def otio_timeline(timeline: Timeline) -> bytes:
-    """The text of NAME.otio."""
+    """Write the text of NAME.otio."""
     from opentimelineio import adapters, opentime, schema
 
     def clip(name: str, path: str, count: int, rate: float) -> Any:

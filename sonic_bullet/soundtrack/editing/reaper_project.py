@@ -17,11 +17,11 @@ from collections.abc import Iterator
 from sonic_bullet.soundtrack.editing.timeline import Timeline
 
 VERSION = '0.1 "6.0"'
-"""Of the format: fields that it lacks have their defaults in any later Reaper."""
+"""Version of the format: fields that it lacks have their defaults in any later Reaper."""
 
 
 def reaper_project(timeline: Timeline) -> bytes:
-    """The text of NAME.rpp."""
+    """Write the text of NAME.rpp."""
     return "\n".join([*_lines(timeline), ""]).encode("utf-8", "replace")
 
 
@@ -48,7 +48,7 @@ def _lines(timeline: Timeline) -> Iterator[str]:
 def _track(
     name: str, path: str, source: str, length: str, *, channels: int, muted: bool = False, volume: int = 1
 ) -> Iterator[str]:
-    """A track with one item that begins where the project does."""
+    """Write a track with one item that begins where the project does."""
     yield "  <TRACK"
     yield f"    NAME {_quoted(name)}"
     yield f"    VOLPAN {volume} 0 -1 -1 1"
@@ -70,7 +70,7 @@ def _seconds(samples: int, sr: int) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text within a quotation mark that it does not hold; where it holds all, backticks become apostrophes."""
+    """Quote a text with a mark that it does not hold; where it holds all, backticks become apostrophes."""
     plain = " ".join(text.split())
     mark = next((mark for mark in "\"'`" if mark not in plain), "`")
     return mark + (plain.replace("`", "'") if mark in plain else plain) + mark

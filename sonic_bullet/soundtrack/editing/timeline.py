@@ -1,4 +1,4 @@
-"""What stands where on a timeline, counted in samples.
+"""Items of a timeline and their positions, counted in samples.
 
 All begin together, at `begins`: stems and mix are of one length, a film lasts whole pictures. Paths are those within
 the session's folder, so that it may be moved.
@@ -27,7 +27,7 @@ class SoundItem:
 
 @dataclass(frozen=True, slots=True)
 class FilmItem:
-    """A film: path, pictures, pictures a second. Its sound is the mix's, so it is not heard."""
+    """A film: path, pictures, pictures a second. Its sound is the mix's, so it is muted."""
 
     path: str
     pictures: int
@@ -36,8 +36,10 @@ class FilmItem:
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """name: of the scene. sr: in Hz. sounds: a track each. markers: from the first sample on. begins: the first sample
-    on the timeline that the session is for.
+    """Timeline of a session.
+
+    name: of the scene; sr: in Hz; sounds: a track each; markers: from the first sample on; begins: the first sample on
+    the timeline that the session is for.
     """
 
     name: str

@@ -1,6 +1,4 @@
-"""An animation by value: bodies, and where each is at each frame. Every reader makes one, every method of scoring takes
-one.
-"""
+"""An animation by value: bodies, and their poses at each frame; made by every reader, taken by every scoring method."""
 
 from __future__ import annotations
 
@@ -19,18 +17,18 @@ from sonic_bullet.records.errors import AnimationError
 
 SLOWEST_FPS, FASTEST_FPS = 5.0, 10_000.0
 STILL_M, STILL_RAD = 1e-5, 1e-4
-"""What moves less from its first pose all the time does not move: a hundredth of a millimetre."""
+"""A body that moves less from its first pose all the time does not move: a hundredth of a millimetre."""
 
 
 UNIT = 0.1
-"""By how much the length of a quaternion may differ from 1: rounding, and keys that are blended linearly."""
+"""Deviation of a quaternion's length from 1 allowed: rounding, and keys that are blended linearly."""
 QUARTER_RAD = np.pi / 2
-"""A turn from frame to frame above which the frame rate hides how a body turns: between frames turns are known but for
-whole ones, and the next that fits, 2π less this one the other way, is no three times as fast."""
+"""Rotation from frame to frame above which the frame rate hides how a body rotates: it is known but for whole turns,
+and the next that fits, 2π less this one the other way, is no three times as fast."""
 
 
 def check_orientations(names: Sequence[str], turn: Array) -> None:
-    """Raise AnimationError, with body and frame, where a quaternion (t, b, 4) is no number or has not the length 1."""
+    """Raise AnimationError, with body and frame, where a quaternion (t, b, 4) is not finite or has not the length 1."""
     if turn.ndim != 3 or turn.dtype.kind not in "fiu":
         return  # the record's own check says so
     length = np.linalg.norm(turn.astype(float), axis=2)
@@ -47,9 +45,14 @@ def check_orientations(names: Sequence[str], turn: Array) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Animation:
-    """fps frames a second. position_m (t, b, 3), quaternion_xyzw (t, b, 4): body frames (centre of mass, principal
-    axes) in a right-handed world. gravity_m_s2 (3,). materials: by a body's name, a preset's name or file; who is not
-    in it is a silent partner.
+    """Bodies and their poses at each frame.
+
+    Attributes
+    ----------
+    fps : frames a second
+    position_m, quaternion_xyzw : (t, b, 3), (t, b, 4) body frames (centre of mass, principal axes), right-handed world
+    gravity_m_s2 : (3,)
+    materials : by a body's name, a preset's name or file; other bodies are silent partners
     """
 
     fps: float
@@ -60,6 +63,7 @@ class Animation:
     materials: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Check the numbers, and that something moves."""
         remedy = "give a frame rate from 5 to 10000"
         fps = as_number(self.fps, "fps", remedy, least=SLOWEST_FPS, most=FASTEST_FPS, error=AnimationError)
         bodies = as_kinds(self.bodies, AnimatedBody, "bodies", "give AnimatedBody", error=AnimationError)
@@ -86,29 +90,31 @@ class Animation:
             raise AnimationError("nothing moves in the animation", "bake the simulation to keyframes, and export those")
 
     def __len__(self) -> int:
+        """Return the number of frames."""
         return len(self.position_m)
 
     @property
     def moving(self) -> Array:
-        """(b,) who is ever elsewhere than in the first frame."""
+        """Which bodies (b,) ever leave their first pose."""
         away = np.abs(self.position_m - self.position_m[0]).max(axis=(0, 2)) > STILL_M
         same = np.abs((self.quaternion_xyzw * self.quaternion_xyzw[0]).sum(axis=2)).min(axis=0)
         return np.asarray(away | (2 * np.arccos(np.clip(same, 0, 1)) > STILL_RAD))
 
     @property
     def free(self) -> Array:
-        """(b,) who is moved by gravity and contacts alone."""
+        """Which bodies (b,) are moved by gravity and contacts alone."""
         return np.array([one.mass_kg > 0 and not one.driven for one in self.bodies], bool)
 
     @property
     def turn_rad(self) -> Array:
-        """(t - 1, b) angle by which each turns from frame to frame, whole turns left out."""
+        """Angle (t - 1, b) by which each body rotates from frame to frame, without whole turns."""
         return np.asarray(np.linalg.norm(rotation(self.quaternion_xyzw[:-1], self.quaternion_xyzw[1:]), axis=-1))
 
     def poses(self) -> Array:
-        """MOTION (t, b) of all frames, with the mean speeds since the frame before; in the first, those since a frame
-        before it that gravity alone would have led from. A semi-implicit integrator starts its step with just these:
-        x(n) = x(n-1) + v(n)·dt.
+        """Return MOTION (t, b) of all frames, with the mean speeds since the frame before.
+
+        In the first frame, those since a frame before it that gravity alone would have led from. A semi-implicit
+        integrator starts its step with just these: x(n) = x(n-1) + v(n)·dt.
         """
         motion = np.zeros(self.position_m.shape[:2], MOTION)
         motion["position_m"], motion["quaternion_xyzw"] = self.position_m, self.quaternion_xyzw

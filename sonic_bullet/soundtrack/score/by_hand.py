@@ -1,12 +1,11 @@
-"""Scripts that move bodies by hand: who is driven step by step sounds as an animation does, who is set elsewhere once
-is a teleport, and silent.
+"""Kinematic bodies of a script: bodies driven step by step sound as an animation, a single teleport is silent.
 
     ContactLog, shapes -> moves of each body -> Animation of all, driven ones marked
-        -> momentum less what the simulated contacts gave -> places of driven pairs, fitted (impulse_fit.py)
+        -> momentum less that of the simulated contacts -> places of driven pairs, fitted (impulse_fit.py)
         -> the log with their rows, rendered as any other
 
-PyBullet's own contacts of a body that is reset every step say what its solver would have done, not what the hand did:
-those rows are dropped (listener), and bodies of mass 0 make none with each other.
+PyBullet's own contacts of a body that is reset every step show what its solver would have done, not what the script
+did: those rows are dropped (listener), and bodies of mass 0 make none with each other.
 """
 
 from __future__ import annotations
@@ -27,13 +26,15 @@ from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animatio
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 
 DRIVEN_STEPS = 4
-"""Steps in a row that a hand moves a body at least: the shortest load that the run time takes for lasting, too."""
+"""Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting, too.
+Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting, too."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moves:
-    """How a body of the log (its index) was moved by hand: steps (first, one after the last) of each drive, and the
-    steps before which it was set elsewhere alone.
+    """How the script moved a body of the log (its index).
+
+    Steps (first, one after the last) of each drive, and the steps before which it was teleported alone.
     """
 
     index: int
@@ -42,7 +43,7 @@ class Moves:
 
 
 def moves_of(log: ContactLog) -> tuple[Moves, ...]:
-    """Who of a log was moved by hand: marked as moved by whoever listened, or of mass 0 and elsewhere than before."""
+    """Find the kinematic bodies of a log: marked as teleported, or of mass 0 and elsewhere than before."""
     by_hand = np.zeros((len(log.steps), len(log.bodies)), bool)
     before: Step | None = None
     mass = np.array([one.mass_kg for one in log.bodies])
@@ -67,7 +68,7 @@ def moves_of(log: ContactLog) -> tuple[Moves, ...]:
 
 
 def move_notes(log: ContactLog, moves: Sequence[Moves]) -> tuple[str, ...]:
-    """What a user should read of them: one line a body."""
+    """Return notes on them: one line a body."""
     start_s, said = log.start_s, []
     for one in moves:
         name = log.bodies[one.index].name
@@ -88,9 +89,14 @@ def scored_by_hand(
     moves: Sequence[Moves],
     progress: Callable[[float], None] | None = None,
 ) -> ContactLog:
-    """The log with the contacts of driven bodies. shapes: of bodies by their index. Raises AnimationError where bodies
-    come or go, steps change their length, or a driven body has no mass and no model to tell it; interrupted, the
-    exception carries the steps so far as ``log``.
+    """Add the contacts of driven bodies to the log. shapes: of bodies by their index.
+
+    Raises
+    ------
+    AnimationError
+        Bodies come or go, steps change their length, or a driven body has neither mass nor model.
+    KeyboardInterrupt
+        Interrupted, the exception carries the steps so far as ``log``.
     """
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
@@ -151,13 +157,14 @@ def _body(log: ContactLog, index: int, shapes: Mapping[int, tuple[Shape, ...]], 
 
 
 def _concerned(row: Array, driven: set[int]) -> Array:
-    """(k,) which CONTACT rows are of a driven body."""
+    """Return which CONTACT rows (k,) are of a driven body."""
     return np.isin(row["a"], list(driven)) | np.isin(row["b"], list(driven))
 
 
 def _given(step: Step, bodies: int, driven: set[int]) -> Array:
-    """(b, 6) linear and angular momentum that a step's simulated contacts give, about the centres of mass, those of
-    driven bodies left out.
+    """Sum linear and angular momentum (b, 6) of a step's simulated contacts, about the centres of mass.
+
+    Contacts of driven bodies are left out.
     """
     found, row = np.zeros((bodies, 6)), step.contacts.row[~_concerned(step.contacts.row, driven)]
     frame = matrices(step.quaternion_xyzw)
@@ -168,7 +175,7 @@ def _given(step: Step, bodies: int, driven: set[int]) -> Array:
 
 
 def _merged(step: Step, made: Step, driven: set[int], moves: Sequence[Moves], number: int) -> Step:
-    """A step with the rows of driven bodies as they were fitted; who is driven in it was not moved elsewhere."""
+    """Replace the rows of driven bodies in a step by the fitted ones; a body driven in it is not teleported."""
     at_hand = np.array([any(a <= number < b for a, b in one.drives) for one in moves], bool)
     moved = step.teleported.copy()
     moved[[one.index for one, yes in zip(moves, at_hand, strict=True) if yes]] = False

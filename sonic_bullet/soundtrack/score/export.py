@@ -1,4 +1,4 @@
-"""What an export says of its objects, and the bodies that it becomes.
+"""Objects of an export, and the bodies that they become.
 
     object frame: meshes, mass where stated, poses of each frame          (gltf.py, keyframes.py)
         -> rules by name, density × volume -> centre of mass, principal axes -> Animation, poses of the body frames
@@ -23,12 +23,12 @@ from sonic_bullet.soundtrack.score.animation import Animation, check_orientation
 
 ONE_SPOT_M = 1e-4
 RESTITUTION, FRICTION = 0.7, 0.7
-"""Of a body where nobody says: the pair's are products, 0.5 and 0.5."""
+"""Of a body where none is stated: the pair's are products, 0.5 and 0.5."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rule:
-    """What holds for objects whose name matches a pattern (* and ?); None: nothing is said."""
+    """What holds for objects whose name matches a pattern (* and ?); None: not stated."""
 
     name: str
     material: str | None = None
@@ -40,9 +40,14 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExportedObject:
-    """An object as its export has it. mesh: vertices (v, 3) in m and faces (f, 3), object frame; or shapes. stated:
-    what the export itself says of it; inertia_kg_m2 (3,): principal moments along the object's axes, with that mass.
-    position_m (t, 3), quaternion_xyzw (t, 4): of its origin.
+    """An object of an export.
+
+    Attributes
+    ----------
+    position_m, quaternion_xyzw : (t, 3), (t, 4) of its origin
+    mesh : vertices (v, 3) in m and faces (f, 3), object frame; or shapes
+    stated : what the export itself states
+    inertia_kg_m2 : (3,) principal moments along the object's axes, with that mass
     """
 
     name: str
@@ -67,10 +72,10 @@ class Export:
 def assembled(
     export: Export, rules: Sequence[Rule] = (), default: str | None = None
 ) -> tuple[Animation, tuple[str, ...]]:
-    """The animation, and notes a user should read. What the export states comes before rules, the first of them before
-    others; default: material of what moves and has none.
+    """Assemble the animation, and notes for the user.
 
-    Raises AnimationError, and MaterialError for an unknown material.
+    What the export states comes before rules, the first of them before others; default: material of bodies that move
+    and have none. Raises AnimationError, and MaterialError for an unknown material.
     """
     from sonic_bullet.presets import load_material
 
@@ -110,7 +115,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _stated_of(one: ExportedObject, rules: Sequence[Rule]) -> Rule:
-    """What export and rules say of an object."""
+    """Combine what export and rules state of an object."""
     found = one.stated
     for rule in rules:
         if fnmatchcase(one.name, rule.name):
@@ -124,7 +129,7 @@ def _stated_of(one: ExportedObject, rules: Sequence[Rule]) -> Rule:
 
 
 def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple[AnimatedBody, Array, Array]:
-    """The body, its centre of mass in the object frame, and the quaternion of its principal axes there."""
+    """Build the body, its centre of mass in the object frame, and the quaternion of its principal axes there."""
     centre, axes, moments, mass = np.zeros(3), np.array([0.0, 0, 0, 1]), np.zeros(3), 0.0
     shapes = one.shapes
     if one.mesh is not None:
@@ -160,7 +165,7 @@ def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple
 
 
 def _solid(vertex: Array, face: Array, density: float) -> tuple[Array, Array, Array, float]:
-    """Centre of mass, quaternion of the principal axes, principal moments and mass of a closed mesh."""
+    """Compute centre of mass, quaternion of the principal axes, principal moments and mass of a closed mesh."""
     from scipy.spatial.transform import Rotation
 
     mass, centre, moment = inertia(vertex, face, density)
@@ -170,7 +175,7 @@ def _solid(vertex: Array, face: Array, density: float) -> tuple[Array, Array, Ar
 
 
 def _primitive(shape: Shape, density: float) -> tuple[Array, float]:
-    """Principal moments and mass of a sphere, box or cylinder [Goldstein, Classical Mechanics, ch. 5]."""
+    """Compute principal moments and mass of a sphere, box or cylinder [Goldstein, Classical Mechanics, ch. 5]."""
     x, y, z = shape.size_m
     if shape.kind == "sphere":
         mass = density * 4 / 3 * np.pi * x**3
@@ -184,14 +189,14 @@ def _primitive(shape: Shape, density: float) -> tuple[Array, float]:
 
 
 def _times(first: Array, second: Array) -> Array:
-    """Quaternions (t, 4) of the turn `first` after the turn `second` (4,)."""
+    """Multiply quaternions (t, 4): rotation `first` after rotation `second` (4,)."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray((Rotation.from_quat(first) * Rotation.from_quat(second)).as_quat())
 
 
 def _check_apart(names: Sequence[str], place: Array, turn: Array, moving: Array) -> None:
-    """Raise AnimationError where two bodies stand in one spot all the time: an object exported twice."""
+    """Raise AnimationError where two bodies coincide all the time: an object exported twice."""
     for i in range(len(names)):
         for j in range(i + 1, len(names)):
             if (moving[i] or moving[j]) and np.abs(place[:, i] - place[:, j]).max() < ONE_SPOT_M:

@@ -1,4 +1,4 @@
-"""What free flight says of an animation: gravity, and with it the scale; noise of the poses; who is moved by hand.
+"""Estimates from free flight: gravity, and with it the scale; noise of the poses; driven bodies.
 
 a(k) = (x(k+n) - 2x(k) + x(k-n)) (fps/n)²    in flight a = g, and of a noise σ in the poses √6 σ (fps/n)² is left
 a hidden impulse: 5 √6 m σ fps               five standard deviations of m times the second difference's speed
@@ -14,7 +14,7 @@ from sonic_bullet.soundtrack.score.animation import QUARTER_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import near_pairs, speeds
 
 STEADY = 0.1
-"""Share by which an acceleration may change from frame to frame and still be a fall: air, and float32 poses."""
+"""Relative change of an acceleration from frame to frame that is still a fall: air, and float32 poses."""
 LEAST_FRAMES = 4
 FALL_RANGE = (0.02, 5.0)
 """Falls below are a slow motion of 1:7, and above another unit of length."""
@@ -22,21 +22,22 @@ HANDED = 0.5
 NEAR_M = 5e-3
 SIGMAS = 5.0
 REST_FRAMES, WHITE, QUIETER = 16, 5.0, 4.0
-"""Frames of a rest that tells noise; see _rests."""
+"""Frames of a rest from which noise is estimated; see _rests."""
 MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
 
 
 def accelerations(animation: Animation, apart: int = 1) -> Array:
-    """(t - 2 apart, b, 3) in m/s², from poses so many frames apart."""
+    """Compute accelerations (t - 2 apart, b, 3) in m/s², from poses so many frames apart."""
     x = animation.position_m
     second = x[2 * apart :] - 2 * x[apart : len(x) - apart] + x[: -2 * apart]
     return np.asarray(second * (animation.fps / apart) ** 2)
 
 
 def frames_apart(animation: Animation, noise_m: float | None, within_m_s2: float) -> int:
-    """How many frames apart poses tell an acceleration from noise: 5 √6 √3 σ (fps/n)², of all three coordinates, is no
-    more than this.
+    """Return how many frames apart poses resolve an acceleration above noise.
+
+    5 √6 √3 σ (fps/n)², of all three coordinates, is no more than it.
     """
     noise_m_s2 = 0.0 if noise_m is None else SIGMAS * float(np.sqrt(18)) * noise_m * animation.fps**2
     frames = int(np.ceil(np.sqrt(noise_m_s2 / max(within_m_s2, 1e-12))))
@@ -44,7 +45,7 @@ def frames_apart(animation: Animation, noise_m: float | None, within_m_s2: float
 
 
 def _steady(a: Array, animation: Animation) -> Array:
-    """(a - 1, b) whether an acceleration is the next frame's too, downwards, and some."""
+    """Return (a - 1, b) whether an acceleration is the next frame's too, downwards, and not small."""
     down = animation.gravity_m_s2
     size = np.linalg.norm(a, axis=2)
     same = np.linalg.norm(a[1:] - a[:-1], axis=2) < STEADY * size[:-1]
@@ -53,8 +54,9 @@ def _steady(a: Array, animation: Animation) -> Array:
 
 
 def fall_m_s2(animation: Animation, noise_m: float | None = None) -> float | None:
-    """With what acceleration bodies fall; None where nobody does steadily. Who leans on something falls slower, nobody
-    faster: the fastest tenth is free.
+    """Estimate the acceleration of falling bodies; None where none falls steadily.
+
+    A body that leans on something falls slower, none faster: the fastest tenth is free.
     """
     within_m_s2 = STEADY * float(np.linalg.norm(animation.gravity_m_s2))
     a = accelerations(animation, frames_apart(animation, noise_m, within_m_s2))
@@ -65,7 +67,7 @@ def fall_m_s2(animation: Animation, noise_m: float | None = None) -> float | Non
 
 
 def alone(animation: Animation, stage: PoseStage) -> Array:
-    """(t, b) who is so far from everybody that it touches nobody from a frame before to a frame after."""
+    """Return (t, b) which bodies touch no other from a frame before to a frame after, by their distance."""
     motion, step_s = animation.poses(), 1 / animation.fps
     fall_m = float(np.linalg.norm(animation.gravity_m_s2)) * step_s**2
     speed_m_s = np.stack([speeds(one, stage.reach_m) for one in motion])
@@ -78,9 +80,10 @@ def alone(animation: Animation, stage: PoseStage) -> Array:
 
 
 def pose_noise_m(animation: Animation, apart: Array) -> float | None:
-    """Standard deviation of the noisiest coordinate of the poses, from the third differences of flights, in which a
-    parabola has none, or else of what rests; None where nobody does either. What rests shows no rounding. apart (t, b):
-    who is near nobody.
+    """Estimate the standard deviation of the noisiest coordinate of the poses; None where nothing flies or rests.
+
+    From the third differences of flights, in which a parabola has none, or else of bodies at rest, which show no
+    rounding. apart (t, b): which bodies are near no other.
     """
     flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
     who = animation.free & animation.moving
@@ -94,9 +97,10 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
 
 
 def _rests(position_m: Array) -> Array:
-    """(t - 3, b) third differences in `REST_FRAMES` of white noise alone. In every coordinate mean squares of third
-    differences are ten times those of first ones, 20 σ² and 2 σ²; where something moves they are less. Nobody is much
-    quieter at any time: what rattles dies away, noise does not.
+    """Return (t - 3, b) third differences in `REST_FRAMES` of white noise alone.
+
+    In every coordinate mean squares of third differences are ten times those of first ones, 20 σ² and 2 σ²; where
+    something moves they are less. No such time is much louder than the quietest: rattling decays, noise does not.
     """
     found = np.zeros((max(len(position_m) - 3, 0), position_m.shape[1]), bool)
     if len(position_m) < REST_FRAMES or not position_m.shape[1]:
@@ -113,12 +117,12 @@ def _rests(position_m: Array) -> Array:
 
 
 def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
-    """The smallest impulse that is told from noise in the poses."""
+    """Compute the smallest impulse that can be distinguished from noise in the poses."""
     return SIGMAS * float(np.sqrt(6)) * mass_kg * noise_m * fps
 
 
 def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = None) -> Array:
-    """(b,) who is moved by hand though nobody says so: in most frames in which it touches nothing it does not fall."""
+    """Find bodies (b,) that are driven though not marked: in most frames without contact they do not fall."""
     pull = float(np.linalg.norm(animation.gravity_m_s2))
     found = np.array([one.driven for one in animation.bodies], bool)
     if pull == 0:
@@ -134,13 +138,15 @@ def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = No
 
 
 def hidden_turns(animation: Animation) -> Array:
-    """(t - 1, b) who turns so fast from a frame to the next that its poses do not tell how."""
+    """Return (t - 1, b) which bodies rotate so fast from a frame to the next that poses do not determine it."""
     return np.asarray((animation.turn_rad > QUARTER_RAD) & animation.free)
 
 
 def unforced(animation: Animation, noise_m: float | None) -> Array:
-    """(t - 1, b) who turns by a hidden amount, and whose centre falls as if nobody touched it: at either end of the
-    interval the second difference of its places is gravity's to `STEADY` of it and to what noise hides.
+    """Return (t - 1, b) which bodies rotate by a hidden amount while their centre falls as without contact.
+
+    At either end of the interval the second difference of its places is gravity's to `STEADY` of it and to what noise
+    hides.
     """
     fall_m_s = float(np.linalg.norm(animation.gravity_m_s2)) / animation.fps
     least_m_s = STEADY * fall_m_s + (0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps))

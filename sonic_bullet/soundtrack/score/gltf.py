@@ -1,12 +1,12 @@
 """glTF 2.0 and GLB with node animations -> Export [Khronos, glTF 2.0 Specification, 2021; sections in brackets].
 
     JSON, buffers (GLB chunk, data URI, file beside it) -> accessors [3.6.2]
-    nodes -> meshes that hang on them, samplers STEP, LINEAR, CUBICSPLINE [3.11, C.1-C.5] -> global transforms a frame
+    nodes -> their meshes, samplers STEP, LINEAR, CUBICSPLINE [3.11, C.1-C.5] -> global transforms a frame
 
-What is read is rigid motion of meshes: a scale that stays is part of the mesh, one that changes, a skin or a morph is
-refused. y is up and a metre is 1 [3.4]; here z is up: (x, -z, y), as Blender had it before it exported. What a node's
-`extras` say (Blender: custom properties) of material, restitution, friction, mass_kg, driven counts as stated, and so
-do mass and isKinematic of KHR_physics_rigid_bodies.
+What is read is rigid motion of meshes: a constant scale is part of the mesh; one that changes, a skin or a morph is
+refused. y is up and a metre is 1 [3.4]; here z is up: (x, -z, y), as in Blender before its export. Material,
+restitution, friction, mass_kg, driven in a node's `extras` (Blender: custom properties) count as stated, and so do mass
+and isKinematic of KHR_physics_rigid_bodies.
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ LATE_S = 1e-3
 _REMEDY = "export it again as glTF 2.0 (.glb)"
 REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 STRETCH = 1e-3
-"""Share by which a scale may change, or the axes of a transform be oblique, and still be rounding."""
+"""Relative change of a scale, or obliqueness of the axes of a transform, that is still rounding."""
 
 
 def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
-    """The rigid bodies of a .gltf or .glb, each frame of its animations. fps: of the frames; None: that of its
-    keyframes. scale: of lengths. Raises FileError, AnimationError.
+    """Read the rigid bodies of a .gltf or .glb, each frame of its animations.
+
+    fps: of the frames; None: that of its keyframes. scale: of lengths. Raises FileError, AnimationError.
     """
     place = Path(path)
     with reading(path, "glTF file", AnimationError, _REMEDY):
@@ -78,7 +79,7 @@ class _Sampler:
     turns: bool
 
     def at(self, time_s: Array) -> Array:
-        """(t, w) at these times, held before the first and after the last key [C.1 … C.5]."""
+        """Interpolate (t, w) at these times, held before the first and after the last key [C.1 … C.5]."""
         key, x = self.time_s, np.clip(time_s, self.time_s[0], self.time_s[-1])
         i = np.clip(np.searchsorted(key, x + 1e-6, side="right") - 1, 0, max(len(key) - 2, 0))
         j = np.minimum(i + 1, len(key) - 1)
@@ -101,7 +102,7 @@ class _Sampler:
 
 
 def _slerp(a: Array, b: Array, s: Array) -> Array:
-    """[C.4], Shoemake 1985."""
+    """Interpolate quaternions on the sphere [C.4], Shoemake 1985."""
     dot = (a * b).sum(axis=1, keepdims=True)
     b, dot = np.where(dot < 0, -b, b), np.minimum(np.abs(dot), 1.0)
     angle = np.arccos(dot)
@@ -111,7 +112,7 @@ def _slerp(a: Array, b: Array, s: Array) -> Array:
 
 
 def _channels(file: GltfTree) -> dict[int, dict[str, _Sampler]]:
-    """Samplers of each animated node, of all animations: what two of them say of one path, the first says."""
+    """Read the samplers of each animated node, of all animations; of two on one path the first counts."""
     found: dict[int, dict[str, _Sampler]] = {}
     for animation in file.tree.get("animations", ()):
         for channel in animation.get("channels", ()):
@@ -135,7 +136,7 @@ def _parents(file: GltfTree) -> dict[int, int]:
 
 
 def _needed(file: GltfTree) -> set[int]:
-    """Nodes that have a mesh, and those that they hang on."""
+    """Return the nodes that have a mesh, and their ancestors."""
     parent, found = _parents(file), set[int]()
     for one, node in enumerate(file.tree.get("nodes", ())):
         at: int | None = one if "mesh" in node else None
@@ -152,7 +153,7 @@ def _objects(
     known: dict[int, Array] = {}
 
     def world(i: int, depth: int = 0) -> Array:
-        """(t, 4, 4) of a node."""
+        """Compute the global transform (t, 4, 4) of a node."""
         if depth > len(nodes):
             raise AnimationError("its nodes hang on themselves", _REMEDY)
         if i not in known:
@@ -189,7 +190,7 @@ def _objects(
 
 
 def _local(node: Mapping[str, Any], own: Mapping[str, _Sampler], at_s: Array) -> Array:
-    """(t, 4, 4) of a node in its parent [3.5.3]."""
+    """Compute the transform (t, 4, 4) of a node in its parent [3.5.3]."""
     from scipy.spatial.transform import Rotation
 
     if "matrix" in node and not own:
@@ -207,8 +208,9 @@ def _local(node: Mapping[str, Any], own: Mapping[str, _Sampler], at_s: Array) ->
 
 
 def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
-    """What stays of a transform (t, 4, 4), (3, 3), and what moves, as positions (t, 3) and turns (t, 4): M = R S with
-    S that of the first frame [polar decomposition, Shoemake & Duff 1992].
+    """Split a transform (t, 4, 4) into a constant (3, 3), positions (t, 3) and rotations (t, 4).
+
+    M = R S with S that of the first frame [polar decomposition, Shoemake & Duff 1992].
     """
     from scipy.linalg import polar
     from scipy.spatial.transform import Rotation
@@ -228,7 +230,7 @@ def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
 
 
 def _mesh(file: GltfTree, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Vertices (v, 3) and triangles (f, 3) of all primitives of a mesh that are triangles [3.7.2]."""
+    """Read vertices (v, 3) and triangles (f, 3) of all primitives of a mesh that are triangles [3.7.2]."""
     vertices, faces, at = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
     for part in mesh.get("primitives", ()):
         if part.get("mode", 4) != 4:
@@ -245,7 +247,7 @@ def _mesh(file: GltfTree, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
 
 
 def _stated(name: str, node: Mapping[str, Any]) -> Rule:
-    """What a node says of itself; what is no number or text there is passed over."""
+    """Read what a node states of itself; values of another type are skipped."""
     extras: Mapping[str, Any] = node["extras"] if isinstance(node.get("extras"), dict) else {}
     body = (node.get("extensions") or {}).get("KHR_physics_rigid_bodies") or {}
     motion = body.get("motion") or {}

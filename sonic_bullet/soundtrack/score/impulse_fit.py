@@ -1,12 +1,12 @@
-"""From 120 poses a second up: the impulses that the second differences of the poses tell.
+"""Impulses from the second differences of the poses, from 120 poses a second up.
 
     m (x(k+1) - 2x(k) + x(k-1))/T - m g T = Σ_j J_j tri((t_j - t_k)/T)              tri: a triangle, 1 at 0, 0 at ±1
     L(k+½) - L(k-½)                       = Σ_j (p_j - x) × J_j tri(…)              L = R I Rᵀ ω, ω of the half step
 
-exact for linear momentum whatever happens within a frame (Taylor's theorem with the remainder as an integral, of which
+Exact for linear momentum whatever happens within a frame (Taylor's theorem with the remainder as an integral, of which
 the triangle is the kernel). For Bullet's own steps the triangle has one sample: the impulse of step k.
 
-    MOTION (t, b) -> second differences; who can touch -> places (PoseStage.closest)
+    MOTION (t, b) -> second differences; pairs that can touch -> places (PoseStage.closest)
         -> non-negative least squares of all bodies that touch each other, friction as a pyramid -> RAW of each frame
 
 min |W(A f - r)|², f >= 0, W the inverse square root of mass and inertia: the residual is a kinetic energy [Erleben
@@ -28,13 +28,15 @@ from sonic_bullet.soundtrack.score.animation import Animation
 TOUCH_M = 1.5e-3
 """How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""
 EVEN = 1e-4
-"""Ridge, of the largest singular value: what places of one face share is shared evenly."""
+"""Ridge, of the largest singular value: places of one face get even loads."""
 
 
 def momentum_changes(animation: Animation, motion: Array, hidden_m_s: float = 0.0) -> Array:
-    """(t, b, 6) linear and angular momentum (world, about the centre of mass) that contacts gave round each frame, in
-    N·s and N·m·s; zero in the first and last, of which nothing is known, and for who is not heavy. Who changes its
-    speed by less than hidden_m_s, and its spin by what is no more at its radius of gyration, changes neither.
+    """Compute linear and angular momentum (t, b, 6) that contacts gave round each frame, in N·s and N·m·s.
+
+    In the world, about the centre of mass; zero in the first and last frame, of which nothing is known, and for
+    massless bodies. A body that changes its speed by less than hidden_m_s, and its spin by no more at its radius of
+    gyration, changes neither.
     """
     mass = np.array([one.mass_kg for one in animation.bodies])
     step_s = 1 / animation.fps
@@ -72,9 +74,13 @@ def fit_steps(
     only: Set[int] | None = None,
     hidden_m_s: float = 0.0,
 ) -> None:
-    """Append MOTION (b,) and loaded RAW rows of each frame but the last. known (t, b, 6): momentum from contacts that
-    are known already; only: of pairs with one of these bodies, None: of all; hidden_m_s: a change of speed below that
-    is none, but noise in the poses.
+    """Append MOTION (b,) and loaded RAW rows of each frame but the last.
+
+    Parameters
+    ----------
+    known : (t, b, 6) momentum from contacts that are known already
+    only : of pairs with one of these bodies, None: of all
+    hidden_m_s : a smaller change of speed is noise in the poses
     """
     reach_m = stage.reach_m
     motion, step_s = animation.poses(), 1 / animation.fps
@@ -99,7 +105,7 @@ def fit_steps(
 
 
 def speeds(motion: Array, reach_m: Array) -> Array:
-    """(b,) at most, of any point of each."""
+    """Bound the speed (b,) of any point of each body."""
     return np.asarray(
         np.linalg.norm(motion["velocity_m_s"], axis=1) + np.linalg.norm(motion["spin_rad_s"], axis=1) * reach_m
     )
@@ -108,7 +114,7 @@ def speeds(motion: Array, reach_m: Array) -> Array:
 def near_pairs(
     motion: Array, reach_m: Array, margin_m: Array, static: Array, stage: PoseStage
 ) -> list[tuple[int, int]]:
-    """Pairs whose bounding boxes are near, one of which moves."""
+    """Return pairs whose bounding boxes are near, one of which moves."""
     low, high = stage.boxes(motion)
     low, high = low - margin_m[:, None], high + margin_m[:, None]
     meet = ((low[:, None] <= high[None]) & (high[:, None] >= low[None])).all(axis=2)
@@ -117,8 +123,9 @@ def near_pairs(
 
 
 def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: PoseStage, touch_m: float) -> Array:
-    """(k,) whether a place closes within the frame before or after: carried on with the speeds that it had, or back
-    with those that it has then.
+    """Return (k,) whether a place closes within the frame before or after.
+
+    It is moved on with its present speeds, or back with those of the later frame.
     """
     if not len(raw):
         return np.zeros(0, bool)
@@ -129,7 +136,7 @@ def _can_touch(raw: Array, before: Array, after: Array, step_s: float, stage: Po
 
 
 def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:
-    """Speed (k,) at which both bodies part along the normal."""
+    """Compute the speed (k,) at which both bodies separate along the normal."""
     v = [
         speeds["velocity_m_s"][i] + np.cross(speeds["spin_rad_s"][i], raw[point] - at["position_m"][i])
         for i, point in ((a, "point_a_m"), (b, "point_b_m"))
@@ -138,7 +145,7 @@ def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:
 
 
 def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage: PoseStage) -> Array:
-    """RAW rows with the forces whose impulses over a frame give each body its `change` (b, 6); others are gone."""
+    """Return the RAW rows with forces whose impulses over a frame give each body its `change` (b, 6), no others."""
     if not len(raw):
         return raw
     from scipy.optimize import nnls
@@ -155,7 +162,7 @@ def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage
     whiten = whitening(animation, motion)
     for rows in _components(a, b, movable, free):
         bodies = sorted({int(x) for x in (*a[rows], *b[rows]) if movable[x]})
-        # who is driven tells of forces only where nobody free does
+        # a driven body determines forces only where no free one does
         tells = [x for x in bodies if free[x]] or bodies
         row_of = {body: i for i, body in enumerate(tells)}
         matrix = np.zeros((6 * len(tells), 4 * len(rows)))
@@ -185,7 +192,7 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
 
 
 def whitening(animation: Animation, motion: Array) -> Array:
-    """(b, 6, 6) inverse square roots of mass and inertia in the world's axes; 0 for who has none."""
+    """Compute inverse square roots (b, 6, 6) of mass and inertia in the world's axes; 0 for massless bodies."""
     frame = matrices(motion["quaternion_xyzw"])
     found = np.zeros((len(animation.bodies), 6, 6))
     for i, body in enumerate(animation.bodies):
@@ -196,8 +203,9 @@ def whitening(animation: Animation, motion: Array) -> Array:
 
 
 def _components(a: Array, b: Array, movable: Array, free: Array) -> Sequence[Array]:
-    """Rows of places by the bodies that hang together through them: through free ones, and, where there is none in a
-    pair, through that pair alone.
+    """Group rows of places by the bodies that they connect.
+
+    Through free bodies, and, where there is none in a pair, through that pair alone.
     """
     parent = list(range(len(movable) + len(a)))
 

@@ -1,4 +1,4 @@
-"""Keyframes as plain files (docs/reference/animation.md), and tables of materials.
+"""Keyframes in plain files (docs/reference/animation.md), and tables of materials.
 
 NAME.json                      header with poses in it -> Export
 NAME.npz    header: its JSON as bytes; position (t, b, 3), quaternion_xyzw (t, b, 4) -> Export
@@ -69,8 +69,9 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
-    """The export that a .json or .npz of keyframes holds. fps: in place of its own; scale: of lengths, besides its
-    unit. Raises FileError, AnimationError.
+    """Read the export that a .json or .npz of keyframes holds.
+
+    fps: in place of its own; scale: of lengths, besides its unit. Raises FileError, AnimationError.
     """
     place = Path(path)
     with reading(path, "animation", AnimationError, _REMEDY):
@@ -97,7 +98,7 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
 
 
 def _numbers(arrays: Mapping[str, Array], name: str, bodies: int, width: int) -> Array:
-    """An array (frames, bodies, width) of floats of any precision."""
+    """Check an array (frames, bodies, width) of floats of any precision."""
     found = arrays.get(name, np.zeros(0))
     if found.ndim != 3 or found.shape[1:] != (bodies, width) or found.dtype.kind != "f":
         raise AnimationError(f"{name} is {shown(found)}", f"give floating-point numbers (frames, {bodies}, {width})")
@@ -116,7 +117,7 @@ def _poses(one: _Object) -> tuple[Array, Array]:
 
 
 def _whole(name: str, position: Array, turn: Array, frames: int) -> tuple[Array, Array]:
-    """Poses of all frames; one alone holds for all."""
+    """Broadcast poses to all frames; one alone holds for all."""
     for what, rows in (("position", position), ("quaternion_xyzw", turn)):
         if len(rows) not in (1, frames):
             raise AnimationError(
@@ -166,19 +167,19 @@ def _mesh(one: _Object, folder: Path) -> tuple[Array, Array]:
 
 
 def upright(vector: Array, up: str) -> Array:
-    """Vectors (…, 3) with z up: (x, y, z) of a world with y up is (x, -z, y)."""
+    """Turn vectors (…, 3) so that z is up: (x, y, z) of a world with y up is (x, -z, y)."""
     return vector if up == "z" else np.stack([vector[..., 0], -vector[..., 2], vector[..., 1]], axis=-1)
 
 
 def tipped(turn: Array) -> Array:
-    """Orientations (…, 4) of a world with y up in one with z up: a quarter turn about x after them."""
+    """Turn orientations (…, 4) of a world with y up to one with z up: a quarter turn about x after them."""
     x, y, z, w = np.moveaxis(np.asarray(turn, float), -1, 0)
     h = np.sqrt(0.5)
     return np.stack([h * (x + w), h * (y - z), h * (z + y), h * (w - x)], axis=-1)
 
 
 def read_rules(path: str | os.PathLike[str]) -> tuple[Rule, ...]:
-    """The rules of a table of materials, the first that says something wins. Raises FileError, AnimationError."""
+    """Read a table of materials; the first rule that states something counts. Raises FileError, AnimationError."""
     remedy = 'give a list such as [{"name": "cup*", "material": "porcelain"}]'
     with reading(path, "table of materials", AnimationError, remedy):
         if Path(path).stat().st_size > 1 << 20:

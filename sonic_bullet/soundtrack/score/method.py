@@ -1,4 +1,4 @@
-"""How the contacts of an animation are found, and the steps that the run time is given."""
+"""Choice of the method that finds an animation's contacts, and of the run time's steps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEP_HZ = 240.0
 
 
 def substeps_of(fps: float) -> int:
-    """Steps to a frame."""
+    """Return the number of steps to a frame."""
     return 1 if fps >= FIT_FROM_FPS else ceil(STEP_HZ / fps - 1e-9)
 
 
@@ -28,9 +28,9 @@ def find_steps(
     *,
     hidden_m_s: float = 0.0,
 ) -> None:
-    """Append MOTION (b,) at the start of each step with its loaded RAW rows: stopped, it leaves those so far.
+    """Append MOTION (b,) at the start of each step with its loaded RAW rows: interrupted, those so far stay.
 
-    hidden_m_s: the change of speed from frame to frame that is not told from noise in the poses.
+    hidden_m_s: the change of speed from frame to frame that noise in the poses hides.
     """
     if animation.fps >= FIT_FROM_FPS:
         fit_steps(animation, stage, found, progress, hidden_m_s=hidden_m_s)

@@ -1,4 +1,4 @@
-"""From a file of poses to a sound and a contact log.
+"""Sound and contact log of a file of poses.
 
 .glb .gltf .json .npz -> Export -> Animation -> checks -> steps (method.py) -> AnimatedWorld -> Listener -> RenderResult
 """
@@ -46,9 +46,10 @@ DEEP_M = 0.01
 
 
 def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
-    """What a file of poses says. fps: frames a second in place of its own; scale: of its lengths, 0.01 for centimetres.
+    """Read a file of poses.
 
-    Raises FileError, AnimationError.
+    fps: frames a second in place of its own; scale: of its lengths, 0.01 for centimetres. Raises FileError,
+    AnimationError.
     """
     place = Path(as_path(path, "path", "name an animation, such as take1.glb"))
     if place.suffix.lower() not in ENDINGS:
@@ -82,12 +83,18 @@ def score_animation(
     say: Callable[[str], None] | None = None,
     tail_db: float | None = None,
 ) -> RenderResult:
-    """The sound of a baked animation, its contact log, and notes a user should read.
+    """Compute the sound of a baked animation, its contact log, and notes for the user.
 
-    rules: what bodies are made of, by name, the first that says something wins; material: of what moves and has none;
-    tail_db: as `scene.render_scene` has it.
-    Raises SonicBulletError; where it was interrupted under way, the exception carries what was scored so far as
-    ``partial``.
+    Parameters
+    ----------
+    rules : materials of bodies, by name; the first that states something counts
+    material : of bodies that move and have none
+    tail_db : as of `scene.render_scene`
+
+    Raises
+    ------
+    SonicBulletError
+        Interrupted under way, the exception carries what was scored so far as ``partial``.
     """
     sr = check_sr(sr)
     notes: tuple[str, ...] = ()
@@ -109,7 +116,7 @@ def score_animation(
             animation = replace(animation, bodies=bodies)
             stage.bodies = bodies
             stage.held |= driven
-            noise_m = pose_noise_m(animation, apart)  # a hand's way is no noise
+            noise_m = pose_noise_m(animation, apart)  # driven motion is no noise
         say("who touches whom")
         steps: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
@@ -149,9 +156,9 @@ def score_scene(
     tail_db: float | None = None,
     **options: Any,
 ) -> RenderResult:
-    """A scene's sound with that of the bodies that it moves by hand (by_hand.py). options: of `scene.render_scene`.
+    """Compute a scene's sound with that of its kinematic bodies (by_hand.py). options: of `scene.render_scene`.
 
-    Raises what `render_scene` does, AnimationError where it drives nobody or its driven bodies cannot be scored;
+    Raises what `render_scene` does, AnimationError where it drives no body or its driven bodies cannot be scored;
     interrupted, the exception carries what was scored so far as ``partial``.
     """
     from sonic_bullet.render import render_kept
@@ -200,7 +207,7 @@ def _result(listener: Listener, notes: tuple[str, ...], tail_db: float | None = 
 
 
 def _check_fall(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
-    """Raise AnimationError where bodies fall as if a metre were something else."""
+    """Raise AnimationError where bodies fall as if lengths were in another unit."""
     found, expected = fall_m_s2(animation, noise_m), float(np.linalg.norm(animation.gravity_m_s2))
     if found is None or expected == 0:
         return ()
@@ -222,7 +229,7 @@ def _driven_notes(bodies: Sequence[AnimatedBody]) -> tuple[str, ...]:
 
 
 def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
-    """What noise in the poses hides, where it is more than a light touch."""
+    """Describe what noise in the poses hides, where it is more than a light touch."""
     if noise_m is None:
         return ()
     hidden = [(hidden_n_s(one.mass_kg, noise_m, animation.fps), one.name) for one in animation.bodies if one.mass_kg]
@@ -239,9 +246,7 @@ def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]
 def _forced(
     animation: Animation, stage: PoseStage, steps: list[tuple[Array, Array]], alone: Array
 ) -> list[tuple[Array, Array]]:
-    """The steps without what touches a body while it turns by nobody knows how much, and falls as if nobody did. alone
-    (t - 1, b).
-    """
+    """Remove the contacts of bodies that rotate by a hidden amount and fall as without contact. alone (t - 1, b)."""
     each, made = substeps_of(animation.fps), []
     for number, (motion, raw) in enumerate(steps):
         mine, kept = alone[min(number // each, len(alone) - 1)], raw
@@ -252,7 +257,7 @@ def _forced(
 
 
 def _turn_notes(animation: Animation, hidden: Array) -> tuple[str, ...]:
-    """Whose turning the frame rate hides."""
+    """Describe the bodies whose rotation the frame rate hides."""
     said = []
     for i in np.flatnonzero(hidden).tolist():
         turn = animation.turn_rad[:, i]
@@ -268,7 +273,7 @@ def _turn_notes(animation: Animation, hidden: Array) -> tuple[str, ...]:
 
 
 def _deep_notes(steps: Sequence[tuple[Array, Array]], stage: PoseStage, hidden: Array) -> tuple[str, ...]:
-    """hidden (b,): whose turning is not known, and so not how deep it gets."""
+    """Describe deep overlaps. hidden (b,): whose rotation is not known, and so not how deep it gets."""
     deepest = 0.0
     for _, raw in steps:
         if len(raw):
@@ -280,7 +285,7 @@ def _deep_notes(steps: Sequence[tuple[Array, Array]], stage: PoseStage, hidden: 
 
 
 def rules_of(table: str | os.PathLike[str] | None) -> tuple[Rule, ...]:
-    """The rules of a table's file, none without one. Raises FileError, AnimationError."""
+    """Read the rules of a table's file, none without one. Raises FileError, AnimationError."""
     if table is None:
         return ()
     from sonic_bullet.soundtrack.score.keyframes import read_rules

@@ -1,13 +1,13 @@
-"""Below 120 poses a second: what happened between two frames is found by letting it happen.
+"""Contacts between frames by simulation, below 120 poses a second.
 
     pose k, speed v, restitution e -> PoseStage.shoot, 240 Hz -> pose' at k+1        pose' - pose(k+1) -> better v, e
 
 Single shooting with a prior [Press et al., Numerical Recipes, 3rd ed. 2007, sec. 18.1]: v is the speed with which the
-frame before ended, moved as little as it must be, and e what explains the next pose best,
+frame before ended, changed as little as possible, and e what explains the next pose best,
 
     min over v, e of  |pose'(v, e) - pose(k+1)|²/σ_x² + |v - v⁻|²/σ_v²
 
-by Gauss-Newton steps with differences, for all bodies that touch each other at once (an island); turns count by the
+by Gauss-Newton steps with differences, for all bodies that touch each other at once (an island); rotations count by the
 radius of gyration. Islands that do not meet are searched in the same shots. Impulses are read off the best shot.
 """
 
@@ -24,8 +24,9 @@ from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import whitening
 
 POSE_M, SPEED_M_S = 1e-4, 3e-2
-"""σ_x, σ_v: a pose is believed to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
-about a step of the simulation."""
+"""σ_x, σ_v: a pose is trusted to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
+about a step of the simulation.
+"""
 FIRST_SPEED_M_S = 3.0
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.65, 0.8, 0.95)
 NUDGE = 0.01  # m/s, and of restitution
@@ -49,8 +50,10 @@ class _Try:
 
 
 class Shooting:
-    """A search through an animation, frame by frame. substeps: steps of the simulation to a frame. hidden_m_s: as in
-    `find_steps`; what is not told from noise in a pose, its 5 σ, is hidden_m_s / (√6 fps).
+    """Search through an animation, frame by frame.
+
+    substeps: steps of the simulation to a frame. hidden_m_s: as in `find_steps`; noise in a pose, its 5 σ, hides
+    hidden_m_s / (√6 fps).
     """
 
     def __init__(self, animation: Animation, stage: PoseStage, substeps: int, hidden_m_s: float = 0.0) -> None:
@@ -94,8 +97,9 @@ class Shooting:
             found += self._corrected(before, owed)
 
     def _followed(self, end: Array, pose: Array, touching: Array) -> Array:
-        """Where the next frame begins: at its pose (b,), or, where noise hides the difference, where this one ended:
-        begun at poses anew, what rests, touching (b,), would fall a little in every frame.
+        """Choose where the next frame begins: at its pose (b,), or, where noise hides the difference, at this end.
+
+        Begun at poses anew, a body at rest, touching (b,), would fall a little in every frame.
         """
         good = np.sqrt(ENOUGH) * POSE_M
         hidden = np.where(touching, max(self._hidden_m, good), self._hidden_m if self._hidden_m >= POSE_M else 0.0)
@@ -105,8 +109,10 @@ class Shooting:
         return np.where(within, end, pose)
 
     def _corrected(self, shot: Shot, missing: Array) -> list[tuple[Array, Array]]:
-        """A frame's steps with its impulses scaled: what speed (b, 6) the next frame began with beyond that with which
-        this one ended, its touches gave too, each by a share of its own.
+        """Scale the impulses of a frame's steps, each strike by its own factor.
+
+        The speed (b, 6) with which the next frame began beyond that with which this one ended also came from its
+        contacts.
         """
         from scipy.optimize import lsq_linear
 
@@ -142,8 +148,9 @@ class Shooting:
         return list(zip(shot.motion[:-1], raws, strict=True))
 
     def _without_hidden(self, raws: list[Array], rows: list[tuple[int, int]]) -> None:
-        """A strike that changes the lighter one's speed by less than noise in the poses does is none: what carries
-        weight all the frame does so evenly, what touches for a moment does not.
+        """Remove a strike that changes the lighter body's speed by less than noise in the poses.
+
+        A load that lasts all the frame becomes even, a short one zero.
         """
         number, row = rows[0]
         who = self._stage.rows(np.array([raws[number][name][row] for name in ("body_a", "body_b")]))
@@ -160,7 +167,7 @@ class Shooting:
                     raws[number][name][row] *= mean / load[number]
 
     def _strikes(self, shot: Shot) -> dict[tuple[int, int, int], list[tuple[int, int]]]:
-        """(step, row) of the loaded places of a pair in steps without a pause, by pair and first step."""
+        """List (step, row) of a pair's loaded places in steps without a pause, by pair and first step."""
         found: dict[tuple[int, int, int], list[tuple[int, int]]] = {}
         last: dict[tuple[int, int], tuple[int, int]] = {}  # first step, and latest, of a pair
         for number, raw in enumerate(shot.raw):
@@ -192,7 +199,7 @@ class Shooting:
         return _Try(speed, restitution, shot, residual)
 
     def _searched(self, k: int) -> _Try:
-        """The best start found at frame k."""
+        """Search the best start at frame k."""
         best = self._shot(k, self._prior.copy(), self._given)
         best = self._flown(k, best)
         touching = best.shot.touching.copy()
@@ -220,7 +227,7 @@ class Shooting:
         return made
 
     def _flown(self, k: int, first: _Try) -> _Try:
-        """Bodies that touch nothing start with the speed that meets the next pose: one Newton step, twice for turns."""
+        """Set the speed of bodies without contact to meet the next pose: one Newton step, twice for rotations."""
         best = first
         for _ in range(2):
             alone = ~best.shot.touching.any(axis=1) & self._animation.free
@@ -242,7 +249,7 @@ class Shooting:
         return [free[label == i] for i in range(count)]
 
     def _merged(self, best: _Try, other: _Try, islands: list[Array]) -> _Try:
-        """Of each island the better start; the shot is the first's."""
+        """Take the better start of each island; the shot is the first's."""
         speed, restitution, residual = best.speed.copy(), best.restitution.copy(), best.residual.copy()
         for island in islands:
             if other.cost(island) < best.cost(island):
@@ -251,7 +258,7 @@ class Shooting:
         return _Try(speed, restitution, best.shot, residual)
 
     def _stepped(self, k: int, best: _Try, islands: list[Array], touching: Array) -> _Try:
-        """One Gauss-Newton step of every island, whole, halved or quartered."""
+        """Take one Gauss-Newton step of every island, whole, halved or quartered."""
         most = max(map(len, islands))
         columns: dict[int, list[Array]] = {i: [] for i in range(len(islands))}
         for member in range(most):
