@@ -1,1 +1,1 @@
-"""What the machine under us asks for: private folders, locked files that are not finished, compiled code, progress."""
+"""Platform: private folders, locked unfinished files, compiled code, progress, supervised processes."""

@@ -1,6 +1,6 @@
-"""An array as a kernel's helpers should see it: the same memory, without a count of who holds it.
+"""Arrays without reference count for a kernel's helpers: the same memory.
 
-numba counts references of each array that one compiled function hands another, atomically: some 5 ns a time and a
+numba counts references of each array that one compiled function passes to another, atomically: some 5 ns a time and a
 third of a kernel whose parts are small. A borrowed array has nothing to count, nor has a slice of it.
 """
 
@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 
 @intrinsic
 def borrowed(typingctx, array):
-    """The array. Only of an argument of the kernel: its caller keeps the memory."""
+    """Return the array without its count. Only for an argument of the kernel: its caller keeps the memory."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         view = cgutils.create_struct_proxy(signature.return_type)(context, builder, value=args[0])

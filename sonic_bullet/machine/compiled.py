@@ -1,12 +1,12 @@
-"""numba's njit for every kernel of this package, its machine code kept between processes where nobody else can put any.
+"""numba's njit for every kernel of this package, with machine code cached between processes in a private folder.
 
     @njit(...) -> kernel -> first call: kept? -> machine code
                                       no      -> compiled, kept
 
-numba's own cache=True keeps code beside the source or in a shared folder, believes what it reads there, and ends the
-import where neither can be written. Here it lies in a folder of mode 0700 that belongs to this user (NUMBA_CACHE_DIR,
-else the user's cache folder), and what cannot be read there is compiled anew (`sonic_bullet.machine.kept_code`).
-Where no such folder can be had kernels are compiled in every process.
+numba's own cache=True keeps code beside the source or in a shared folder and trusts what it reads there. Here code is
+kept in a folder of this user (NUMBA_CACHE_DIR/sonic_bullet, else the user's cache folder), and what cannot be read
+there is compiled anew (`sonic_bullet.machine.kept_code`). Where there is no such folder, kernels are compiled in every
+process.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ import numba
 from sonic_bullet.machine.user_folder import START, cache_folder, private_folder
 
 KNOWN_NUMBA = ["0", "68"]
-"""The release of numba whose inner parts `linked_once` stands on. Any other compiles as numba does by itself: the same
+"""The release of numba whose inner parts `linked_once` uses. With any other, numba's own compilation is used: the same
 results, a first run that takes three times as long.
 """
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """numba.njit with these options; the machine code is kept as the module's head says."""
+    """Apply numba.njit with these options; the machine code is cached."""
 
     def compiled(function: Callable[..., Any]) -> Any:
         kernel = _kernel(function, options)
@@ -56,7 +56,7 @@ def _kernel(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 
 @cache
 def folder() -> Path | None:
-    """Where machine code is kept; None for nowhere."""
+    """Return the folder of machine code; None for none."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
         return private_folder(START / given / "sonic_bullet")

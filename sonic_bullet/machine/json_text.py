@@ -1,4 +1,4 @@
-"""Whatever is written as JSON, by one encoder: strict, and the same for every command and every record.
+"""JSON output by one encoder: strict, and the same for every command and every record.
 
 value -> built-in types (numpy's scalars and arrays as what they hold) -> UTF-8 JSON; NaN and infinities -> null
 
@@ -33,7 +33,7 @@ def json_bytes(value: Any, *, indent: int | None = None) -> bytes:
 
 
 def _built_in(value: Any) -> Any:
-    """What a numpy value holds, as msgspec knows it."""
+    """Convert a numpy value to built-in types for msgspec."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()
     raise TypeError(f"a {type(value).__name__} has no form in JSON")

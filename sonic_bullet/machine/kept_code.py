@@ -1,11 +1,11 @@
-"""A cache for one numba kernel in a folder of this user's own; it stands on inner parts of numba, and
-`sonic_bullet.machine.compiled` does without where they moved.
+"""Cache of one numba kernel in a private folder.
 
-    index (signature -> file) | machine code, each: numba's bytes, written beside and replaced
+    index (signature -> file) | machine code, each: numba's bytes, written to a temporary file and renamed
 
-numba unpickles what it finds, so that the folder must be this user's alone (`sonic_bullet.machine.user_folder`). An
-error while code is loaded is a miss, one while it is kept costs the next run time. Code is of the sources it was
-compiled from, and those are not one file: `source_stamp`.
+It uses inner parts of numba, and `sonic_bullet.machine.compiled` does without where they moved. numba unpickles what it
+finds, so the folder must be this user's alone (`sonic_bullet.machine.user_folder`). An error while code is loaded is a
+miss, one while it is kept costs the next run time. Code is of the sources it was compiled from, and those are several
+files: `source_stamp`.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ class KeptFiles(IndexDataCacheFile):  # type: ignore[misc]
 
 @cache
 def source_stamp(source: Path) -> str:
-    """A digest of a module and of all of its own tree that it imports, and they import: what it calls, and the numbers
-    that it reads, stand in its machine code too.
+    """Digest a module and all modules of its own tree that it imports, directly or not.
+
+    What it calls, and the numbers that it reads, are in its machine code too.
     """
     digest, seen, todo = hashlib.sha256(), {source}, [source]
     while todo:
@@ -50,7 +51,7 @@ def source_stamp(source: Path) -> str:
 
 @cache
 def _read(source: Path) -> tuple[bytes, frozenset[Path]]:
-    """A module's text, and the files of those that its lines at the left margin import from the tree it stands in."""
+    """Return a module's text, and the files of its top-level imports from the tree it stands in."""
     root, content = source.parent, source.read_bytes()
     while (root / "__init__.py").exists():
         root = root.parent
@@ -63,7 +64,7 @@ def _read(source: Path) -> tuple[bytes, frozenset[Path]]:
 
 
 class _Locator:
-    """What numba asks: where a kernel's files lie, and what they were compiled from."""
+    """Locator for numba: where a kernel's files lie, and what they were compiled from."""
 
     def __init__(self, place: Path, function: Any) -> None:
         source = Path(function.__code__.co_filename).resolve()
@@ -71,25 +72,30 @@ class _Locator:
         self._path = place / f"{source.parent.name}_{hashlib.sha256(bytes(source.parent)).hexdigest()[:32]}"
 
     def get_cache_path(self) -> str:
+        """Return the folder of the kernel's files."""
         return str(self._path)
 
     def get_source_stamp(self) -> str:
+        """Return the digest of the sources."""
         return source_stamp(Path(self._py_file))
 
     def get_disambiguator(self) -> str:
+        """Return the kernel's line number."""
         return str(self._line)
 
     def ensure_cache_path(self) -> None:
+        """Make the folder."""
         self._path.mkdir(mode=0o700, exist_ok=True)
 
 
 class _Place:
-    """Stands where numba keeps its list of locators."""
+    """Replacement of numba's list of locators."""
 
     def __init__(self, place: Path) -> None:
         self._place = place
 
     def from_function(self, function: Any, source: str) -> _Locator:
+        """Return the locator of a function."""
         return _Locator(self._place, function)
 
 
@@ -100,9 +106,9 @@ class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel, below ``place``: whatever goes wrong with it costs time, never the result.
+    """numba's cache of one kernel, below ``place``: its failures cost time, never the result.
 
-    Raises whatever numba's inner parts raise where they are not what they were.
+    Raises whatever numba's inner parts raise where they have changed.
     """
 
     def __init__(self, function: Any, place: Path) -> None:
@@ -116,7 +122,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The kept code for a signature, None for a miss."""
+        """Load the kept code for a signature, None for a miss."""
         try:
             return self._loaded(sig, target_context)
         except Exception:
@@ -128,6 +134,6 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the code for a signature, if that can be done."""
+        """Keep the code for a signature, where possible."""
         with suppress(Exception):
             super().save_overload(sig, data)

@@ -1,10 +1,9 @@
-"""What is kept between runs, file by file: listed, bounded and removed.
+"""Cached files: listed, bounded and removed.
 
     folder -> KIND-<sha256>.npz: size, last use (its time of modification, set at every use) -> over the limit?
-        what was unused for longest goes first; models that logs refer to go last, for nothing computes them anew
+        least recently used files go first; models that logs refer to go last, for nothing computes them anew
 
-Another process may do the same at the same time: a file that has gone is no error, neither here nor to who wants to
-read it.
+Another process may do the same at the same time: a file that has gone is no error, neither here nor to its reader.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ KINDS = {"radiation": "radiation", "model": OF_LOGS}
 
 
 class KeptFile(NamedTuple):
-    """A file that is kept. used_s: when it was last used, in s since 1970."""
+    """A cached file. used_s: when it was last used, in s since 1970."""
 
     path: Path
     kind: str
@@ -38,7 +37,7 @@ class KeptFile(NamedTuple):
 
 
 def as_bytes(size: str, name: str) -> int:
-    """A size in words, such as 500MB, 1.5GiB or 0. Raises FileError."""
+    """Parse a size, such as 500MB, 1.5GiB or 0. Raises FileError."""
     found = SIZE.fullmatch(size.strip())
     if found is None:
         raise FileError(f"{name} is '{size}', which is no size", "give one such as 500MB, 2GB or 0")
@@ -47,13 +46,13 @@ def as_bytes(size: str, name: str) -> int:
 
 
 def limit_bytes() -> int:
-    """How much may be kept of what is computed: SONIC_BULLET_CACHE_LIMIT, else 2 GB. Raises FileError."""
+    """Return how much may be cached: SONIC_BULLET_CACHE_LIMIT, else 2 GB. Raises FileError."""
     given = os.environ.get(LIMIT)
     return as_bytes(given, LIMIT) if given else DEFAULT_LIMIT_BYTES
 
 
 def computed(folder: Path) -> list[KeptFile]:
-    """The computed models in a folder."""
+    """List the computed models in a folder."""
     return [
         KeptFile(path, KINDS.get(found[1], "modes"), size, used)
         for path, size, used in _files(folder)
@@ -62,7 +61,7 @@ def computed(folder: Path) -> list[KeptFile]:
 
 
 def compiled(folder: Path) -> list[KeptFile]:
-    """The machine code in the folders of a folder."""
+    """List the machine code in the folders of a folder."""
     with suppress(OSError):
         return [
             KeptFile(path, CODE_KIND, size, used)
@@ -74,13 +73,13 @@ def compiled(folder: Path) -> list[KeptFile]:
 
 
 def touch(path: Path) -> None:
-    """Note that a file was used now, where that can be noted."""
+    """Record that a file was used now, where possible."""
     with suppress(OSError):
         os.utime(path)
 
 
 def bounded(files: Iterable[KeptFile], most_bytes: int) -> list[KeptFile]:
-    """Remove files until those that are left have ``most_bytes`` at most. Returns those removed."""
+    """Remove files until the rest has ``most_bytes`` at most. Returns those removed."""
     listed = sorted(files, key=lambda one: (one.kind == OF_LOGS, one.used_s, one.path.name))
     excess, removed = sum(one.size_bytes for one in listed) - most_bytes, []
     for one in listed:
@@ -94,7 +93,7 @@ def bounded(files: Iterable[KeptFile], most_bytes: int) -> list[KeptFile]:
 
 
 def _files(folder: Path) -> Iterator[tuple[Path, int, float]]:
-    """Path, size and time of modification of each regular file there is."""
+    """Yield path, size and time of modification of each regular file."""
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             with suppress(OSError):

@@ -1,12 +1,12 @@
-"""A kernel and all kernels it calls, optimised and made machine code once; it stands on inner parts of numba, and
-`sonic_bullet.machine.compiled` does without in any release of it but the one that they are known of.
+"""Whole-program jit: a kernel and all kernels it calls, optimised and compiled once.
 
     kernel called by Python    -> Whole: its code and that of all below it, linked, optimised together, kept
-    kernel called by a kernel  -> Part: typed and written down, no more; two processes may do so for one Whole
+    kernel called by a kernel  -> Part: typed and lowered, no more; two processes may do so for one Whole
 
-numba itself optimises a kernel with all that it calls, makes machine code of that, and links it into each of its
-callers, which are optimised with it anew: code six calls deep is compiled six times. Which of the two a kernel is hangs
-on who asks, so it may be both.
+numba itself optimises a kernel with all that it calls, compiles that, and links it into each of its callers, which are
+optimised with it anew: code six calls deep is compiled six times. Which of the two a kernel is depends on its caller,
+so it may be both. This uses inner parts of numba, and `sonic_bullet.machine.compiled` does without in any release but
+the one that they are known of.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ from sonic_bullet.machine.progress import show_stage
 
 
 class _Environments:
-    """Stands where a part's code generator would be told where its constants lie: kept until its code has a place."""
+    """Store of a part's constants, in place of the code generator: kept until its code has a place."""
 
     def __init__(self) -> None:
         self.found: list[tuple[str, Any]] = []
 
     def set_env(self, name: str, environment: Any) -> None:
+        """Store a constant's environment."""
         self.found.append((name, environment))
 
 
@@ -54,7 +55,7 @@ class _Bare:
 
 class _Linking(JITCodeLibrary):  # type: ignore[misc]
     def add_linking_library(self, library: Any) -> None:
-        """Link parts one by one, each once, whoever calls them."""
+        """Link parts one by one, each once, whatever calls them."""
         if isinstance(library, Part):
             for bare in library.closure():
                 if bare not in self._linking_libraries:
@@ -64,7 +65,7 @@ class _Linking(JITCodeLibrary):  # type: ignore[misc]
 
 
 class Part(_Linking):
-    """Code as it was written down, neither optimised nor loaded."""
+    """Lowered code, neither optimised nor loaded."""
 
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
@@ -73,15 +74,16 @@ class Part(_Linking):
 
     @property
     def codegen(self) -> Any:
+        """The store of constants, in place of the code generator."""
         return self.environments
 
     def closure(self) -> Iterator[Any]:
-        """The part, and what it links."""
+        """Yield the part, and what it links."""
         yield self.bare
         yield from self._linking_libraries
 
     def own_module(self) -> Any:
-        """Its functions, to be merged with equal ones and dropped where nobody calls them."""
+        """Return its functions, to be merged with equal ones and dropped where they are not called."""
         module = self._final_module
         for function in () if self._owned else module.functions:
             if not function.is_declaration and function.linkage == binding.Linkage.external:
@@ -93,22 +95,23 @@ class Part(_Linking):
         module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
-        """Say that no more is written: there is nothing to be made of it here."""
+        """Mark the part as complete; nothing is compiled here."""
         self._raise_if_finalized()
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
-        """All of it, for a caller that knows nothing of parts."""
+        """Return all of it, for a caller that does not know parts."""
         module = self.own_module().clone()
         for library in self._linking_libraries:
             module.link_in(library._get_module_for_linking(), preserve=True)
         return module
 
     def get_pointer_to_function(self, name: str) -> int:
+        """Return 0: a part has no address."""
         return 0
 
     def serialize_using_object_code(self) -> tuple[str, bytes]:
-        """What another process needs to link it."""
+        """Return what another process needs to link it."""
         return self.name, self._get_module_for_linking().as_bitcode()
 
 
@@ -127,7 +130,7 @@ class Whole(_Linking):
                     self._codegen.set_env(name, environment)
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
-        """Machine code, and the names in it; nobody links it, so what it was made of is not kept."""
+        """Return machine code, and the names in it; it is never linked, so its sources are not kept."""
         self._ensure_finalized()
         names = [f.name for f in self._final_module.functions if not f.is_declaration]
         text = "".join(f'define void @"{name}"() {{\n ret void\n}}\n' for name in names)
@@ -138,6 +141,7 @@ class _Compiler(Compiler):  # type: ignore[misc]
     library: type[_Linking]
 
     def define_pipelines(self) -> Any:
+        """Compile into a library of this compiler's kind."""
         state = self.state
         if state.library is None:
             state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
@@ -149,6 +153,7 @@ class _WholeCompiler(_Compiler):
     library = Whole
 
     def compile_extra(self, function: Callable[..., Any]) -> Any:
+        """Compile, with progress shown."""
         with _undisturbed(), show_stage(f"compiling {function.__name__}"):
             return super().compile_extra(function)
 
@@ -159,9 +164,7 @@ class _PartCompiler(_Compiler):
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """While kernels are compiled: the collector would look for garbage among millions of objects that stay, a sixth of
-    the time.
-    """
+    """Switch off garbage collection while kernels are compiled: it would take a sixth of the time."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -172,8 +175,9 @@ def _undisturbed() -> Iterator[None]:
 
 
 def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """The function as a kernel; its ``part`` is what kernels call. Raises whatever numba's inner parts raise where they
-    are not what they were.
+    """Make the function a kernel; its ``part`` is what kernels call.
+
+    Raises whatever numba's inner parts raise where they have changed.
     """
     inner = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     kernel = numba.njit(**{**options, "no_cfunc_wrapper": True}, pipeline_class=_WholeCompiler)(function)
@@ -181,7 +185,7 @@ def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     ask = part.get_call_template
 
     def get_call_template(arguments: Any, keywords: Any) -> Any:
-        """As numba has it, but for numbers that stand in the code: they are no types of their own."""
+        """Call numba's, with literal numbers as plain types."""
         return ask(
             tuple(types.unliteral(one) for one in arguments),
             {name: types.unliteral(one) for name, one in keywords.items()},
@@ -192,7 +196,7 @@ def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
 
 
 def is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
-    """Whether the kernel has machine code for arguments of these types, or it was kept; then it is loaded."""
+    """Return whether the kernel has machine code for arguments of these types; load it from the cache if there."""
     if arguments in kernel.overloads:
         return True
     found = kernel._cache.load_overload(arguments, kernel.targetctx)
@@ -203,19 +207,19 @@ def is_kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
 
 
 def write(kernel: Any, arguments: tuple[Any, ...]) -> None:
-    """Have the part of a kernel for arguments of these types, with all that it calls."""
+    """Compile the part of a kernel for arguments of these types, with all that it calls."""
     kernel.typingctx.refresh(), kernel.targetctx.refresh()
     with _undisturbed():
         kernel.part.compile(arguments)
 
 
 def written(kernel: Any, arguments: tuple[Any, ...]) -> bytes:
-    """That part, as another process takes it in."""
+    """Serialise that part for another process."""
     return bytes(dumps(kernel.part.overloads[arguments]._reduce()))
 
 
 def take_in(kernel: Any, content: bytes) -> None:
-    """A part that a process forked from this one has `written`."""
+    """Add a part that a process forked from this one has `written`."""
     (name, bitcode), description, environment, signature, _, _, annotation, reload_init, others = loads(content)
     part, target = kernel.part, kernel.part.targetctx
     library = Part(target.codegen(), name)
@@ -231,5 +235,5 @@ def take_in(kernel: Any, content: bytes) -> None:
 
 
 def name_apart() -> None:
-    """Make what this process compiles from now on bear other names than what its parent does."""
+    """Give code that this process compiles from now on other names than its parent's."""
     FunctionIdentity._unique_ids = itertools.count(1_000_000)

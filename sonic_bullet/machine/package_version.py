@@ -1,7 +1,7 @@
-"""The version of an imported package, whatever the distribution is called that brought it.
+"""Version of an imported package, whatever the distribution is called that installed it.
 
 PyBullet comes from PyPI's ``pybullet`` or from its fork ``pybullet-arm64``; a package may lie on the path without
-having been installed at all. A version is recorded, never needed: what nobody knows is "unknown", and no error.
+having been installed at all. A version is recorded, never needed: an unknown one is "unknown", and no error.
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
-"""A file that is being written: under a name of its own, locked, and swept by the next writer where its own writer was
-killed.
+"""Unfinished files: under a temporary name, locked, and removed by the next writer where their own writer was killed.
 
     sweep the folder -> create (O_EXCL) -> flock -> still linked? -> write -> fsync -> os.replace -> NAME
 
 The name is the same length whatever it will become, so a NAME as long as the file system takes is written too. The lock
-is the file's own (flock(2)): it ends with the process, however that ends. Whoever writes into a folder first removes
-what is left of killed runs: regular files of exactly this pattern, of this user, whose lock is free. Creating and
-sweeping do not race: the sweeper removes a file only while it holds its lock, and a writer that then finds its file
-locked or without a name takes another. Where a file system knows no locks nothing is swept.
+is the file's own (flock(2)): it ends with the process, however that ends. A writer first removes what is left of killed
+runs in its folder: regular files of exactly this pattern, of this user, whose lock is free. Creating and sweeping do
+not race: the sweeper removes a file only while it holds its lock, and a writer that then finds its file locked or
+without a name takes another. Where a file system has no locks nothing is swept.
 """
 
 from __future__ import annotations
@@ -34,9 +33,8 @@ OPEN_FLAGS = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW",
 class PartialFile:
     """A new, empty, locked file in ``folder``.
 
-    `replace` gives it its name, `close` removes it where it has none. Raises OSError.
-
-    fd: open for reading and writing, for as long as this object is.
+    `replace` gives it its name, `close` removes it where it has none. fd: open for reading and writing, as long as this
+    object is. Raises OSError.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -50,14 +48,17 @@ class PartialFile:
             self.close()  # a sweeper was quicker: between creation and lock the file looks like a killed run's
 
     def replace(self, target: Path) -> None:
-        """Bring all bytes to the disk, then put the file in the place of ``target``. Raises OSError."""
+        """Write all bytes to the disk, then put the file in the place of ``target``. Raises OSError."""
         os.fsync(self.fd)
         if os.name == "nt":  # which renames no file that is open
             self._shut()
         os.replace(self.path, target)
 
     def refusal(self) -> OSError | None:
-        """Why the disk takes no more, by writing more at the end and taking it back; None where it does take it."""
+        """Return why the disk takes no more, None where it does.
+
+        It writes more at the end and removes it again.
+        """
         size = os.lseek(self.fd, 0, os.SEEK_END)
         try:
             left = bytes(PROBE_BYTES)
@@ -72,7 +73,7 @@ class PartialFile:
         return None
 
     def close(self) -> None:
-        """Remove the file, if it has not got its name, and give up the lock. Twice is once."""
+        """Remove the file, if it has not got its name, and release the lock. A second call does nothing."""
         self._shut()
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
@@ -84,9 +85,7 @@ class PartialFile:
 
 
 def sweep(folder: Path) -> None:
-    """Remove what killed runs of this user left unfinished in ``folder``; a file whose lock is held stays, and so does
-    everything else.
-    """
+    """Remove unfinished files of this user's killed runs in ``folder``; locked files and all others stay."""
     if fcntl is None:
         return
     with suppress(OSError), os.scandir(folder) as entries:
@@ -108,7 +107,7 @@ def _remove_if_free(path: Path) -> None:
 
 
 def _lock(fd: int) -> bool | None:
-    """True: locked. False: another holds the lock. None: there are no locks here."""
+    """Try to lock. True: locked. False: another holds the lock. None: there are no locks here."""
     if fcntl is None:
         return None
     try:

@@ -1,11 +1,11 @@
-"""What long work says while it lasts, and who shows it.
+"""Progress messages of long work, and their display.
 
     status(label), show_stage(text) ─► a terminal: one line, rewritten
                                     ─► else a pipe ─► supervisor of the command, or a thread ─► lines of stderr
 
-A line each time another stage begins, and every 4 s while one lasts. The supervisor is a process of its own: it speaks
-while a compiler or a call of C holds the interpreter. Processes that were forked write into the same pipe.
-SONIC_BULLET_PROGRESS=0: nothing is said.
+A line each time another stage begins, and every 4 s while one lasts. The supervisor is a process of its own: it writes
+while a compiler or a call of C holds the interpreter. Forked processes write into the same pipe.
+SONIC_BULLET_PROGRESS=0: nothing is shown.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ Made = TypeVar("Made")
 
 EVERY_S = 4.0
 """Between lines of one stage: below the 5 s after which a user takes a program for dead, with room for a busy machine.
-"""
+Between lines of one stage: below the 5 s after which a user takes a program for dead, with room for a busy machine."""
 LEAST_S = 1.0
 """Between lines of stages that follow each other fast."""
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
-"""A command, a call from Python that takes less says nothing."""
+"""A command, a call from Python that takes less shows nothing."""
 LONGEST = 300  # characters of a line
 NO_PRINT = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 DETAIL = re.compile(r": |\d+ ?%")
-"""Where what a stage is ends and how far it is begins."""
+"""Where a stage's name ends and its progress begins."""
 
 _SHOWN: list[Say] = []
 
 
 @dataclass(slots=True)
 class _Sink:
-    """Where messages go: "stage PROCESS TAB LABEL TAB TEXT". fd: of a pipe, -1: none; last: this process's own."""
+    """Destination of messages "stage PROCESS TAB LABEL TAB TEXT". fd: of a pipe, -1: none; last: this process's own."""
 
     fd: int = -1
     last: tuple[str, str] = ("", "")
@@ -54,19 +54,19 @@ _SINK = _Sink()
 
 @dataclass(frozen=True, slots=True)
 class PipeSay:
-    """Says what is being done into the pipe, whichever process calls it."""
+    """Writer of progress into the pipe, from any process."""
 
     label: str
 
     def __call__(self, text: str) -> None:
+        """Write what is being done."""
         _SINK.last = self.label, text
         _send(os.getpid(), self.label, text)
 
 
 @dataclass(slots=True)
 class ProgressLines:
-    """Which of what is said becomes a line, and when. command: heads them; "": there are none
-    before a stage is said."""
+    """Choice of the messages that become a line, and when. command: heads them; "": no line before a first stage."""
 
     command: str
     begin_s: float
@@ -77,7 +77,7 @@ class ProgressLines:
     _stages: tuple[str, ...] | None = None
 
     def take(self, message: str) -> None:
-        """Take in "PROCESS TAB LABEL TAB TEXT"; without label and text that process does nothing any more."""
+        """Take in "PROCESS TAB LABEL TAB TEXT"; without label and text that process has finished."""
         process, label, text = (*message.split("\t"), "", "")[:3]
         self._idle = "working"
         if label or text:
@@ -86,7 +86,7 @@ class ProgressLines:
             self._said.pop(process, None)
 
     def due(self, now_s: float) -> str:
-        """The line to be written now; "": none."""
+        """Return the line to be written now; "": none."""
         stages = tuple(DETAIL.split(text)[0] for _, text in self._said.values())
         pause_s = LEAST_S if stages and stages != self._stages else EVERY_S
         if not (self.command or self._said):
@@ -102,7 +102,7 @@ class ProgressLines:
 
 @contextmanager
 def shown_by(say: Say) -> Iterator[Say]:
-    """While this lasts, `status` writes through ``say``."""
+    """Let `status` write through ``say`` within the context."""
     _SHOWN.append(say)
     try:
         yield say
@@ -112,9 +112,9 @@ def shown_by(say: Say) -> Iterator[Say]:
 
 @contextmanager
 def status(label: str) -> Iterator[Say]:
-    """A function of the present activity: a spinner on a terminal's stderr, elsewhere lines of it (the module's head).
+    """Show the present activity: a spinner on a terminal's stderr, elsewhere lines of it (the module's head).
 
-    What starts while another is shown writes into that one.
+    Yields a function that takes its text. An activity that starts within another writes into that one.
     """
     if _SHOWN:
         yield _SHOWN[-1]
@@ -139,8 +139,9 @@ def status(label: str) -> Iterator[Say]:
 
 
 def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made]], Callable[P, Made]]:
-    """Give a function, where its caller gives neither, arguments of these names that `status` shows: a function of
-    what is being done and one of the fraction done.
+    """Decorate a function: where its caller gives neither argument of these names, `status` shows them.
+
+    text: name of the argument called with what is being done; fraction: of that called with the fraction done.
     """
 
     def decorated(function: Callable[P, Made]) -> Callable[P, Made]:
@@ -159,7 +160,7 @@ def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made
 
 
 def percent(say: Say) -> Callable[[float], None]:
-    """A function of the fraction done; it says another percent than before: it is called every physics step."""
+    """Make a function of the fraction done that reports only new per cents: it is called every physics step."""
     before = -1
 
     def progress(fraction: float) -> None:
@@ -173,7 +174,7 @@ def percent(say: Say) -> Callable[[float], None]:
 
 @contextmanager
 def show_stage(text: str) -> Iterator[None]:
-    """Say what is done while this lasts, beside what is being done already; a terminal's line stays as it is."""
+    """Show a stage within the context, beside the present one; a terminal's line stays as it is."""
     with status("sonic_bullet") as say:
         before = _SINK.last[1]
         if not isinstance(say, PipeSay) or text in before:
@@ -187,33 +188,33 @@ def show_stage(text: str) -> Iterator[None]:
 
 
 def is_shown() -> bool:
-    """Whether progress is shown at all."""
+    """Return whether progress is shown at all."""
     return sys.stderr is not None and os.environ.get("SONIC_BULLET_PROGRESS") != "0"  # None: a program without console
 
 
 def on_terminal() -> bool:
-    """Whether stderr is a terminal, where one line is rewritten."""
+    """Return whether stderr is a terminal, where one line is rewritten."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 def open_sink(fd: int) -> None:
-    """Have messages written to a pipe that another process reads."""
+    """Set the pipe for messages, read by another process."""
     _SINK.fd = fd
 
 
 def forward(message: str) -> None:
-    """Hand on what another process said."""
+    """Forward another process's message."""
     _write(f"stage {message}\n")
 
 
 def clear_stage(process: int | None = None) -> None:
-    """Say that a process, this one for None, does nothing that is to be shown."""
+    """Report that a process, this one for None, has nothing to show."""
     _send(os.getpid() if process is None else process, "", "")
 
 
 @contextmanager
 def waiting_for(process: int) -> Iterator[None]:
-    """This process waits for another one: what that one says is shown alone."""
+    """Show only the other process's messages while this one waits for it."""
     last = _SINK.last
     clear_stage()
     try:
@@ -225,7 +226,7 @@ def waiting_for(process: int) -> Iterator[None]:
 
 
 def write_line(line: str) -> None:
-    """A line of stderr; dropped where nobody reads what was written before, who would be waited for."""
+    """Write a line to stderr; drop it where nobody reads, as writing would block."""
     with suppress(Exception):  # a stream that is closed, or no stream
         stream = sys.stderr
         with suppress(OSError, ValueError):  # a notebook's has no number
@@ -248,7 +249,7 @@ def _write(message: str) -> None:
 
 @contextmanager
 def _printed() -> Iterator[None]:
-    """Somebody reads the pipe while this lasts: whoever does so already, or a thread."""
+    """Ensure a reader of the pipe within the context: an existing one, or a thread."""
     if _SINK.fd >= 0:
         yield
         return
@@ -267,7 +268,7 @@ def _printed() -> Iterator[None]:
 
 
 def _print_lines(out: int) -> None:
-    """The thread: reads until it is told to end."""
+    """Run the thread: read until the end message."""
     lines, unread = ProgressLines("", time.monotonic(), CALL_QUIET_S), b""
     with suppress(OSError, ValueError):
         while True:

@@ -1,12 +1,12 @@
-"""Somebody who waits for a command and outlives it: a process that does nothing else.
+"""Supervisor of a command: a process that waits for it and outlives it.
 
     supervisor ── fork ─► worker: runs the command, its scene, PyBullet, Netgen, compilers
         ◄── lines: scene, left, closing, done (`worker`), stage (`progress`) ; Python lines of a crash (faulthandler)
         ──► SIGINT, SIGTERM passed on; SIGKILL to what does not end
 
-A scene may end its process without a word, crash in C, or never step; a long call of C hears no signal. The worker says
-when it is done. If it ends before, or has to be ended, the supervisor knows the line, removes what was left and ends
-what the worker had started. Where processes do not fork, the command runs here.
+A scene may end its process without a message, crash in C, or never step; a long call of C receives no signal. The
+worker reports its end. If it ends before, or has to be killed, the supervisor names the line, removes what was left and
+ends what the worker had started. Where processes do not fork, the command runs here.
 """
 
 from __future__ import annotations
@@ -48,26 +48,26 @@ from sonic_bullet.records.errors import SceneError
 IDLE_S = 10.0
 """Wall time without a physics step after which a scene is taken for a viewer's loop."""
 ASK_S = 1.0
-"""How often a scene that does not step is asked where it is."""
+"""How often a scene that does not step is asked for its line."""
 END_S = 0.5
 """For an interrupted command to end by itself; it must be gone within 1 s."""
 CLOSE_S = 20.0
 """For what was made before the interrupt to be written."""
 LEAVE_S = 0.2
-"""For the interpreter of an interrupted command to end once all is said."""
+"""For the interpreter of an interrupted command to end after its last message."""
 POLL_S = 0.05
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
 STAND_INS = f"{PACKAGE}/listener/pybullet/"
 """Functions that a script calls in place of PyBullet's: their time is the script's own."""
 LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
 _FORKS_EARLY_ONLY = sys.platform != "linux"
-"""Where libraries forbid a fork once they are there (macOS)."""
+"""Whether libraries forbid a fork once they are loaded (macOS)."""
 SUBREAPER = 36  # prctl(2)
 
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How a worker ended. code: of the command, or of how it was ended; words: what is to be said, "": it said it."""
+    """How a worker ended. code: of the command, or of how it was ended; words: to be printed, "": printed already."""
 
     code: int
     words: str = ""
@@ -92,7 +92,7 @@ class _Worker:
     lines: progress.ProgressLines | None = None
 
     def listen(self, wait_s: float) -> None:
-        """Read what it says, for at most that long."""
+        """Read its messages, for at most that long."""
         for fd in select.select([self.said, self.traces], [], [], wait_s)[0]:
             data = os.read(fd, 1 << 16)
             if fd == self.traces:
@@ -119,18 +119,20 @@ class _Worker:
             self.code = int(text)
 
     def has_ended(self) -> bool:
+        """Return whether the process has ended."""
         if self.status is None:
             found, status = os.waitpid(self.process, os.WNOHANG)
             self.status = status if found else None
         return self.status is not None
 
     def kill(self) -> None:
+        """End the process, if it runs."""
         if not self.has_ended():
             os.kill(self.process, signal.SIGKILL)
             self.status = os.waitpid(self.process, 0)[1]
 
     def where(self) -> str:
-        """File, and line where it is asked for now; "": it does not answer."""
+        """Ask for file and line of the present call stack; "": it does not answer."""
         self.trace = ""
         os.kill(self.process, ASK_WHERE)  # type: ignore[arg-type]
         end = time.monotonic() + 0.3
@@ -143,8 +145,8 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
     """Call ``run`` in a process of its own and wait for its end, which is an exit code.
 
     alone: this process is the command's: interrupts are passed on, and the worker ends as an interpreter does; else the
-    caller goes on, and what interrupts it ends the worker.
-    command: heads lines of progress; "": there are none before a stage is said.
+    caller goes on, and an interrupt of it ends the worker. command: heads lines of progress; "": no line before a first
+    stage.
     """
     if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
         if alone:
@@ -181,7 +183,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
 
 
 def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool, parent: int) -> None:
-    """The worker, which does not return."""
+    """Run the worker; it does not return."""
     leave = os._exit
     end_with(parent)
     connect(*fds, clock, _end_idle)
@@ -270,14 +272,14 @@ def _ending(child: _Worker, stops: list[int], ended_idle: tuple[str, str] | None
 
 
 def _at_end(child: _Worker) -> bool:
-    """Read what a process that is gone has left; whether there was nothing."""
+    """Read what a process that is gone has left; return whether there was nothing."""
     before = (len(child.trace), child.exit_lines, child.unread, child.code)
     child.listen(0)
     return before == (len(child.trace), child.exit_lines, child.unread, child.code)
 
 
 def _how_it_ended(child: _Worker) -> str:
-    """In one line: who ended the process, where."""
+    """Describe in one line what ended the process, and where."""
     assert child.status is not None
     _, crashed, lines = child.trace.rpartition("Fatal Python error")
     lines = child.exit_lines or (lines if crashed else "")
@@ -299,12 +301,12 @@ def _how_it_ended(child: _Worker) -> str:
 
 
 def _line_in(lines: str, scene: str) -> int:
-    """The line of the scene that was reached last; 0: none."""
+    """Find the line of the scene that was reached last; 0: none."""
     return next((int(one["line"]) for one in LINE.finditer(lines) if one["file"] == escaped(scene)), 0)
 
 
 def _judgement(trace: str, scene: str) -> str:
-    """Whose code runs: "own", the scene's; "ours", this package for it, or an import; "": it is not there to be read.
+    """Judge whose code runs: "own", the scene's; "ours", this package or an import; "": no trace yet.
 
     trace: its calls, the latest first, which come piece by piece.
     """
@@ -318,7 +320,7 @@ def _judgement(trace: str, scene: str) -> str:
 
 
 def _clean_up(child: _Worker, tied: bool, before: set[int]) -> None:
-    """End what the worker left running, remove what it left lying; where it ended by itself there is nothing."""
+    """End what the worker left running, and remove its files; where it ended by itself there is nothing."""
     if child.code is None and tied:
         while orphans := set(_children()) - before:
             for one in orphans:
@@ -339,7 +341,7 @@ def _close(*fds: int) -> None:
 
 
 def _children() -> list[int]:
-    """Processes whose parent this one is."""
+    """List the child processes of this one."""
     found = []
     for place in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError, ValueError, IndexError):

@@ -1,11 +1,11 @@
-"""The user's own folder for what is kept between runs: nobody else can put anything into it.
+"""Private cache folder of the user: no other user can write into it.
 
     platformdirs' cache folder / sonic_bullet, mode 0700, owner checked -> "modal" (computed models), "compiled"
         (machine code)
 
-Machine code read from a file is run, and a computed model is believed: both come from a folder of this user that no
-other may write to. Without a home, on a disk that takes nothing, or where the folder belongs to somebody else there is
-none, and everything is computed anew.
+Machine code read from a file is run, and a computed model is trusted: both come from a folder of this user that no
+other may write to. Without a home, on a disk that cannot be written, or where the folder belongs to another user there
+is none, and everything is computed anew.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import stat
 from pathlib import Path
 
 NOTES: list[str] = []
-"""Why something cannot be kept, for those who want to say it; empty where all is well."""
+"""Why something cannot be cached; empty where all is well."""
 
 
 def _start() -> Path:
@@ -26,21 +26,18 @@ def _start() -> Path:
 
 
 START = _start()
-"""Where the process was when this module came: a scene may change the folder, and a relative path of the environment
-means this one.
-"""
+"""Working folder when this module was imported: a scene may change it, and relative paths of the environment mean this
+one."""
 
 
 def cache_folder(name: str) -> Path | None:
-    """The folder ``name`` in the user's cache folder, made where it is missing, or None where there can be none of this
-    user's own.
-    """
+    """Return the folder ``name`` in the user's cache folder, made where it is missing; None where there can be none."""
     root = _root()
     return None if root is None else private_folder(root / name)
 
 
 def private_folder(path: Path) -> Path | None:
-    """``path`` as a folder of mode 0700 that belongs to this user, None where that cannot be had.
+    """Return ``path`` as a folder of mode 0700 that belongs to this user, None where that is impossible.
 
     It is made, or made private; the folder above it is made too, but no home that is missing.
     """
@@ -65,7 +62,7 @@ def private_folder(path: Path) -> Path | None:
 
 
 def cache_folders() -> list[Path]:
-    """Where compiled code and computed models may lie."""
+    """List where compiled code and computed models may lie."""
     named = (os.environ.get(name) for name in ("SONIC_BULLET_CACHE", "NUMBA_CACHE_DIR"))
     root = _root()
     return [*(Path(one).absolute() for one in named if one), *([] if root is None else [root])]

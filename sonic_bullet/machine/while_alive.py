@@ -1,4 +1,4 @@
-"""Results of a function kept as long as what they were made of is alive: for records that are compared by identity.
+"""Identity cache: results kept as long as the record they were computed from lives.
 
 `functools.lru_cache` would hold the last so many of them, and all that belongs to them, for ever.
 """
@@ -16,7 +16,8 @@ Result = TypeVar("Result")
 
 
 class WhileAlive(Generic[Of, More, Result]):
-    """The function call(of, *more), a decorator: computed once for each ``of`` and each ``more``, which can be hashed.
+    """Decorator of a function call(of, *more): computed once for each ``of`` and each hashable ``more``.
+
     What it returns must not hold ``of``.
     """
 
@@ -26,6 +27,7 @@ class WhileAlive(Generic[Of, More, Result]):
         update_wrapper(self, call)
 
     def __call__(self, of: Of, *more: More.args, **named: More.kwargs) -> Result:
+        """Return the cached result, computed on the first call."""
         mine = self._kept.setdefault(of, {})
         key = (more, tuple(sorted(named.items())))
         if key not in mine:
@@ -33,9 +35,9 @@ class WhileAlive(Generic[Of, More, Result]):
         return mine[key]
 
     def cache_clear(self) -> None:
-        """Forget all."""
+        """Forget all results."""
         self._kept.clear()
 
     def __len__(self) -> int:
-        """Of how many things something is kept."""
+        """Count the records with results."""
         return len(self._kept)

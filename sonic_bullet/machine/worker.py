@@ -1,12 +1,12 @@
-"""What the process of a command says to the one that waits for it (`supervisor`); where nobody waits, nothing.
+"""Messages of a command's process to its supervisor (`supervisor`); without one, nothing.
 
 A message is one line of a pipe, written at once, so that lines of several processes do not mix:
 
     scene PATH     whose code is run from here on          left PATH    to be removed where this process is killed
-    exit  STACK    somebody calls os._exit                 closing      what was made so far is being written
-    done  CODE     the command has come to its end           stage …     what is being done (`progress`)
+    exit  STACK    os._exit is called                      closing      what was made so far is being written
+    done  CODE     the command has come to its end         stage …      what is being done (`progress`)
 
-The time of the last physics step stands in memory that both processes have.
+The time of the last physics step stands in shared memory.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Handler = Callable[[int, FrameType | None], Any]
 
 @dataclass(slots=True)
 class WorkerState:
-    """To the supervisor. fd: of the pipe; clock: 8 bytes, when the scene stepped last, 0: no scene runs."""
+    """Connection to the supervisor. fd: of the pipe; clock: 8 bytes, when the scene stepped last, 0: no scene runs."""
 
     fd: int = -1
     clock: Any = None
@@ -48,9 +48,10 @@ _LINE = WorkerState()
 
 
 def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
-    """Make this process one that is supervised: a crash leaves its Python lines on ``traces``, `os._exit` says where it
-    is called, the first interrupt is a KeyboardInterrupt and all others are ignored. at_idle: is called where a scene
-    has not stepped for too long.
+    """Make this process a supervised one.
+
+    A crash writes its Python lines to ``traces``, `os._exit` reports where it is called, the first interrupt is a
+    KeyboardInterrupt and all others are ignored. at_idle: called where a scene has not stepped for too long.
     """
     import faulthandler
 
@@ -73,14 +74,14 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
 
 
 def catch_stops() -> None:
-    """Make the first interrupt a KeyboardInterrupt, and have all others ignored."""
+    """Make the first interrupt a KeyboardInterrupt, and ignore all others."""
     for word in STOPS:
         if signal.getsignal(word) is not signal.SIG_IGN:  # as a shell's background jobs have it
             signal.signal(word, _stop)
 
 
 def _forget_stops() -> None:
-    """Have what ends a process end a fork of this one, at once: a pool ends its workers so."""
+    """Let signals end a fork of this process at once: a pool ends its workers so."""
     for word, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
         if signal.getsignal(word) is _stop:
             signal.signal(word, handler)
@@ -102,12 +103,12 @@ def _say_where(traces: int, frame: FrameType | None) -> None:
 
 
 def escaped(path: str) -> str:
-    """A path as faulthandler writes it."""
+    """Escape a path as faulthandler does."""
     return path.encode("ascii", "backslashreplace").decode()[:500]
 
 
 def _stop(number: int, _: FrameType | None) -> None:
-    """The first interrupt: whoever cleans up is not interrupted again."""
+    """Handle the first interrupt: cleaning up is not interrupted again."""
     for word in STOPS:
         signal.signal(word, signal.SIG_IGN)
     _LINE.stopped = STOPS[signal.Signals(number)]
@@ -115,30 +116,30 @@ def _stop(number: int, _: FrameType | None) -> None:
 
 
 def stop_word() -> str:
-    """How this process was told to end; "": it was not."""
+    """Return how this process was told to end; "": it was not."""
     return _LINE.stopped
 
 
 def tell(kind: str, text: str = "") -> None:
-    """Say something to the supervisor, if there is one."""
+    """Send a message to the supervisor, if there is one."""
     if _LINE.fd >= 0:
         with suppress(OSError):
             os.write(_LINE.fd, f"{kind} {' '.join(text.splitlines())}\n".encode("utf-8", "surrogateescape")[:LONGEST])
 
 
 def note_leftover(path: str | Path) -> None:
-    """Have a file or folder removed where this process is killed; one that has got its name by then is none."""
+    """Register a file or folder to be removed where this process is killed, unless it has been renamed by then."""
     tell("left", str(path))
 
 
 def note_closing() -> None:
-    """What was made before an interrupt is being written: wait for it."""
+    """Report that what was made before an interrupt is being written, so that the supervisor waits."""
     tell("closing")
 
 
 @contextmanager
 def running_scene(path: Path) -> Iterator[None]:
-    """The code of a scene runs while this lasts."""
+    """Report that a scene's code runs within the context."""
     before, _LINE.scene = _LINE.scene, str(path)
     tell("scene", str(path))
     mark_step()
@@ -152,13 +153,13 @@ def running_scene(path: Path) -> Iterator[None]:
 
 
 def mark_step() -> None:
-    """A physics step is made."""
+    """Record a physics step."""
     if _LINE.clock is not None and _LINE.scene:
         struct.pack_into("d", _LINE.clock, 0, time.monotonic())
 
 
 def scene_line(frame: FrameType | None) -> tuple[str, int]:
-    """Name of the scene that runs and the line of it that a frame comes from, 0: none."""
+    """Return the name of the scene that runs and the line of it that a frame comes from, 0: none."""
     while frame is not None and frame.f_code.co_filename != _LINE.scene:
         frame = frame.f_back
     return Path(_LINE.scene).name, 0 if frame is None else frame.f_lineno
@@ -166,21 +167,21 @@ def scene_line(frame: FrameType | None) -> tuple[str, int]:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder that is gone afterwards, however this process ends."""
+    """Provide a folder that is removed afterwards, however this process ends."""
     with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder:
         note_leftover(folder)
         yield Path(folder)
 
 
 def end_with(parent: int) -> None:
-    """Have this process, a fork, end with the one that it was forked from (Linux), or now where that one is gone."""
+    """Let this process, a fork, end with its parent (Linux), or now where that has ended."""
     process_control(DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 
 
 def process_control(option: int, value: int) -> bool:
-    """Linux: whether it was done."""
+    """Call prctl on Linux; return whether it succeeded."""
     if sys.platform != "linux":
         return False
     import ctypes
