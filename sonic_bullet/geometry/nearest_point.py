@@ -3,9 +3,9 @@
     nearest in a triangle by its Voronoi regions       [Ericson, Real-Time Collision Detection (2005), ch. 5.1.5]
     depth-first search of a binary tree of bounding boxes, nearer child first          [ibid., ch. 6.3]
 
-PyBullet collides a mesh as its convex hull, and a thin wall has two sides a hair apart: of the faces nearly as near as
-the nearest, one that looks the same way as the contact's normal is preferred. On an edge faces are equally near but for
-rounding: the one that looks most that way is taken, so that the answer does not hang on how the world is turned.
+PyBullet collides a mesh as its convex hull, and a thin wall has two sides close together: of the faces nearly as near
+as the nearest, one that faces the contact's normal is preferred. On an edge faces are equally near but for rounding:
+the one that faces it most is taken, so that the answer does not depend on the world's orientation.
 
 Surface -> FACE and NODE tables (numpy, level by level) -> nearest_face, one kernel for `nearest` and for the run time
 """
@@ -46,8 +46,11 @@ _DEEPEST = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceIndex:
-    """A surface ready for `nearest`: faces (f,) of FACE in tree order, ``order`` (f,) their own numbers, nodes (k,) of
-    NODE. wall_m: see WALL_PART; tie_m: see TIE_PART."""
+    """A surface ready for `nearest`.
+
+    faces (f,) of FACE in tree order, ``order`` (f,) their own numbers, nodes (k,) of NODE; wall_m: see WALL_PART;
+    tie_m: see TIE_PART.
+    """
 
     faces: Array
     nodes: Array
@@ -57,8 +60,9 @@ class SurfaceIndex:
 
 
 def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = None) -> SurfaceIndex:
-    """Build the tree over vertex_m (v, 3), face (f, 3), of faces with curvature_per_m (f,). Raises MeshError where
-    there is no face.
+    """Build the tree over vertex_m (v, 3), face (f, 3), of faces with curvature_per_m (f,).
+
+    Raises MeshError where there is no face.
     """
     if len(face) == 0:
         raise MeshError("surface without triangles has no nearest point", "give the body a model with a surface")
@@ -88,11 +92,11 @@ def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = 
 
 
 def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
-    """Face (k,), barycentric coordinates (k, 3) and distance (k,) in m of the surface point nearest to each of points_m
-    (k, 3).
+    """Find the surface point nearest to each of points_m (k, 3).
 
-    normals (k, 3): the outward normal the surface should have there, or None; a face with normal·n > 0 is taken if it
-    is at most twice as far as the nearest one plus a wall's thickness.
+    Returns face (k,), barycentric coordinates (k, 3) and distance (k,) in m. normals (k, 3): the outward normal the
+    surface should have there, or None; a face with normal·n > 0 is taken if it is at most twice as far as the nearest
+    one plus a wall's thickness.
     """
     points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
     wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
@@ -104,13 +108,15 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
 def closest_point(
     vertex_m: Array, face: Array, points: Array, normals: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """`nearest` on a surface given plainly: builds the tree for this one call."""
+    """Run `nearest` on a plain surface: builds the tree for this one call."""
     return nearest(surface_index(vertex_m, face), points, normals)
 
 
 def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
-    """Order (f,) of the faces and NODE (k,) of a balanced tree over their boxes low, high and centres (f, 3): each
-    node's faces split at the median of their longest axis, in the order in which they are. Level by level.
+    """Build a balanced tree over the faces' boxes low, high and centres (f, 3), level by level.
+
+    Returns the order (f,) of the faces and NODE (k,). Each node's faces are split at the median of their longest axis,
+    in their present order.
     """
     order = np.arange(len(low))
     start, end = np.zeros(1, np.int64), np.array([len(low)])
@@ -138,7 +144,7 @@ def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _in_triangle(px, py, pz, face):  # noqa: PLR0911 - one return a Voronoi region
-    """Barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
+    """Compute barycentric coordinates of the triangle's point nearest to p [Ericson 2005, p. 141]."""
     abc = face.corner_m
     a0, a1, a2 = abc[0, 0], abc[0, 1], abc[0, 2]
     b0, b1, b2 = abc[1, 0], abc[1, 1], abc[1, 2]
@@ -177,7 +183,7 @@ def _in_triangle(px, py, pz, face):  # noqa: PLR0911 - one return a Voronoi regi
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _box_gap(px, py, pz, node):
-    """Squared distance of p from a box."""
+    """Compute the squared distance of p from a box."""
     low, high = node.low_m, node.high_m
     x, y, z = (
         max(low[0] - px, 0.0, px - high[0]),
@@ -189,9 +195,10 @@ def _box_gap(px, py, pz, node):
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, ny, nz):
-    """Face, barycentric coordinates (three numbers) and distance in m of the point nearest to p on one body's surface,
-    which has its faces and nodes from face_at and node_at on; the face counted from there. n: the outward normal that
-    the surface should have, 0 for any.
+    """Find face, barycentric coordinates (three numbers) and distance in m of the point nearest to p on one body.
+
+    Its faces and nodes begin at face_at and node_at; the face is counted from there. n: the outward normal that the
+    surface should have, 0 for any.
     """
     stack, gaps = np.empty(_DEEPEST, np.int64), np.empty(_DEEPEST)
     any_face, any2, any_u, any_v, any_w = 0, np.inf, 1.0, 0.0, 0.0  # nearest of all
@@ -242,9 +249,9 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
 
 @njit(nogil=True, error_model="numpy")
 def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted, face, found):
-    """`nearest_face` of points (k, 3) with normals (k, 3): into face (k,) and found (k, 4), the distance last.
+    """Write `nearest_face` of points (k, 3) with normals (k, 3) to face (k,) and found (k, 4), the distance last.
 
-    first: 0, as an argument: numba compiles a kernel anew for a number that stands in the code.
+    first: 0, as an argument: numba compiles a kernel anew for a literal number.
     """
     for k in range(len(point_m)):
         p, n = point_m[k], wanted[k]

@@ -15,8 +15,9 @@ from sonic_bullet.records import Array
 LARGEST_M, HEAVIEST_KG = 10.0, 202e3
 """Of what is struck to sound: the largest bell ever cast, the Tsar Bell, is 6.6 m wide and weighs 202 t.
 
-A mesh in millimetres is a thousand times its size, so that all but what is under a centimetre passes the first, and a
-steel ball of 4 mm the second."""
+A mesh in millimetres is a thousand times its size, so that all above a centimetre exceeds the first, and a steel ball
+of 4 mm the second.
+"""
 CREASE_RAD = np.deg2rad(30.0)
 
 
@@ -26,19 +27,19 @@ def _area_vectors(vertex_m: Array, face: Array) -> Array:
 
 
 def face_areas_m2(vertex_m: Array, face: Array) -> Array:
-    """Area (f,) of each face."""
+    """Compute the area (f,) of each face."""
     return np.asarray(np.linalg.norm(_area_vectors(vertex_m, face), axis=1))
 
 
 def outward_normals(vertex_m: Array, face: Array) -> Array:
-    """Unit normals (f, 3), outward where the faces are; zero for a face without area."""
+    """Compute unit normals (f, 3), outward where the faces are; zero for a face without area."""
     vector = _area_vectors(vertex_m, face)
     length = np.linalg.norm(vector, axis=1)
     return np.asarray(vector / np.where(length > 0, length, 1)[:, None])
 
 
 def volume_m3(vertex_m: Array, face: Array) -> float:
-    """Enclosed volume; negative where the faces look inward, meaningless where the surface is open."""
+    """Compute the enclosed volume; negative where the faces look inward, meaningless where the surface is open."""
     if len(face) == 0:
         return 0.0
     centre = vertex_m[face].reshape(-1, 3).mean(axis=0)
@@ -47,7 +48,7 @@ def volume_m3(vertex_m: Array, face: Array) -> float:
 
 
 def inertia(vertex_m: Array, face: Array, density_kg_m3: float) -> tuple[float, Array, Array]:
-    """Mass in kg, centre of mass (3,) in m and inertia (3, 3) in kg·m² about it, of the enclosed solid."""
+    """Compute mass in kg, centre of mass (3,) in m and inertia (3, 3) in kg·m² about it, of the enclosed solid."""
     origin = vertex_m[face].reshape(-1, 3).mean(axis=0)
     corner = vertex_m[face] - origin  # (f, 3 corners, 3)
     volume = np.einsum("ij,ij->i", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
@@ -61,7 +62,7 @@ def inertia(vertex_m: Array, face: Array, density_kg_m3: float) -> tuple[float, 
 
 
 def welded(vertex_m: Array, face: Array) -> tuple[Array, Array]:
-    """The same surface with identical vertices made one and faces of repeated vertices dropped: (v', 3), (f', 3)."""
+    """Merge identical vertices and drop faces of repeated vertices: (v', 3), (f', 3)."""
     unique, inverse = np.unique(vertex_m + 0.0, axis=0, return_inverse=True)  # + 0.0: minus zero is zero
     face = inverse.ravel()[face]
     whole = (face[:, 0] != face[:, 1]) & (face[:, 1] != face[:, 2]) & (face[:, 2] != face[:, 0])
@@ -69,7 +70,7 @@ def welded(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 
 
 def oversize(vertex_m: Array, mass_kg: float) -> str:
-    """How large a body is that is larger than anything that is struck to sound, in words; "" for all others.
+    """Describe a body that is larger than anything that is struck to sound; "" for all others.
 
     Most such bodies are meshes in millimetres, grounds or terrains: their modes are no mistake, but hardly what was
     meant.
@@ -81,14 +82,14 @@ def oversize(vertex_m: Array, mass_kg: float) -> str:
 
 
 def _edges(face: Array) -> Array:
-    """Directed edges (3f, 2): edge k of face i (corner k to k+1) in row 3i + k."""
+    """Return directed edges (3f, 2): edge k of face i (corner k to k+1) in row 3i + k."""
     return np.stack([face, np.roll(face, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
 
 
 def is_closed(face: Array) -> bool:
-    """Every edge is run through as often one way as the other: no hole, neighbours agree on the outside.
+    """Test whether every edge is used as often one way as the other: no hole, neighbours agree on the outside.
 
-    ``welded`` first.
+    Merge vertices first (``welded``).
     """
     edge = _edges(face)
     n = int(face.max()) + 1 if len(face) else 1
@@ -98,9 +99,7 @@ def is_closed(face: Array) -> bool:
 
 
 def _smooth_neighbours(face: Array, normal: Array) -> tuple[Array, Array]:
-    """Pairs of directed edges (rows of `_edges`) that are one edge shared by two faces at less than the
-    crease angle.
-    """
+    """Find pairs of directed edges (rows of `_edges`) that two faces share at less than the crease angle."""
     edge = _edges(face)
     n = int(face.max()) + 1
     key = edge.min(axis=1) * n + edge.max(axis=1)
@@ -113,8 +112,9 @@ def _smooth_neighbours(face: Array, normal: Array) -> tuple[Array, Array]:
 
 
 def corner_normals(vertex_m: Array, face: Array) -> Array:
-    """Unit normals (f, 3, 3) at the corners of each face, averaged by angle over the faces that join there without a
-    crease.
+    """Compute unit normals (f, 3, 3) at the corners of each face.
+
+    They are averaged by angle over the faces that join there without a crease.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -142,7 +142,7 @@ def corner_normals(vertex_m: Array, face: Array) -> Array:
 
 
 def face_curvature(vertex_m: Array, face: Array) -> Array:
-    """Mean of the principal curvatures (f,) in 1/m: 1/r on a ball, 0 on a flat side, negative inside a bowl.
+    """Compute the mean of the principal curvatures (f,) in 1/m: 1/r on a ball, 0 on a flat side, negative in a bowl.
 
     Faces that meet at more than 30° meet in a crease, which does not count.
     """
