@@ -1,11 +1,11 @@
-"""Materials from and to typed preset files: what a body is made of, each number with its source.
+"""Materials from and to typed preset files: density, elasticity, damping, surface, each number with its source.
 
     NAME.json -> Preset (typed, every field checked) -> Material
 
 A file is UTF-8 JSON, format "sonic-bullet-preset/1": name, density_kg_m3, elasticity (youngs_pa and poisson, or
 stiffness_pa 6×6), damping, surface, impact, each group with the `source` of its numbers, an optional `note`, and how
-far they differ between objects of that material: `range`, `range_source`, `spread`. `provenance` says what a fitted
-preset was fitted from, and how sure it is; it changes no sound. `residual` is what the modes do not say
+far they differ between objects of that material: `range`, `range_source`, `spread`. `provenance` states what a fitted
+preset was fitted from, and how certain it is; it changes no sound. `residual` is the sound beside the modes
 (docs/explanation/residual.md), played with every contact. `effects` are what a diagnosis found to belong to material or
 object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
 
@@ -47,7 +47,9 @@ RECORDED_FOLDER = FOLDER / "recorded"
 BYTES_MAX = 1 << 20
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
-"""How a provenance begins to say whose damping it is where recordings identified none: a table's, without radiation."""
+"""First words of a provenance's line on the damping that was taken from a table, without radiation, where recordings
+identified none.
+"""
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -56,8 +58,10 @@ Row = tuple[float, float, float, float, float, float]
 
 
 class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """range: by field, the values that materials of that name have; spread: standard deviation of their logarithm.
-    Neither changes a sound.
+    """A group of a preset's numbers.
+
+    range: by field, the values that materials of that name have; spread: standard deviation of their logarithm. Neither
+    changes a sound.
     """
 
     source: Annotated[str, msgspec.Meta(min_length=1)]
@@ -90,24 +94,24 @@ class Damping(_Part, frozen=True):
 
 
 class Surface(_Part, frozen=True):
-    """roughness_m: rms height of the profile; hurst: exponent of its spectrum."""
+    """Roughness: roughness_m, the rms height of the profile; hurst, the exponent of its spectrum."""
 
     roughness_m: NotNegative
     hurst: Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 
 class Restitution(_Part, frozen=True):
-    """restitution of an impact against a rigid wall: the file's group `impact`."""
+    """Restitution of an impact against a rigid wall: the file's group `impact`."""
 
     restitution: Fraction
 
 
 class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """Of a preset that ships with the package and was made of recordings: what was struck, the command that made the
-    file, whose recordings they are, and how near the file alone comes to takes.
+    """Origin of a preset that ships with the package and was made of recordings.
 
-    Distances are means in dB over the takes held out, or where none is over those fitted; other_take_db: the nearest
-    other take, None where there is none. distance: what was played and held against which takes, in words.
+    What was struck, the command that made the file, whose recordings they are, and how near the file alone comes to
+    takes. Distances are means in dB over the takes held out, or where none is over those fitted; other_take_db: the
+    nearest other take, None where there is none. distance: what was played and compared with which takes, in words.
     """
 
     struck: Annotated[str, msgspec.Meta(min_length=1)]
@@ -123,11 +127,11 @@ class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class Provenance(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """Where a fitted preset comes from. parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in
-    the same units, where known.
+    """Origin of a fitted preset.
 
-    assumed: what was taken from the guess. verdict: the fit's own, or the diagnosis' where one wrote it. correction:
-    relative, of each mode's frequency against the mesh's. origin: of a preset that ships with the package.
+    parameters: α 1/s, β s, γ m²/s², σ, ν by name; spreads: standard errors in the same units, where known; assumed:
+    what was taken from the guess; verdict: the fit's own, or the diagnosis' where one wrote it; correction: relative,
+    of each mode's frequency against the mesh's; origin: of a preset that ships with the package.
     """
 
     method: str
@@ -157,10 +161,12 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 def load_material(name: str | os.PathLike[str]) -> Material:
-    """The material of that name (`list_materials`), or of a preset file where ``name`` is a path or ends in .json.
+    """Load the material of that name (`list_materials`), or of a preset file where ``name`` is a path or ends in .json.
 
-    Raises MaterialError: unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical
-    numbers.
+    Raises
+    ------
+    MaterialError
+        Unknown name (listing the near ones), unreadable file, a wrong field (named), unphysical numbers.
     """
     text = as_path(name, "name", _REMEDY, error=MaterialError)
     filed = text.endswith(".json") or os.sep in text
@@ -174,7 +180,7 @@ def load_material(name: str | os.PathLike[str]) -> Material:
 
 
 def named_preset(name: str | os.PathLike[str]) -> Preset:
-    """The preset of that name, or of a file where ``name`` is a path or ends in .json.
+    """Read the preset of that name, or of a file where ``name`` is a path or ends in .json.
 
     Raises MaterialError as `load_material` does.
     """
@@ -190,30 +196,30 @@ def named_preset(name: str | os.PathLike[str]) -> Preset:
 
 
 def list_materials() -> tuple[Material, ...]:
-    """All materials that come with the package, by name: those of tables, and those of recordings."""
+    """List all materials that come with the package, by name: those of tables, and those of recordings."""
     return tuple(load_material(name) for name in material_names())
 
 
 @cache
 def material_names() -> tuple[str, ...]:
-    """The names `load_material` knows, sorted."""
+    """List the names that `load_material` knows, sorted."""
     return tuple(sorted((*table_names(), *recorded_names())))
 
 
 @cache
 def table_names() -> tuple[str, ...]:
-    """The names of materials whose numbers come from tables, sorted."""
+    """List the names of materials whose numbers come from tables, sorted."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
 
 
 @cache
 def recorded_names() -> tuple[str, ...]:
-    """The names of things that were struck and recorded, whose presets come with the package, sorted."""
+    """List the names of objects that were struck and recorded, whose presets come with the package, sorted."""
     return tuple(sorted(path.stem for path in RECORDED_FOLDER.glob("*.json")))
 
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
-    """The typed content of a preset file. Raises MaterialError naming file and field."""
+    """Read the typed content of a preset file. Raises MaterialError naming file and field."""
     remedy = "mend that field; docs/reference/preset.md describes the file"
     with reading(path, "preset", MaterialError, remedy):
         try:
@@ -241,7 +247,7 @@ def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
 
 
 def material_of(preset: Preset, where: str = "") -> Material:
-    """The material a preset describes.
+    """Build the material that a preset describes.
 
     Raises MaterialError naming preset and field where its numbers contradict each other.
     """
@@ -280,8 +286,9 @@ def material_of(preset: Preset, where: str = "") -> Material:
 
 
 def total_damping(preset: Preset) -> bool:
-    """Whether a preset's damping has radiation in it: as it says, else where it was fitted, as `fit` read total decays
-    before it said so.
+    """Return whether a preset's damping includes radiation.
+
+    As it states, else where it was fitted, as `fit` read total decays before it stated so.
     """
     if preset.damping.includes_radiation is not None:
         return preset.damping.includes_radiation
@@ -297,7 +304,7 @@ def _effects(preset: Preset, label: str) -> tuple[Effect, ...]:
 
 
 def rayleigh_of_loss_factor(eta: float, low_hz: float, high_hz: float) -> tuple[float, float]:
-    """(alpha_per_s, beta_s) whose loss is ``eta`` at both frequencies; the module's head has the equations."""
+    """Compute (alpha_per_s, beta_s) whose loss is ``eta`` at both frequencies; the module's head has the equations."""
     w1, w2 = 2 * math.pi * low_hz, 2 * math.pi * high_hz
     return eta * w1 * w2 / (w1 + w2), eta / (w1 + w2)
 

@@ -1,1 +1,1 @@
-"""Values -> pictures."""
+"""Pictures of values."""

@@ -1,5 +1,6 @@
-"""One picture of a fit: recording and synthesis as spectrograms above, features and the fitted circle in the (f, d)
-plane below [Ren, Yeh, Lin 2013, Fig. 10, 11].
+"""Picture of a fit: spectrograms of recording and synthesis, features and the fitted circle in the (f, d) plane.
+
+[Ren, Yeh, Lin 2013, Fig. 10, 11]
 
 (ω² + (d − 1/β)²) = 1/β² − α/β, the circle of eq. 8, drawn as d(f)
 """
@@ -63,8 +64,9 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
 
 
 def _played(found: CaseFit, o: ObjectFit) -> tuple[Array, str]:
-    """What the fit plays of an object's first strike (n,), and in words: its modes, or where nobody knows its place the
-    lines as they were struck on average, at the recording's energy.
+    """Synthesise an object's first strike (n,) by the fit, and describe how.
+
+    By its modes, or where its place is not known by the lines as struck on average, at the recording's energy.
     """
     e = o.evidence
     assert e.signals is not None
@@ -78,7 +80,7 @@ def _played(found: CaseFit, o: ObjectFit) -> tuple[Array, str]:
 
 
 def _plane(axes: Axes, found: CaseFit) -> None:
-    """Lines and the fitted circle over frequency; decays in a logarithm, ticks as plain numbers."""
+    """Draw lines and the fitted circle over frequency; decays in a logarithm, ticks as plain numbers."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     fit = found.fit
@@ -127,7 +129,7 @@ def _plane(axes: Axes, found: CaseFit) -> None:
 
 
 def circle(freq_hz: Array, alpha_per_s: float, beta_s: float) -> Array:
-    """Decay (k,) of modes that ring at freq_hz (k,) [eq. 8], the lower branch; NaN past the circle."""
+    """Compute the decay (k,) of modes that ring at freq_hz (k,) [eq. 8], the lower branch; NaN past the circle."""
     square = (2 * np.pi * freq_hz) ** 2
     if beta_s == 0:
         return np.full(len(freq_hz), alpha_per_s / 2)

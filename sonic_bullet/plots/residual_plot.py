@@ -1,8 +1,7 @@
-"""One picture of a residual: what was recorded, its features, what is synthesised, represented, and left [Ren, Yeh, Lin
-2013, Fig. 7].
+"""Picture of a residual: recorded, its features, synthesised, represented, and left [Ren, Yeh, Lin 2013, Fig. 7].
 
 above: spectrograms of one strike;
-    below: features and modes in the (f, d) plane, features filled by the share of them that is represented
+    below: features and modes in the (f, d) plane, features filled by the fraction of them that is represented
 """
 
 from __future__ import annotations

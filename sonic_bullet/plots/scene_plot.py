@@ -1,11 +1,11 @@
-"""One picture of a render: what was found above, what was touched below, on one time axis.
+"""Picture of a render: pressure and spectrum above, contacts below, on one time axis.
 
     samples (channels, n) Pa -> pressure p(t)
                              -> level of a short-time spectrum, dB re 20 µPa per bin: 20 log10(|P(f, t)|/√2/20 µPa), |P|
                                  the amplitude of a sine
-    SoundEvent (soundtrack)  -> per sounding body one lane: strikes (area ∝ impulse), sliding and rolling bars
+    SoundEvent (soundtrack)  -> per body one lane: strikes (area ∝ impulse), sliding and rolling bars
 
-Events are those of the table that `--events` writes, and what rests beside them.
+Events are those of the table that `--events` writes, and supports beside them.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ STRIKES_MAX = 400  # of a lane, the strongest
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Events:
-    """What the bodies of a log did. strike_* (s,): body index, time in s, impulse in N·s; bar_* (r,): body index,
-    start, end in s, kind.
+    """Events of a log's bodies.
+
+    strike_* (s,): body index, time in s, impulse in N·s; bar_* (r,): body index, start, end in s, kind.
     """
 
     strike_body: Array
@@ -51,7 +52,7 @@ class Events:
 
 
 def drawn_events(log: ContactLog, events: Sequence[SoundEvent]) -> Events:
-    """Those of every body that has a model: what strikes, and what rests, rolls or slides."""
+    """Collect the strikes and the bars of rest, rolling or sliding of every body that has a model."""
     strikes: list[tuple[int, float, float]] = []
     bars: list[tuple[int, float, float, str]] = []
     for one in events:
@@ -71,10 +72,10 @@ def drawn_events(log: ContactLog, events: Sequence[SoundEvent]) -> Events:
 
 
 def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, Array]:
-    """(frequencies (f,) Hz, times (t,) s, levels (f, t) dB re 20 µPa) of the first channel of (channels, n) or (n,)
-    pascals; a window at a time is read of what is kept.
+    """Compute the spectrogram of the first channel of (channels, n) or (n,) pascals; stored sound is read by windows.
 
-    A Hann window of 10 ms, scaled so that a sine of amplitude a reads 20 log10(a/√2/20 µPa) whatever the rate.
+    Returns frequencies (f,) Hz, times (t,) s, levels (f, t) dB re 20 µPa. A Hann window of 10 ms, scaled so that a sine
+    of amplitude a reads 20 log10(a/√2/20 µPa) whatever the rate.
     """
     from scipy.signal.windows import hann
 
@@ -95,12 +96,12 @@ def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, A
 
 
 def quantity(sensor: Sensor) -> tuple[str, str]:
-    """What a sensor's samples are, and their unit."""
+    """Return the quantity of a sensor's samples, and their unit."""
     return {Microphone: ("pressure", "Pa"), Vibrometer: ("velocity", "m/s")}.get(type(sensor), ("modal sum", "1"))
 
 
 def check_picture_output(path: str | os.PathLike[str]) -> Path:
-    """The real path of a picture.
+    """Check a picture's path; return the real one.
 
     Raises FileError where the extension is not .png, .pdf or .svg or the place cannot be written.
     """
@@ -121,9 +122,18 @@ def render_picture(
 ) -> None:
     """Draw ``samples`` (channels, n) in Pa, and the events of ``log`` where there is one, to a PNG, PDF or SVG.
 
-    events: the log's, where they are known already; None: they are found (`find_sound_events`). Of several channels the
-    first is drawn, and the picture says so. Equal input gives equal bytes. Raises FileError (place, extension) and
-    AudioError (rate, shape, NaN).
+    Of several channels the first is drawn, and the picture says so. Equal input gives equal bytes.
+
+    Parameters
+    ----------
+    events : the log's, where they are known already; None: they are found (`find_sound_events`)
+
+    Raises
+    ------
+    FileError
+        The place or the extension is wrong.
+    AudioError
+        The rate, the shape or the samples are wrong.
     """
     check_picture_output(path)
     rate = check_sr(sr)
@@ -167,9 +177,7 @@ def render_picture(
 
 
 def _draw_samples(axis: Any, sound: KeptSound, sr: int, what: str, unit: str) -> None:
-    """p(t), as the band between least and greatest value of each of at most 4000 stretches: no peak falls between
-    pixels.
-    """
+    """Draw p(t) as the band between least and greatest value of at most 4000 stretches, so that no peak is lost."""
     frames = sound.shape[1]
     stretch = max(1, frames // 4000)
     least, most, energy = [np.zeros(0)], [np.zeros(0)], 0.0
@@ -218,7 +226,7 @@ def _draw_spectrogram(axis: Any, sound: KeptSound, sr: int) -> Any:
 
 
 def _lanes(log: ContactLog, events: Events) -> list[int]:
-    """The bodies to show: those that did something, the busiest first where there are too many, in the log's order."""
+    """Choose the bodies to show: those with events, the busiest where there are too many, in the log's order."""
     busy = np.bincount(np.append(events.strike_body, events.bar_body), minlength=len(log.bodies))
     chosen = np.argsort(-busy, kind="stable")[:LANES_MAX]
     return sorted(int(i) for i in chosen if busy[i] > 0)
@@ -299,7 +307,7 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
 
 
 def _label(log: ContactLog, index: int) -> str:
-    """Name and material of a body, as a lane's label."""
+    """Format name and material of a body as a lane's label."""
     body = log.bodies[index]
     name = body.name if len(body.name) <= 18 else body.name[:17] + "…"
     name = name.encode("utf-8", "replace").decode().replace("$", r"\$")

@@ -1,4 +1,4 @@
-"""One picture of what was cut: each recording's envelope, its takes shaded in turn, each strike numbered."""
+"""Picture of the takes cut: each recording's envelope, its takes shaded in turn, each strike numbered."""
 
 from __future__ import annotations
 

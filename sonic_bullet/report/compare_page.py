@@ -1,11 +1,11 @@
-"""One page of comparisons that opens offline: verdict and cause first, players that switch at the same sample.
+"""Page of comparisons that opens offline: verdict and cause first, players that switch at the same sample.
 
     Comparison -> page_entry (words, Ogg, PNG) -> write_page: template, autoescaped -> one HTML file
 
-Both sounds are started by one clock at one time, and switching changes which of them is heard: the same sample goes on.
-Nothing is fetched: sounds and pictures stand in the page. Its Content-Security-Policy allows the one style and the one
-script below by their hashes, so that what a body or a file is called never runs. Sounds are lossy (Ogg Vorbis) and
-scaled by one factor for both, and stand only where something differs.
+Both sounds are started by one clock at one time, and a switch changes the gains alone: the same sample goes on. Nothing
+is fetched: sounds and pictures stand in the page. Its Content-Security-Policy allows the one style and the one script
+below by their hashes, so that the name of a body or a file never runs. Sounds are lossy (Ogg Vorbis) and scaled by one
+factor for both, and included only where something differs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PEAK = 0.9
 PLAYED_S = 12.0
 """Of each sound at most, so that twenty scenes stay below 5 MB."""
 LEFT, RIGHT = 0.09, 0.98
-"""Where a picture's axes begin and end, as shares of its width: the cursor goes there."""
+"""Where a picture's axes begin and end, as fractions of its width, for the cursor."""
 
 STYLE = """
 :root{color-scheme:light dark;--line:#8886}
@@ -111,7 +111,7 @@ for (const box of document.querySelectorAll('.players')) {
 
 
 def page_entry(found: Comparison) -> dict[str, Any]:
-    """What the page says of one comparison: texts, and sounds and pictures as base64, where something differs."""
+    """Collect the page's content for one comparison: texts, and sounds and pictures (base64) if something differs."""
     described = found.described()
     entry: dict[str, Any] = {
         "name": Path(found.b.name).name,
@@ -148,7 +148,7 @@ def write_page(path: str, entries: list[dict[str, Any]], title: str = "Two versi
 
 
 def page(entries: list[dict[str, Any]], title: str = "Two versions compared") -> str:
-    """The page's text."""
+    """Render the page's text."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -163,7 +163,7 @@ def page(entries: list[dict[str, Any]], title: str = "Two versions compared") ->
 
 
 def _hash(text: str) -> str:
-    """Of an inline style or script, as a Content-Security-Policy names it [W3C CSP 3, section 2.3.1]."""
+    """Hash an inline style or script for a Content-Security-Policy [W3C CSP 3, section 2.3.1]."""
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
@@ -207,7 +207,7 @@ def _picture(found: Comparison, one: Array, other: Array, sr: int) -> str:
 
 
 def _levels(x: Array, sr: int) -> Array:
-    """(frequencies, windows) in dB, all channels together, at most 800 windows."""
+    """Compute levels (frequencies, windows) in dB, all channels together, at most 800 windows."""
     window = 1024
     hop = max(256, x.shape[1] // 800)
     padded = np.pad(x, ((0, 0), (window // 2, window // 2)))  # a window shows at its middle

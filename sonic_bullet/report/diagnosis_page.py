@@ -1,4 +1,4 @@
-"""One page that opens offline: the verdict in words, what to hear, what to see, and each candidate effect's evidence.
+"""Page of a diagnosis that opens offline: the verdict in words, sounds, pictures, and each candidate effect's evidence.
 
     Diagnosis -> players (WAV, 16 bit, one scale for all three sounds of a strike), spectrograms, (f, d) plane, table of
         candidate effects -> one HTML file
@@ -47,7 +47,7 @@ def write_report(path: str, d: Diagnosis) -> None:
 
 
 def page(d: Diagnosis) -> str:
-    """The page's text."""
+    """Render the page's text."""
     name = html.escape(d.case.name)
     parts = [
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{name}</title><style>{STYLE}</style>",
@@ -195,7 +195,7 @@ def _number(value: Any) -> str:
 
 
 def _wav(sample: Array, sr: int) -> str:
-    """A data URI."""
+    """Encode samples as a data URI."""
     import soundfile
 
     held = io.BytesIO()

@@ -1,9 +1,9 @@
-"""One page of takes that opens offline: a player each, how loud it is, what was drawn for it.
+"""Page of takes that opens offline: a player each, its loudness, and the factors drawn for it.
 
     sound, gain, loudness, factors -> take_entry (FLAC) -> write_page: template, autoescaped -> one HTML file
 
 Nothing is fetched: sounds stand in the page, without loss, so that the same takes give the same bytes. Its
-Content-Security-Policy allows the one style by its hash and no script, so that what a body is called never runs.
+Content-Security-Policy allows the one style by its hash and no script, so that a body's name never runs.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ td,th{text-align:left;padding:.2rem .8rem .2rem 0;border-bottom:1px solid var(--
 def take_entry(
     name: str, sound: KeptSound, sr: int, gain_per_pa: float, loudness: str, drawn: Mapping[str, Mapping[str, float]]
 ) -> dict[str, Any]:
-    """What the page says of one take."""
+    """Collect the page's content for one take."""
     import soundfile
 
     frames = min(sound.shape[1], round(PLAYED_S * sr))
