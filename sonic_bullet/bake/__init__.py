@@ -1,8 +1,8 @@
-"""A body's modal sound as a file that another engine plays.
+r"""A body's modal sound in a file for other engines.
 
     mesh + material -> session.body_models -> Body \
     scene, log      ->                        Body -> render.resonator: decays with the air's, pressure at 1 m
-        -> mode_importance: order, what is masked or weak
+        -> mode_importance: order, masked and weak modes
         -> sample_points: the user's own vertices, fewer or more -> shapes there
         -> BakedModel
     BakedModel -> gltf_models  .glb .gltf  KHR_audio_rigid_bodies, doubles and what it lacks in `extras`  -> BakedModel

@@ -1,8 +1,8 @@
-"""A baked model as JSON holds it: typed, every field checked; the same words in a .json file and in a glTF's `extras`.
+"""A baked model as JSON: typed, every field checked; the same names in a .json file and in a glTF's `extras`.
 
-BakedModel -> BodyForm -> JSON;   of it, ExtrasForm is what glTF's own accessors do not say
+BakedModel -> BodyForm -> JSON;   of it, ExtrasForm is what glTF's own accessors do not hold
 
-ABOUT says what each field means, for docs/reference/baked.md and the schema.
+ABOUT describes each field, for docs/reference/baked.md and the schema.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class ModesForm(_Part, frozen=True):
 
 
 class BakedMaterialForm(_Part, frozen=True):
-    """The solid, and how it meets another. What is not known is absent."""
+    """The solid, and its contact properties. What is not known is absent."""
 
     name: str = ""
     density_kg_m3: float | None = None
@@ -65,7 +65,7 @@ class MassForm(_Part, frozen=True):
 
 
 class ExtrasForm(_Part, frozen=True):
-    """What a glTF's own accessors do not say of a model: doubles, radiation, contact, residual."""
+    """What a glTF's own accessors do not hold of a model: doubles, radiation, contact, residual."""
 
     format: str
     modes: ModesForm
@@ -145,7 +145,7 @@ def _rows(matrix: Array) -> tuple[Triple, Triple, Triple]:
 
 
 def modes_form(model: BakedModel) -> ModesForm:
-    """The modes of a model without their shapes."""
+    """Return the modes of a model without their shapes."""
     pressure = model.pressure_pa_m
     bend, growth = model.bend_s2_m2, model.damping_growth_s_m
     return ModesForm(
@@ -160,7 +160,7 @@ def modes_form(model: BakedModel) -> ModesForm:
 
 
 def common_form(model: BakedModel) -> dict[str, Any]:
-    """The fields that `BodyForm` and `ExtrasForm` share."""
+    """Return the fields that `BodyForm` and `ExtrasForm` share."""
     mass = model.mass
     return {
         "modes": modes_form(model),
@@ -178,7 +178,7 @@ def common_form(model: BakedModel) -> dict[str, Any]:
 
 
 def model_of(form: BodyForm | ExtrasForm, *, name: str, point_m: Array, face: Array, shape: Array) -> BakedModel:
-    """The model that a form says, with shapes (p, 3, m) at its points. Raises RecordError, FileError, MaterialError."""
+    """Build the model of a form, with shapes (p, 3, m) at its points. Raises RecordError, FileError, MaterialError."""
     modes, mass = form.modes, form.mass
     real, imag = modes.pressure_real_pa_m, modes.pressure_imag_pa_m
     if (real is None) != (imag is None) or (real is not None and imag is not None and len(real) != len(imag)):
@@ -204,7 +204,7 @@ def model_of(form: BodyForm | ExtrasForm, *, name: str, point_m: Array, face: Ar
 
 
 def baked_schema() -> dict[str, Any]:
-    """JSON Schema of a baked .json file. Raises KeyError where a field has no words in `ABOUT`."""
+    """Build the JSON Schema of a baked .json file. Raises KeyError where a field has no description in `ABOUT`."""
     schema = msgspec.json.schema(BakedFile)
     for name, about in ABOUT.items():
         properties = schema["$defs"][name]["properties"]

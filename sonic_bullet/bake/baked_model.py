@@ -1,4 +1,4 @@
-"""What a baked body is, proven when it is built: modes at points of its surface, mass, contact constants.
+"""Records of a baked body, checked when built: modes at points of its surface, mass, contact constants.
 
     velocity of a mode q̇ = Re z,   strike j at p:  z += (1 + i d/ω) φ(p)·j,   ż = (-d + iω) z
     pressure at 1 m = Re Σ pressure·z
@@ -22,11 +22,15 @@ from sonic_bullet.records.coerce import as_number, as_text, shown
 
 @dataclass(frozen=True, slots=True)
 class BakedMaterial:
-    """What a baked body is made of, and how it meets another; None where a file does not say.
+    """Material of a baked body, and its contact properties; None where a file does not state them.
 
-    density_kg_m3, youngs_pa, poisson: of the solid. alpha_per_s, beta_s: the material's own Rayleigh damping, without
-    radiation. contact_modulus_pa: E/(1-ν²) where it is touched, of its softest axis; two bodies meet with
-    1/E* = Σ 1/contact_modulus [Johnson 1985, eq. 4.24]. restitution, roughness_m, hurst: as of `Material`.
+    Attributes
+    ----------
+    density_kg_m3, youngs_pa, poisson : of the solid
+    alpha_per_s, beta_s : the material's own Rayleigh damping, without radiation
+    contact_modulus_pa : E/(1-ν²) where it is touched, of its softest axis
+        Two bodies in contact have 1/E* = Σ 1/contact_modulus [Johnson 1985, eq. 4.24].
+    restitution, roughness_m, hurst : as of `Material`
     """
 
     name: str = ""
@@ -41,6 +45,7 @@ class BakedMaterial:
     hurst: float | None = None
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         where = f"material {shown(as_text(self.name, 'the name of a material', 'give a text'))}"
         bounds: dict[str, dict[str, Any]] = {
             "density_kg_m3": {"above": 0},
@@ -60,7 +65,7 @@ class BakedMaterial:
 
 
 def _words(bound: dict[str, Any]) -> str:
-    """A range as a remedy says it."""
+    """Describe a range for a remedy."""
     names = {"above": "above", "below": "below", "least": "of at least", "most": "of at most"}
     return " and ".join(f"{names[key]} {value:g}" for key, value in bound.items())
 
@@ -74,6 +79,7 @@ class MassProperties:
     inertia_kg_m2: Array
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         store(
             self,
             mass_kg=as_number(self.mass_kg, "mass_kg", "give a mass above zero", above=0),
@@ -86,12 +92,17 @@ class MassProperties:
 class BakedModel:
     """One body's modal sound, for engines of any kind.
 
-    freq_hz, decay_per_s (m,): of the damped modes, the most important first; the decay has all that the body loses,
-    radiation too. shape (p, 3, m) float32: displacement at the points, mass-normalised, in 1/√kg. point_m (p, 3): on
-    the surface. face (f, 3): triangles of points between which shapes are interpolated; f = 0: the nearest point's
-    shape counts. pressure_pa_m (m,) complex: pressure at 1 m, in Pa·m, per modal velocity of 1 m/s·√kg, mean over
-    directions; None where a file does not say. bend_s2_m2, damping_growth_s_m (m,), damping_growth_power: as of
-    `ModalModel`, None for a linear body. residual: what the preset sounds beside its modes. notes: what to know of it.
+    Attributes
+    ----------
+    freq_hz, decay_per_s : (m,) of the damped modes, the most important first; decays include all losses, radiation too
+    shape : (p, 3, m) float32, displacement at the points, mass-normalised, in 1/√kg
+    point_m : (p, 3) on the surface
+    face : (f, 3) triangles of points between which shapes are interpolated; f = 0: the nearest point's shape counts
+    pressure_pa_m : (m,) complex, pressure at 1 m, in Pa·m, per modal velocity of 1 m/s·√kg, mean over directions
+        None where a file does not state it.
+    bend_s2_m2, damping_growth_s_m, damping_growth_power : (m,), (m,), as of `ModalModel`, None for a linear body
+    residual : the preset's residual
+    notes : notes for the user
     """
 
     name: str
@@ -110,6 +121,7 @@ class BakedModel:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check shapes and numbers."""
         where = f"baked model {shown(as_text(self.name, 'the name of a baked model', 'give a text'))}"
         again = "bake it again"
         freq = frozen_array(self.freq_hz, float, (None,), f"{where}: freq_hz")
@@ -144,4 +156,5 @@ class BakedModel:
 
     @property
     def mode_count(self) -> int:
+        """Number of modes."""
         return len(self.freq_hz)

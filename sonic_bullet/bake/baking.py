@@ -1,9 +1,9 @@
 """A body with its modes -> BakedModel.
 
-    Body -> render.resonator, which scenes sound by: decays with the air's and the mounting's, pressure at 1 m
+    Body -> render.resonator, as in scenes: decays with the air's and the mounting's, pressure at 1 m
          -> modes in order of importance -> shapes at points of the user's surface, by nearest point on the solved one
 
-A mesh's own vertices are where its file has them, in its order; what the solver meshed has others.
+A mesh's own vertices are where its file has them, in its order; the solver's mesh has others.
 """
 
 from __future__ import annotations
@@ -24,17 +24,20 @@ from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
 
 HIGHEST_RATE_HZ = 384_000
-"""Modes up to half of it are baked; who plays them leaves out those above half his own rate."""
+"""Modes up to half of it are baked; a player leaves out those above half its own rate."""
 COARSE = 0.1
-"""Rms of what triangles of points get wrong of the shapes between them, relative, that is said. A tenth is 1 dB."""
+"""Relative rms error of shapes interpolated between points above which a note is given. A tenth is 1 dB."""
 
 
 @dataclass(frozen=True, slots=True)
 class PruningOptions:
-    """What is left of a model.
+    """Limits of a baked model. Raises ModalError naming the argument.
 
-    modes: so many at most, the most important. below_db: leave out what is masked, and what is so many dB below the
-    strongest. points: at so many points; None: the mesh's own vertices. Raises ModalError naming the argument.
+    Attributes
+    ----------
+    modes : at most as many, the most important
+    below_db : leave out masked modes, and those so many dB below the strongest
+    points : number of points; None: the mesh's own vertices
     """
 
     modes: int | None = None
@@ -42,6 +45,7 @@ class PruningOptions:
     points: int | None = None
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         for name, remedy in (("modes", "keep 1 mode at least"), ("points", "give 3 points at least")):
             value = getattr(self, name)
             if value is not None:
@@ -177,7 +181,7 @@ def bake_body(
 
 
 def _shape_at(point_m: Array, index: SurfaceIndex, shape: Array, model: ModalModel) -> Array:
-    """Shapes (p, 3, m) float32 at points, interpolated in the solved surface's triangles."""
+    """Interpolate shapes (p, 3, m) float32 at points in the solved surface's triangles."""
     face, weight, _ = nearest(index, point_m)
     return np.asarray(np.einsum("pc,pcxm->pxm", weight, shape[model.face[face]]), np.float32)
 
@@ -185,8 +189,9 @@ def _shape_at(point_m: Array, index: SurfaceIndex, shape: Array, model: ModalMod
 def _coarse(
     point: Array, face: Array, shape: Array, index: SurfaceIndex, solved: Array, model: ModalModel, energy: Array
 ) -> str:
-    """How wrong shapes are between the points, where that is much: at the triangles' middles, against the solved ones,
-    mean of the modes by energy.
+    """Describe the error of shapes between the points, where it is large.
+
+    At the triangles' middles, against the solved shapes, mean of the modes by energy.
     """
     if not len(face):
         return ""
@@ -221,7 +226,7 @@ def _material_of(material: Material) -> BakedMaterial:
 
 
 def _solid_of(model: ModalModel, density_kg_m3: float) -> MassProperties | None:
-    """Of the meshed solid, whose mass the shapes are normalised by; None where its surface encloses nothing."""
+    """Compute the mass properties of the meshed solid, which normalises the shapes; None where its surface is open."""
     if model.mass_kg <= 0 or volume_m3(model.vertex_m, model.face) <= 0:
         return None
     mass, centre, moment = inertia(model.vertex_m, model.face, density_kg_m3)

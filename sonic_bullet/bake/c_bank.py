@@ -7,7 +7,7 @@
     bowl_render(&bank, out, n);
 
 The bank is `strike_playback` sample for sample, in double, C99 and the maths library alone. It holds a few pulses at a
-time; a strike when all are under way is not taken, and `_strike` says so by 0.
+time; when all are under way a strike is refused, and `_strike` returns 0.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def write_c_bank(path: str | os.PathLike[str], model: BakedModel) -> None:
 
 
 def c_bank_text(model: BakedModel) -> str:
-    """The header. Raises ModalError where nothing says how the model radiates."""
+    """Write the header's text. Raises ModalError where the model has no radiation."""
     name, pressure = identifier(model.name), pressure_of(model)
     guard = f"{name.upper()}_MODAL_BANK_H"
     material = re.sub(r"\*/|[\r\n]", " ", model.material.name)
@@ -133,13 +133,13 @@ def c_bank_text(model: BakedModel) -> str:
 
 
 def identifier(name: str) -> str:
-    """A name as C and Faust take it."""
+    """Make a name that C and Faust accept."""
     plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
     return plain if plain and not plain[0].isdigit() and plain not in RESERVED else f"body_{plain}".rstrip("_")
 
 
 def _table(kind: str, name: str, values: Array) -> str:
-    """An array of C, in digits that give the same number back."""
+    """Write an array in C, in digits that give the same number back."""
     flat = values.ravel()
     digits = 17 if kind == "double" else 9
     words = [f"{value:.{digits}g}" for value in flat.tolist()]

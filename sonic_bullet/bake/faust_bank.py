@@ -70,7 +70,7 @@ with {{
 
 process =
 """
-"""What stands before the modes, one a line: frequency, decay, pressure, and a table of g over the points."""
+"""What precedes the modes, one a line: frequency, decay, pressure, and a table of g over the points."""
 
 
 def write_faust_bank(path: str | os.PathLike[str], model: BakedModel) -> None:
@@ -80,7 +80,7 @@ def write_faust_bank(path: str | os.PathLike[str], model: BakedModel) -> None:
 
 
 def faust_bank_text(model: BakedModel) -> str:
-    """The program. Raises ModalError where nothing says how the model radiates."""
+    """Write the program's text. Raises ModalError where the model has no radiation."""
     pressure = pressure_of(model)
     gain = -np.einsum("px,pxm->mp", point_normals(model), model.shape.astype(float))
     loudest = int(np.argmax((gain**2).T @ (np.abs(pressure) ** 2 / np.maximum(model.decay_per_s, 1e-3))))
@@ -105,6 +105,6 @@ def faust_bank_text(model: BakedModel) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """A number as Faust reads it: never a whole one, which it would take for an integer."""
+    """Format a number for Faust: never a whole one, which it would take for an integer."""
     text = f"{value:.{digits}g}"
     return text if "." in text or "e" in text else f"{text}.0"

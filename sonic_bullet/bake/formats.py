@@ -1,7 +1,7 @@
-"""Which file holds what: by a name's end.
+"""Formats of baked files, by a name's ending.
 
 .glb .gltf .json    any number of models, read back by `read_baked`
-.dsp .h .wav        one model, for whoever plays it
+.dsp .h .wav        one model, for playback
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ONE = (".dsp", ".h", ".wav")
 
 
 def check_baked_name(path: str | os.PathLike[str]) -> str:
-    """The end of a name that a baked model can have. Raises FileError."""
+    """Check that a name has the ending of a baked model, and return it. Raises FileError."""
     end = Path(as_path(path, "path", "name a file, such as bowl.glb")).suffix.lower()
     if end not in SEVERAL + ONE:
         raise FileError(f"cannot bake to {path}: {shown(end)} is no format known here", nearest(end, SEVERAL + ONE))

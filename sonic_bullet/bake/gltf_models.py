@@ -5,8 +5,8 @@
     a node and a mesh for each model; two nodes of one model are two bodies
     extras.sonic_bullet of a model: doubles, pressure at 1 m, contact constants, residual (baked_form.ExtrasForm)
 
-[KHR_audio_rigid_bodies, draft of 2026: Accessor Requirements, Mass Properties, Acoustic Surfaces.] What `extras` say
-counts where it agrees with the accessors to float32; where somebody changed these, they count.
+[KHR_audio_rigid_bodies, draft of 2026: Accessor Requirements, Mass Properties, Acoustic Surfaces.] `extras` count where
+they agree with the accessors to float32; where these were changed, the accessors count.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _surface_entry(material: BakedMaterial) -> dict[str, Any]:
 
 
 def _model_entry(model: BakedModel, buffer: GltfBuffer, number: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """A model's entry, and the mesh primitive of its surface, None where it has no triangle."""
+    """Write a model's entry, and the mesh primitive of its surface, None where it has no triangle."""
     positions = buffer.append(model.point_m, target=ARRAY_BUFFER)
     entry: dict[str, Any] = {
         "name": model.name,
@@ -118,7 +118,7 @@ def _mass_entry(mass: MassProperties) -> dict[str, Any]:
 
 
 def read_gltf_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
-    """The models of a .gltf or .glb that has KHR_audio_rigid_bodies, in its order. Raises FileError, RecordError."""
+    """Read the models of a .gltf or .glb with KHR_audio_rigid_bodies, in its order. Raises FileError, RecordError."""
     tree = read_tree(Path(path), FileError, REMEDY)
     audio = tree.tree.get("extensions", {}).get(EXTENSION, {})
     found = audio.get("modalModels", ())
@@ -167,7 +167,7 @@ def _values(
     count: int | None = None,
     whole: bool = False,
 ) -> Array:
-    """(n, width) of an accessor that a model names, as the draft wants it. Raises FileError."""
+    """Read an accessor (n, width) that a model names, checked against the draft. Raises FileError."""
     index, all_of_them = entry.get(key), tree.tree.get("accessors", ())
     if index is None:
         raise FileError(f"{name} has no {key}", REMEDY)
@@ -190,7 +190,7 @@ def _values(
 
 
 def _extras(entry: Mapping[str, Any], freq_hz: Array, decay_per_s: Array, name: str) -> ExtrasForm | None:
-    """Our own words on a model, where they are of its accessors."""
+    """Read our extras of a model, where they agree with its accessors."""
     extras = entry.get("extras")
     said = extras.get(EXTRAS) if isinstance(extras, dict) else None
     if said is None:

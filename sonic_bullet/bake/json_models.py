@@ -37,12 +37,12 @@ def write_json_models(path: str | os.PathLike[str], models: Sequence[BakedModel]
 
 
 def _shortest(values: Array) -> Array:
-    """float32 numbers as the doubles of fewest digits that are the same float32: a file half as long."""
+    """Convert float32 numbers to doubles of fewest digits that are the same float32: a file half as long."""
     return values.astype(np.float32).astype(str).astype(float)
 
 
 def read_json_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
-    """The models that `write_json_models` wrote. Raises FileError, RecordError."""
+    """Read the models that `write_json_models` wrote. Raises FileError, RecordError."""
     place = Path(path)
     if place.stat().st_size > LARGEST_BYTES:
         raise FileError(f"{path} is larger than a gigabyte", "bake fewer modes or points")

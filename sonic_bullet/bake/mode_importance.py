@@ -1,12 +1,12 @@
-"""Which modes of a body matter to an ear, and which are not worth a resonator.
+"""Importance of a body's modes to a listener, and which are not worth a resonator.
 
     E = <|φ·n|²> |p|²/4d                                      energy at 1 m after one impulse, mean over the surface
     masked:  L < 10 log₁₀ Σ_j 10^{(L_j + S(z - z_j) - 14.5 - z_j)/10}      over j that ring at least as long
     S(Δz) = 15.81 + 7.5 (Δz + 0.474) - 17.5 √(1 + (Δz + 0.474)²)  dB       [Schroeder, Atal, Hall 1979, eq. 1]
-    14.5 + z dB: a tone hides a narrow band that far below itself          [Jayant, Johnston, Safranek 1993, sec. III]
+    14.5 + z dB: a tone masks a narrow band that far below itself          [Jayant, Johnston, Safranek 1993, sec. III]
     z = 6 asinh(f/600)  Bark
 
-What rings on when its masker is gone is not masked by it, so only maskers that decay no faster count.
+A mode that outlasts its masker is not masked by it, so only maskers that decay no faster count.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from sonic_bullet.geometry import face_areas_m2, outward_normals
 from sonic_bullet.records import Array
 
 SLOWEST_PER_S = 1e-3
-"""A decay that is none counts as this one: 10^4 s are forever to an ear."""
+"""A decay of zero counts as this one: 10^4 s."""
 
 
 def mode_energy(vertex_m: Array, face: Array, shape: Array, pressure_pa_m: Array, decay_per_s: Array) -> Array:
-    """E (m,) in Pa²·s per (N·s)². Source: the module's first equation."""
+    """Compute E (m,) in Pa²·s per (N·s)² by the module's first equation."""
     area, normal = face_areas_m2(vertex_m, face), outward_normals(vertex_m, face)
     along = np.einsum("fx,fxm->fm", normal, shape[face].mean(axis=1, dtype=float))
     square = area @ along**2 / area.sum()
@@ -29,7 +29,7 @@ def mode_energy(vertex_m: Array, face: Array, shape: Array, pressure_pa_m: Array
 
 
 def masked_modes(freq_hz: Array, decay_per_s: Array, energy: Array) -> Array:
-    """(m,) bool: modes that others hide. Source: the module's equations."""
+    """Find the modes (m,) that others mask, by the module's equations."""
     bark = 6 * np.arcsinh(freq_hz / 600)
     with np.errstate(divide="ignore"):
         level = 10 * np.log10(energy)
@@ -43,7 +43,7 @@ def masked_modes(freq_hz: Array, decay_per_s: Array, energy: Array) -> Array:
 def important_modes(
     freq_hz: Array, decay_per_s: Array, energy: Array, *, most: int | None = None, below_db: float | None = None
 ) -> Array:
-    """Indices of the modes to keep, the most important first.
+    """Return the indices of the modes to keep, the most important first.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def important_modes(
     most : int, optional
         How many to keep at most.
     below_db : float, optional
-        Leave out what is masked, and what lies so many dB below the strongest mode.
+        Leave out masked modes, and those so many dB below the strongest.
     """
     order = np.argsort(-energy, kind="stable")
     if below_db is not None and len(order):

@@ -4,7 +4,7 @@ fewer: farthest-point sampling along the surface [Gonzalez 1985], then the trian
     different points: the dual of the points' Voronoi cells
 more:  the longest edge is halved, again and again [Rivara 1984]; the user's own vertices stay first, in their order
 
-Distances go along edges (Dijkstra), so the two sides of a thin wall are far from each other. Vertices on one place are
+Distances go along edges (Dijkstra), so the two sides of a thin wall are far from each other. Vertices at one place are
 one: STL has each as often as it has triangles there.
 """
 
@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 
 
 def sample_points(vertex_m: Array, face: Array, count: int | None) -> tuple[Array, Array]:
-    """Points (p, 3) and triangles (f, 3) of a surface; ``count`` None: its own vertices as they are."""
+    """Sample points (p, 3) and triangles (f, 3) of a surface; ``count`` None: its own vertices as they are."""
     if count is None or count == len(vertex_m) or not len(face):
         return vertex_m, face
     return _fewer(vertex_m, face, count) if count < len(vertex_m) else _more(vertex_m, face, count)
@@ -58,7 +58,7 @@ def _fewer(vertex_m: Array, face: Array, count: int) -> tuple[Array, Array]:
 
 
 def _distinct(face: Array) -> Array:
-    """Faces of the same corners in the same sense, once each."""
+    """Remove repeated faces of the same corners in the same sense."""
     if not len(face):
         return face
     turn = np.argmin(face, axis=1)

@@ -26,14 +26,19 @@ from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST
 NODES_PER_SAMPLE = 2
 BLOCK = 256
 IMPULSE_N_S, CONTACT_S = 0.01, 1e-4
-"""Of a strike that nobody describes: a light tap, as long as steel on steel."""
+"""Of a strike without given impulse and length: a light tap, as long as steel on steel."""
 LONGEST_CONTACT_S = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BakedStrike:
-    """point_m (3,): where, on the surface. impulse_n_s (3,): what the body gets. contact_s: length of the pulse; 0: all
-    at once. Raises RecordError.
+    """One strike. Raises RecordError.
+
+    Attributes
+    ----------
+    point_m : (3,) where, on the surface
+    impulse_n_s : (3,) impulse on the body
+    contact_s : length of the pulse; 0: all at once
     """
 
     point_m: Array
@@ -41,6 +46,7 @@ class BakedStrike:
     contact_s: float = CONTACT_S
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         remedy = f"give 0 to {LONGEST_CONTACT_S} s"
         store(
             self,
@@ -59,7 +65,7 @@ def choose_strike(
     impulse_n_s: float = IMPULSE_N_S,
     contact_s: float = CONTACT_S,
 ) -> BakedStrike:
-    """A strike of what is given.
+    """Make a strike, with defaults for what is not given.
 
     Parameters
     ----------
@@ -94,8 +100,9 @@ def choose_strike(
 
 
 def point_normals(model: BakedModel) -> Array:
-    """Outward unit normals (p, 3): means of the triangles around each point, by area [Gouraud 1971]; along x where no
-    triangle has a point.
+    """Compute outward unit normals (p, 3): means of the triangles around each point, by area [Gouraud 1971].
+
+    Along x where no triangle has a point.
     """
     total = np.zeros((len(model.point_m), 3))
     corner = model.point_m[model.face]
@@ -107,7 +114,10 @@ def point_normals(model: BakedModel) -> Array:
 
 
 def pressure_of(model: BakedModel) -> Array:
-    """(m,) its pressure at 1 m; where its file does not say, by its surface of points. Raises ModalError."""
+    """Return the model's pressure (m,) at 1 m; where its file has none, compute it from its surface of points.
+
+    Raises ModalError.
+    """
     if model.pressure_pa_m is not None:
         return model.pressure_pa_m
     if not len(model.face):
@@ -134,7 +144,7 @@ def pressure_of(model: BakedModel) -> Array:
 
 
 def shape_at(model: BakedModel, point_m: Array) -> Array:
-    """Shapes (3, m) at a place: interpolated in the nearest triangle, else the nearest point's."""
+    """Interpolate shapes (3, m) at a place in the nearest triangle, else return the nearest point's."""
     if not len(model.face):
         return np.asarray(model.shape[int(np.argmin(np.linalg.norm(model.point_m - point_m, axis=1)))], float)
     face, weight, _ = closest_point(model.point_m, model.face, np.asarray(point_m, float)[None])
@@ -142,7 +152,7 @@ def shape_at(model: BakedModel, point_m: Array) -> Array:
 
 
 def render_strike(model: BakedModel, strike: BakedStrike, sr: int = 48_000, seconds: float = 2.0) -> Array:
-    """Pressure of one strike at 1 m.
+    """Render the pressure of one strike at 1 m.
 
     Parameters
     ----------
@@ -190,8 +200,9 @@ def render_strike(model: BakedModel, strike: BakedStrike, sr: int = 48_000, seco
 
 
 def pulse_nodes(length: float) -> tuple[Array, Array]:
-    """Times (N,) in samples from the start and parts (N,) of the impulse of a pulse of so many samples. Source: the
-    module's first equation.
+    """Compute node times (N,) in samples from the start and impulse fractions (N,) of a pulse of ``length`` samples.
+
+    By the module's first equation.
     """
     length = max(length, SHORTEST)
     count = max(NODES_PER_PULSE, int(np.ceil(NODES_PER_SAMPLE * length)))
