@@ -118,7 +118,7 @@ def described(thing: Any) -> Iterator[str]:
         if all(line.startswith("    ") for line in lines):
             yield from ["", "```text", *(line[4:] for line in lines), "```"]
         elif len(lines) > 2 and re.fullmatch("-{3,}", lines[1]):
-            yield from ["", f"{lines[0]}:", "", *section_entries(lines[2:])]
+            yield from ["", f"{lines[0]}:", "", *section_entries(lines[0], lines[2:])]
         else:
             yield ""
             fields = re.split(FIELD, " ".join(line.strip() for line in lines))
@@ -129,7 +129,7 @@ def described(thing: Any) -> Iterator[str]:
                 yield from (f"{'  ' if i else '- '}{line}" for i, line in enumerate(filled(field)))
 
 
-def section_entries(lines: list[str]) -> Iterator[str]:
+def section_entries(section: str, lines: list[str]) -> Iterator[str]:
     """Format the entries of a numpydoc section as a list: what is indented below an entry describes it."""
     entries: list[list[str]] = []
     for line in lines:
@@ -139,7 +139,8 @@ def section_entries(lines: list[str]) -> Iterator[str]:
             entries.append([line.strip()])
     for head, *description in entries:
         name, _, kind = head.partition(" : ")
-        title = f"`{name}` ({kind})" if kind else head
+        named = section in ("Parameters", "Attributes", "Raises")
+        title = f"`{name}` ({kind})" if kind else f"`{head}`" if named else head
         text = f"{title}: {' '.join(description)}" if description else title
         yield from (f"{'  ' if i else '- '}{line}" for i, line in enumerate(filled(text)))
 

@@ -143,7 +143,9 @@ class Listener:
         relative, of the highest frequency; the models' notes state what is reached. mounting: "free", "placed" (in a
         building; of mass 0 the default), "on floor" (one side radiates) or the added loss factor.
         progress: called with the link whose modes or radiation are computed; without one, stderr
-        shows what takes over 2 s. Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
+        shows what takes over 2 s.
+
+        Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
         SceneError (unknown body or link, a name in use), MaterialError, MeshError, ModalError, RecordError.
         """
         how: dict[str, Any] = {
@@ -216,11 +218,15 @@ class Listener:
         """Play the sound from now on: each step returns when the card has space for its frame.
 
         A loop faster than real time is paced by it; leave `time.sleep` out. A slower one leaves gaps, which
-        `Playback.report` counts. device: name or number of a sound card, None for the system's own, "null" for none,
-        clocked in real time. full_scale_pa: the pressure (m/s for vibrometers) of full scale; larger samples are
-        clipped and counted. ahead_s: how much sound may wait for the card: how late a step may be. A card that goes
-        away is a `PlaybackWarning`, and physics and log go on. Close the result, or use it as a context manager. Raises
-        AudioError: no such card or rate, fewer channels than microphones, no microphone, detached, playing already.
+        `Playback.report` counts. A card that goes away is a `PlaybackWarning`, and physics and log go on. Close the
+        result, or use it as a context manager.
+
+        device: name or number of a sound card, None for the system's own, "null" for none, clocked in real time.
+        full_scale_pa: the pressure (m/s for vibrometers) of full scale; larger samples are clipped and counted.
+        ahead_s: how much sound may wait for the card: how late a step may be.
+
+        Raises AudioError: no such card or rate, fewer channels than microphones, no microphone, detached, playing
+        already.
         """
         if not self._attached:
             raise AudioError("the listener is detached, so nothing more will sound", "attach a new one")
@@ -305,7 +311,7 @@ class Listener:
         return self._synth.sound()
 
     def kept_sound(self, *, tail_db: float | None = None) -> KeptSound:
-        """Return the result of `sound` in its spool, for runs longer than the memory. tail_db: as for `write`."""
+        """Return the result of `sound` in its spool, for runs longer than the memory; tail_db as for `write`."""
         return self._synth.kept_sound(as_tail_db(tail_db))
 
     def write(self, path: str | Path, *, tail_db: float | None = None, **options: Any) -> AudioReport:
