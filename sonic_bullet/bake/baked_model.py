@@ -26,11 +26,15 @@ class BakedMaterial:
 
     Attributes
     ----------
-    density_kg_m3, youngs_pa, poisson : of the solid
-    alpha_per_s, beta_s : the material's own Rayleigh damping, without radiation
-    contact_modulus_pa : E/(1-ν²) where it is touched, of its softest axis
-        Two bodies in contact have 1/E* = Σ 1/contact_modulus [Johnson 1985, eq. 4.24].
-    restitution, roughness_m, hurst : as of `Material`
+    density_kg_m3, youngs_pa, poisson
+        Of the solid.
+    alpha_per_s, beta_s
+        The material's own Rayleigh damping, without radiation.
+    contact_modulus_pa
+        E/(1-ν²) where it is touched, of its softest axis. Two bodies in contact have 1/E* = Σ 1/contact_modulus
+        [Johnson 1985, eq. 4.24].
+    restitution, roughness_m, hurst
+        As of `Material`.
     """
 
     name: str = ""
@@ -94,15 +98,23 @@ class BakedModel:
 
     Attributes
     ----------
-    freq_hz, decay_per_s : (m,) of the damped modes, the most important first; decays include all losses, radiation too
-    shape : (p, 3, m) float32, displacement at the points, mass-normalised, in 1/√kg
-    point_m : (p, 3) on the surface
-    face : (f, 3) triangles of points between which shapes are interpolated; f = 0: the nearest point's shape counts
-    pressure_pa_m : (m,) complex, pressure at 1 m, in Pa·m, per modal velocity of 1 m/s·√kg, mean over directions
-        None where a file does not state it.
-    bend_s2_m2, damping_growth_s_m, damping_growth_power : (m,), (m,), as of `ModalModel`, None for a linear body
-    residual : the preset's residual
-    notes : notes for the user
+    freq_hz, decay_per_s : (m,)
+        Of the damped modes, the most important first; decays include all losses, radiation too.
+    shape : (p, 3, m) float32
+        Displacement at the points, mass-normalised, in 1/√kg.
+    point_m : (p, 3)
+        On the surface.
+    face : (f, 3)
+        Triangles of points between which shapes are interpolated; f = 0: the nearest point's shape counts.
+    pressure_pa_m : (m,) complex
+        Pressure at 1 m, in Pa·m, per modal velocity of 1 m/s·√kg, mean over directions. None where a file does not
+        state it.
+    bend_s2_m2, damping_growth_s_m, damping_growth_power : (m,), (m,)
+        As of `ModalModel`, None for a linear body.
+    residual
+        The preset's residual.
+    notes
+        Notes for the user.
     """
 
     name: str

@@ -35,9 +35,12 @@ class PruningOptions:
 
     Attributes
     ----------
-    modes : at most as many, the most important
-    below_db : leave out masked modes, and those so many dB below the strongest
-    points : number of points; None: the mesh's own vertices
+    modes
+        At most as many, the most important.
+    below_db
+        Leave out masked modes, and those so many dB below the strongest.
+    points
+        Number of points; None: the mesh's own vertices.
     """
 
     modes: int | None = None

@@ -73,7 +73,7 @@ def read_baked(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     Parameters
     ----------
     path : path
-        A .json that `bake` wrote, or a .glb or .gltf with KHR_audio_rigid_bodies, anybody's.
+        A .json that `bake` wrote, or a .glb or .gltf with KHR_audio_rigid_bodies, of any origin.
 
     Returns
     -------

@@ -36,9 +36,12 @@ class BakedStrike:
 
     Attributes
     ----------
-    point_m : (3,) where, on the surface
-    impulse_n_s : (3,) impulse on the body
-    contact_s : length of the pulse; 0: all at once
+    point_m : (3,)
+        Where, on the surface.
+    impulse_n_s : (3,)
+        Impulse on the body.
+    contact_s
+        Length of the pulse; 0: all at once.
     """
 
     point_m: Array

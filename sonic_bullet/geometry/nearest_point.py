@@ -32,8 +32,7 @@ NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", 
 
 LEAF = 4
 # A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A,
-# at
-# most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near
+# at most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near
 # both).
 WALL_PART = 0.03
 # Faces whose distances differ by less than this part of the surface's diagonal are equally near.
@@ -221,7 +220,7 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
                 _box_gap(px, py, pz, nodes[node_at + left]),
                 _box_gap(px, py, pz, nodes[node_at + right]),
             )
-            nearer = 1 if gap_left <= gap_right else 0  # is looked at first: it lies on top
+            nearer = 1 if gap_left <= gap_right else 0  # visited first, on top of the stack
             stack[top + nearer], gaps[top + nearer] = left, gap_left
             stack[top + 1 - nearer], gaps[top + 1 - nearer] = right, gap_right
             top += 2

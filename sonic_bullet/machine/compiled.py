@@ -35,7 +35,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         kernel = _kernel(function, options)
         place = folder()
         if place is not None:
-            with suppress(Exception):  # a numba whose inner parts moved: the kernel is compiled in every process
+            with suppress(Exception):  # numba's inner parts have changed: the kernel is compiled in every process
                 from sonic_bullet.machine.kept_code import KernelCache
 
                 kernel._cache = KernelCache(function, place)

@@ -129,7 +129,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
             return None
 
     def _loaded(self, sig: Any, target_context: Any) -> Any:
-        # all that is needed to run code; what is needed to write it takes 0.3 s to import, and is when some is written
+        # enough to run code; what is needed to write it takes 0.3 s to import, and is imported then
         rtsys.initialize(target_context)
         return self._load_overload(sig, target_context)
 

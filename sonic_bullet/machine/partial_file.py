@@ -26,7 +26,7 @@ except ImportError:  # Windows: nothing is locked there, and nothing swept
     fcntl = None  # type: ignore[assignment]
 
 NAME = re.compile(r"sonic-bullet-[0-9a-f]{16}\.partial")
-PROBE_BYTES = 1 << 20  # more than any writer here asks for at once
+PROBE_BYTES = 1 << 20  # more than any writer here writes at once
 OPEN_FLAGS = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -50,7 +50,7 @@ class PartialFile:
     def replace(self, target: Path) -> None:
         """Write all bytes to the disk, then put the file in the place of ``target``. Raises OSError."""
         os.fsync(self.fd)
-        if os.name == "nt":  # which renames no file that is open
+        if os.name == "nt":  # Windows renames no open file
             self._shut()
         os.replace(self.path, target)
 

@@ -258,7 +258,7 @@ def _printed() -> Iterator[None]:
     with ExitStack() as stack:
         stack.callback(os.close, out)
         stack.callback(os.close, into)
-        with suppress(RuntimeError):  # no thread to be had
+        with suppress(RuntimeError):  # no thread can be started
             thread.start()
             stack.callback(thread.join, 1.0)
             stack.callback(os.write, into, b"end\n")

@@ -199,7 +199,7 @@ def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool,
         if os.getpid() != worker._LINE.process:  # a fork of the scene's own that came this far
             leave(code)
         tell("done", str(code))
-        if alone:  # as an interpreter ends; whoever called `supervised` goes on in the other process alone
+        if alone:  # as an interpreter ends; the caller of `supervised` continues in the other process alone
             atexit._run_exitfuncs()
             with suppress(Exception):
                 sys.stdout.flush(), sys.stderr.flush()
@@ -243,7 +243,7 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
         if now - max(own_since, asked_at) > ASK_S or (now - own_since > IDLE_S and now - asked_at > ASK_S):
             asked_at = now
             found = _judgement(child.where(), child.scene)
-            if found != "own":  # a call into C that lasts does not answer
+            if found != "own":  # a long call into C does not answer
                 own_since = now
             elif now - own_since > IDLE_S and not os.environ.get("SONIC_BULLET_DEBUG"):
                 if ended_idle is not None:

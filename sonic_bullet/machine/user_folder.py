@@ -76,7 +76,7 @@ def _root() -> Path | None:
     except (OSError, RuntimeError, KeyError) as error:  # a user without a name or a home
         _note(f"this user has no home ({error})")
         return None
-    if not path.is_absolute():  # "~" stays "~" where nobody knows this user
+    if not path.is_absolute():  # "~" stays "~" for an unknown user
         _note("this user has no home")
         return None
     return private_folder(path)

@@ -76,7 +76,7 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
 def catch_stops() -> None:
     """Make the first interrupt a KeyboardInterrupt, and ignore all others."""
     for word in STOPS:
-        if signal.getsignal(word) is not signal.SIG_IGN:  # as a shell's background jobs have it
+        if signal.getsignal(word) is not signal.SIG_IGN:  # ignored, as in a shell's background jobs
             signal.signal(word, _stop)
 
 

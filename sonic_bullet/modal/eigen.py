@@ -24,7 +24,7 @@ from sonic_bullet.records.errors import ModalError
 
 BLOCK = 8
 TOLERANCE = 1e-7  # of the residual bound, relative to θ
-RIGID_TOLERANCE = 1e-4  # of the first elastic λ: 1e-5 is round-off in a sheet a seven-hundredth as thick as long
+RIGID_TOLERANCE = 1e-4  # of the first elastic λ: 1e-5 is round-off in a sheet of thickness length/700
 
 
 @dataclass(frozen=True, slots=True, eq=False)

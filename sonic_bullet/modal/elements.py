@@ -41,7 +41,7 @@ body is tried: creases keep elements small.
 """
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
-LIMIT = 100_000  # unknowns that degree 3 may take: of more elements those of degree 2 are a third
+LIMIT = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
 TRIES = 2
 WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
 OVER = 1.4  # × MOST_UNKNOWNS: a surface with more detail than its volume and area predict takes larger elements
@@ -100,7 +100,7 @@ class Elements:
     def nodes(self) -> lagrange.Field:
         """Nodes of the unknowns, over L, in elimination order."""
         made = lagrange.field(self.solid, self.degree)
-        if self.degree == 2:  # the solid is in that order
+        if self.degree == 2:  # the solid's nodes are in elimination order
             return made
         order = dissection(made.node_m, made.tet)
         place = np.empty(len(order), np.int64)

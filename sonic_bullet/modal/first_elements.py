@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 PER_WAVE = 0.2
 """First edge over the shortest wave."""
 WIDE = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
-LARGEST = 0.2  # edge over the diagonal: fewer elements than that are no body
+LARGEST = 0.2  # edge over the diagonal, at most
 
 
 def filled(
@@ -63,7 +63,7 @@ def filled(
         name = key("solid", name, edge_m, filler if filler == "simple" else filler == "lattice")
         return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, filler=filler)
 
-    # which nodes a clamp reaches goes with their size, and moves modes by up to 1 %: one size then, whatever is wanted
+    # the nodes that a clamp reaches depend on the size, which moves modes by up to 1 %: one size, whatever is wanted
     first = Wanted(np.inf, MOST_MODES) if len(clamp) else wanted
     wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first, say)
     edge = given or edge_m

@@ -22,13 +22,20 @@ class Family:
 
     Attributes
     ----------
-    lame, shear : (b, b) reduced stiffness
-    skin : (v, 3, b) float32, the basis on the surface at ρL³ = 1 kg
-    vertex_m, face : (v, 3), (4t, 3) the surface, each element's face cut in four
-    length_m : diagonal L
-    count : how many of the lowest modes are true
-    meshed : False where λ carries no element's error
-    error : estimated relative error of the highest frequency, NaN where it is not known
+    lame, shear : (b, b)
+        Reduced stiffness.
+    skin : (v, 3, b) float32
+        The basis on the surface at ρL³ = 1 kg.
+    vertex_m, face : (v, 3), (4t, 3)
+        The surface, each element's face cut in four.
+    length_m
+        Diagonal L.
+    count
+        How many of the lowest modes are true.
+    meshed
+        False where λ carries no element's error.
+    error
+        Estimated relative error of the highest frequency, NaN where it is not known.
     """
 
     lame: Array

@@ -65,17 +65,24 @@ def analyse(
     """Compute the vibration modes of a body up to to_hz, or its lowest ``count``.
 
     At most `MOST_MODES` are kept; the note says when that cut them. A body all of whose modes lie above to_hz has none,
-    and a plane has none. Of pieces that do not hang together the largest is kept, and noted.
+    and a plane has none. Of unconnected pieces the largest is kept, and noted.
 
     Parameters
     ----------
-    shapes : together one solid, in the body frame
-    fixed : spheres (x, y, z, radius) in m, body frame, that clamp it; one between nodes takes the nearest
-    thickness_m : wall of open surfaces (see surfaces.py); it makes closed ones hollow
-    accuracy : relative, of the highest frequency; the note says what is reached
-    edge_m : element size, by default from a budget of unknowns
-    cache : folder, "default" or None
-    progress : called with a line of text now and then
+    shapes
+        Together one solid, in the body frame.
+    fixed
+        Spheres (x, y, z, radius) in m, body frame, that clamp it; one between nodes takes the nearest.
+    thickness_m
+        Wall of open surfaces (see surfaces.py); it makes closed ones hollow.
+    accuracy
+        Relative, of the highest frequency; the note says what is reached.
+    edge_m
+        Element size, by default from a budget of unknowns.
+    cache
+        Folder, "default" or None.
+    progress
+        Called with a line of text now and then.
 
     Raises
     ------

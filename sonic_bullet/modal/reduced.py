@@ -83,7 +83,7 @@ def family(
         say=say,
     )
     made = _reduced(method, length, wanted, (low, high), say)
-    # what is kept is finite: -1 is an error not known
+    # the cache holds finite numbers: -1 is an unknown error
     numbers = np.array([made.volume_m3, made.count, made.meshed, np.nan_to_num(made.error, nan=-1.0)])
     arrays = {
         "lame": made.lame,
@@ -126,7 +126,7 @@ def _reduced(
     from scipy.linalg import block_diag
 
     tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
-    while True:  # a family without a mode is of no use
+    while True:  # until there is a mode
         method, sectors, _, _, error = converged(method, tensors, wanted, ACCURACY, say)
         sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
         if sectors:

@@ -46,7 +46,7 @@ ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ..
 FEWER = (0, 4, 5, 6, 11, 12, 13)  # anchors used where each costs a solution by elements
 SPARE = 1.3  # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
 SPANNED = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
-SHORTER = 1.0  # waves than an isotropic body's of as many modes
+SHORTER = 1.0  # factor on the wave number of an isotropic body with as many modes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

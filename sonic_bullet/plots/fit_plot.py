@@ -134,7 +134,7 @@ def circle(freq_hz: Array, alpha_per_s: float, beta_s: float) -> Array:
     if beta_s == 0:
         return np.full(len(freq_hz), alpha_per_s / 2)
     inside = 1 - beta_s * (alpha_per_s + beta_s * square)
-    # 1/β − √(1/β² − α/β − ω²), without the difference of near equals
+    # 1/β − √(1/β² − α/β − ω²), without cancellation
     return np.asarray(
         np.where(inside >= 0, (alpha_per_s + beta_s * square) / (1 + np.sqrt(np.maximum(inside, 0))), np.nan)
     )

@@ -126,7 +126,8 @@ def render_picture(
 
     Parameters
     ----------
-    events : the log's, where they are known already; None: they are found (`find_sound_events`)
+    events
+        The log's, where they are known already; None: they are found (`find_sound_events`).
 
     Raises
     ------

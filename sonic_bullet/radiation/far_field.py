@@ -212,7 +212,7 @@ def _near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Ar
         direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
         reach = np.zeros(len(middle))
         np.maximum.at(reach, cell, ((point - middle[cell]) * direction[cell]).sum(axis=1))
-        middle += reach[:, None] * direction  # else edges are planed off
+        middle += reach[:, None] * direction  # else edges are cut off
         triangle = cell[name]
         triangle = triangle[
             (triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])

@@ -64,9 +64,12 @@ def render_log(
 
     Parameters
     ----------
-    residual : whether materials' residuals sound, None: as the log says
-    progress : called with the fraction done
-    say : called with what is being computed before the first step
+    residual
+        Whether materials' residuals sound, None: as the log says.
+    progress
+        Called with the fraction done.
+    say
+        Called with what is being computed before the first step.
 
     Raises
     ------

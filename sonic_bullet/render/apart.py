@@ -39,9 +39,12 @@ def render_apart(
 
     Parameters
     ----------
-    frames : number of samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end
-    witness : observer that is called with every step
-    progress, say : as of `render_log`, and so are errors
+    frames
+        Number of samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end.
+    witness
+        Observer that is called with every step.
+    progress, say
+        As of `render_log`, and so are errors.
     """
     from sonic_bullet.files import check_sr
     from sonic_bullet.render import make_radiation_known, quenched_steps, together

@@ -75,7 +75,7 @@ class _Growing:
 def pressed_pa(material: Material, side: ContactSide) -> float:
     """Compute E/(1 − ν²) where a material is touched: of its softest axis, for boards are pressed across the grain."""
     soft, usual = 1 / side.compliance_per_pa, material.plane_strain_pa
-    return soft if soft < 0.99 * usual else usual  # to the bit where no axis is softer
+    return soft if soft < 0.99 * usual else usual  # bit-identical where no axis is softer
 
 
 class BodyTable:

@@ -110,7 +110,7 @@ def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
         )
         if body.mass_kg > 0:
             mobility += 1 / body.mass_kg
-            # the turn's part is a scalar: taken in the body's own frame, where its inertia is
+            # the rotational part is a scalar: computed in the body's frame, where its inertia is
             a, b, c = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]
             x, y, z, w = q[0], q[1], q[2], q[3]
             s = 2 / (x * x + y * y + z * z + w * w)  # v - w·t + u×t,  t = 2u×v: back by the quaternion (u, w)

@@ -107,7 +107,7 @@ def excite(
         np.int64(0), number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs,
         active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, np.int64(0),
     )  # fmt: skip
-    # else what strikes after the quench would be dated back before it, and be lost: it waits for its own step
+    # else a strike after the quench would be dated back before it and be lost: it waits for its own step
     if not quench:
         found = find_pulses(
             np.int64(1), number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN],

@@ -36,7 +36,7 @@ def make_driver(arguments: Sequence[Any]) -> None:
     """Load or compile the driver's machine code for such arguments."""
     kinds = tuple(numba.typeof(one) for one in arguments)
     with show_stage("machine code of the run time"):
-        with suppress(Exception):  # a numba whose inner parts moved: it is compiled by one process
+        with suppress(Exception):  # numba's inner parts have changed: one process compiles
             _make_stages(kinds)
         driver.advance_steps.compile(kinds)
 

@@ -43,13 +43,20 @@ class ForcePulse:
 
     Attributes
     ----------
-    low, high : body indices
-    start_s : after the start of the step being rendered
-    length_s : of the pulse
-    flat : half-sine, not Hertz'
-    impulse_n_s : (3,) world, on low
-    modes_low, modes_high : (m,) Uᵀj of the whole impulse in N·s/√kg
-    share : transmitted fraction of all these (synth.pulse.compliance)
+    low, high
+        Body indices.
+    start_s
+        After the start of the step being rendered.
+    length_s
+        Of the pulse.
+    flat
+        Half-sine, not Hertz'.
+    impulse_n_s : (3,)
+        World, on low.
+    modes_low, modes_high : (m,)
+        Uᵀj of the whole impulse in N·s/√kg.
+    share
+        Transmitted fraction of all these (synth.pulse.compliance).
     """
 
     low: int
@@ -69,9 +76,12 @@ class Drive:
 
     Attributes
     ----------
-    force_n : (n,) on the lower body along the direction, its negative on the higher
-    gain0, gain1 : Uᵀ on the modes of both bodies, each (m,) a newton
-    direction0, direction1 : (3,) on the lower body, world
+    force_n : (n,)
+        On the lower body along the direction, its negative on the higher.
+    gain0, gain1
+        Uᵀ on the modes of both bodies, each (m,) a newton.
+    direction0, direction1 : (3,)
+        On the lower body, world.
     """
 
     low: int

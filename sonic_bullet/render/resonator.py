@@ -119,7 +119,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             weight[row] = np.einsum("c,cxm,x->m", barycentric[0], corners, sensor.direction)
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
-    if body.silent or body.gain_db:  # of what sensors hear; what it takes of its partners, and gives them, stays
+    if body.silent or body.gain_db:  # of its sound at sensors; its coupling to partners stays
         gain = 0.0 if body.silent else body.gain
         weight *= gain
         translation = None if translation is None else replace(translation, weight=translation.weight * gain)
@@ -185,7 +185,7 @@ def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played
 def _translation(body: Body, sr: int, air: Air) -> Translation | None:
     """Return the mode of each translation of a moving body: gain is the force along it, weight Pa·m per N·s."""
     radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
-    if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # the least of volumes have a radius of none, too
+    if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # a tiny volume's radius may round to zero
         return None
     rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
     return Translation(rate, rate, 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg)

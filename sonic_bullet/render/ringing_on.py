@@ -52,7 +52,7 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
     state = state.copy()
     state.witness = None
     still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
-    advance(setup, state, [still] * LOOKAHEAD)  # up to the end of ``last``, which others have
+    advance(setup, state, [still] * LOOKAHEAD)  # up to the end of ``last``, which is rendered already
     state.credit_s = np.zeros(0)  # no new poles
     state.changed()
     step = replace(still, dt_s=max(still.dt_s, STEP_S))

@@ -185,7 +185,7 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
         1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1)
     )
     slides = np.unique(step[(rows.sweep_m_s[mine] > SLIDES_M_S).any(axis=1)])
-    # what is shorter is no support yet, but settling
+    # shorter contact is settling, no support yet
     if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:
         return None
     fastest = float(rows.approach_m_s[mine].max())

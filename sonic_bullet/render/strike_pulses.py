@@ -114,7 +114,7 @@ def find_pulses(
         strike = strikes[q]
         _gather(strike, rows)
         n, low, high = strike.normal, strike.body[0], strike.body[1]
-        # a tenth for what a solver leaves over, a hundredth in every direction for bodies that are wedged
+        # a tenth for a solver's remainder, a hundredth in every direction for wedged bodies
         fall = 1.1 * abs(n[0] * g[0] + n[1] * g[1] + n[2] * g[2]) * dt_s + 0.01 * gravity
         speed = max(strike.approach_m_s - max(held[low], held[high]) * fall, 0.0)
         if speed > 0 and not is_recreated(bodies, low, high, strike.approach_m_s, fall, number):
@@ -339,7 +339,7 @@ def _make(strike, quaternion, rows, bodies, faces, nodes, shapes, frequency_hz, 
         given += compliance(push[side], frequency_hz, body.frequency_at, body.modes, length, spectrum[flat])
         pulse.body[side] = strike.body[side]
     pulse.length_s, pulse.flat = length, flat
-    # an impulse below 1e-162 N·s, which only a forged log has: nothing of it is heard
+    # the square of an impulse below 1e-162 N·s is zero; it is inaudible
     square = accepted * accepted
     pulse.share = 1.0 / (1.0 + mass * given / square) if square > 0 else 1.0
     for x in range(3):

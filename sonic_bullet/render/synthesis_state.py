@@ -171,11 +171,11 @@ class StepScratch:
     passed: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
     sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    samples: int = -1  # that there is room for
+    samples: int = -1  # capacity in samples
 
     def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
         """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
-        samples = self.samples = max(self.samples, samples)  # steps that are no whole number of them differ by one
+        samples = self.samples = max(self.samples, samples)  # steps of no whole number of samples differ by one
         if len(self.slot) < drives or self.push.shape[2] != columns:
             drives = max(drives, 2 * len(self.slot))
             self.pulse, self.push = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
@@ -306,7 +306,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     modes = [with_lines(one, voice) for one, voice in zip(new, voices, strict=True)]
     instrument = bank.append(state.bank, state.ringing, modes)
     air = path.append_bodies(state.path, state.travelling, np.array([one.radius_m for one in new]))
-    for one, voice in zip(new, voices, strict=True):  # nothing has changed where something was refused till here
+    for one, voice in zip(new, voices, strict=True):  # up to here a refusal has changed nothing
         follows = voice.follows if voice is not None else np.zeros(0, np.int64)
         state.table.add(one, follows, surface_seed(setup.seed, one.body))
     (state.bank, state.ringing), (state.path, state.travelling) = instrument, air

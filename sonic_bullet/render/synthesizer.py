@@ -49,7 +49,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
             quench(state)
         count = 1 if state.has_residual or state.witness is not None else len(steps)
-        ahead = [q - state.number for q in state.quenches if q > state.number]  # the next one begins anew there
+        ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead)])
         frames.append(_advanced(setup, state, steps[:count]))
         steps = steps[count:]
@@ -263,7 +263,7 @@ class Synthesizer:
         if self._lag.shape[1] == 0 and fresh.shape[1] == count:
             return fresh
         queue = np.concatenate([self._lag, fresh], axis=1)
-        if rendered and queue.shape[1] < count:  # the step grew: the lag in samples grows with it
+        if rendered and queue.shape[1] < count:  # the step grew, and with it the lag in samples
             queue = np.concatenate([np.zeros((channels, count - queue.shape[1])), queue], axis=1)
         out, self._lag = queue[:, :count], queue[:, count:]
         return np.ascontiguousarray(out)
@@ -276,7 +276,7 @@ class Synthesizer:
         return self._take(steps, bodies) if self._setup.sensors else np.zeros((0, 0))
 
     def _take(self, steps: Sequence[Step], bodies: Records) -> Array:
-        if self._failed is not None:  # within a step, so that nothing can go on from there
+        if self._failed is not None:  # it failed within a step: the state cannot be continued
             raise self._failed
         state = self._state
         if steps[0].body is not state.present:

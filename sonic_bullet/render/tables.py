@@ -48,7 +48,7 @@ BODY = np.dtype(
         ("node_at", "i8"),
         ("placed", "i8"),  # step in which it began or was last teleported
         ("rebound", "f8"),  # restitution as the simulator has it; a pair's is the product
-        ("loaded", "i8"),  # last step before the one looked at in which it carried load
+        ("loaded", "i8"),  # last step before the present one in which it carried load
         ("cause_m_s", "f8"),  # approach of its last strike that gravity and bouncing did not make, and its step
         ("cause_step", "i8"),
         ("since_m_s", "f8"),  # approach of the fastest such strike after that one, and its step
@@ -85,7 +85,7 @@ PAIR = np.dtype(
         ("key", "i8"),
         ("body", "i8", (2,)),
         ("force_n", "f8", (HISTORY,)),  # normal load of each step
-        ("struck_n", "f8", (HISTORY,)),  # what of it strikes have used up
+        ("struck_n", "f8", (HISTORY,)),  # part of it used up by strikes
         ("support_n", "f8", (2,)),  # silent load at the rendered step's start and end
         ("rubs", "i8"),  # 1 while it has a voice: what follows holds
         ("load_n", "f8"),  # at the end of the step before

@@ -72,7 +72,7 @@ def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
 
     Frame m is centred on sample m·window/overlap, with zeros before and after the samples.
     """
-    from scipy.fft import rfft  # several frames at once in vector registers, which numpy's does not
+    from scipy.fft import rfft  # transforms several frames at once in vector registers, unlike numpy
 
     frames = np.empty((frame_count(len(sample), window, overlap), window), np.float32)
     _cut(np.ascontiguousarray(sample, np.float32), hann(window), window // overlap, frames)

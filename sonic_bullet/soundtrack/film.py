@@ -35,10 +35,14 @@ class FilmLook:
 
     Attributes
     ----------
-    size : pixels, even
-    eye_m, target_m : of the camera, None: chosen
-    follow : name of the body that the camera moves with
-    shadows : whether they are drawn, a third slower
+    size
+        Pixels, even.
+    eye_m, target_m
+        Of the camera, None: chosen.
+    follow
+        Name of the body that the camera moves with.
+    shadows
+        Whether they are drawn, a third slower.
     """
 
     fps: Fraction = Fraction(30)
@@ -106,11 +110,16 @@ def make_film(
 
     Parameters
     ----------
-    standing : shapes of the scene's world, where it is there
-    events : drawn in, where they are given
-    codec : of the sound, None: the container's usual one
-    level : found before, in place of peak_dbfs and lufs
-    progress : called with the fraction done
+    standing
+        Shapes of the scene's world, where it is there.
+    events
+        Drawn in, where they are given.
+    codec
+        Of the sound, None: the container's usual one.
+    level
+        Found before, in place of peak_dbfs and lufs.
+    progress
+        Called with the fraction done.
 
     Raises
     ------

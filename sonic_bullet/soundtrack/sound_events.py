@@ -136,7 +136,7 @@ class EventWitness:
         self._log, self._steps, self._sr = log, iter(log.steps), log.sr
         self._known: dict[int, Mapping[tuple[int, int], _Touch]] = {}
         self._seen: list[_Moment] = []
-        self._runs: dict[tuple[int, int], list[_Run]] = {}  # grown in place: what rests rests for hours
+        self._runs: dict[tuple[int, int], list[_Run]] = {}  # grown in place: a rest may last for hours
         self._struck: dict[tuple[int, int], int] = {}
         first = log.sensors[0] if log.sensors else None
         self._own = OwnSound(first, log.air.sound_speed_m_s) if isinstance(first, Microphone) else None

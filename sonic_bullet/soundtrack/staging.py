@@ -174,7 +174,7 @@ def chosen_camera(
     moves = np.ptp(staging.position_m, axis=0).max(axis=1) > 1e-3
     small = radius < WIDE_M
     seen = moves & small if (moves & small).any() else small if small.any() else np.ones(len(radius), bool)
-    # a body that falls for ever is not followed: nine tenths of the film decide
+    # percentiles, so that a body that falls for ever is not followed
     low, high = np.percentile(staging.position_m[:, seen].reshape(-1, 3), [5, 95], axis=0)
     reach = float(np.linalg.norm(high - low)) / 2 + float(radius[seen].max())
     target = np.array(target_m, float) if target_m is not None else (low + high) / 2

@@ -86,9 +86,12 @@ def write_stems(
 
     Parameters
     ----------
-    gain_per_pa : of all, so that they add up
-    peak_dbfs, lufs : each to its own level instead; silent ones, or too short or faint for a loudness, stay as they are
-    cues : a stem's own, by its body's index
+    gain_per_pa
+        Of all, so that they add up.
+    peak_dbfs, lufs
+        Each to its own level instead; silent ones, or too short or faint for a loudness, stay as they are.
+    cues
+        A stem's own, by its body's index.
 
     Raises
     ------

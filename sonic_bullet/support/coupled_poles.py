@@ -72,7 +72,7 @@ def start(x: Touched, m: int) -> tuple[Array, Array]:
 
 def likest(share: Array) -> Array:
     """Assign to each row of weights (m, n) a column, each once, with the largest sum; -1 (m,) where none is left."""
-    from scipy.optimize import linear_sum_assignment  # a fifth of a second, for those who need it
+    from scipy.optimize import linear_sum_assignment  # takes a fifth of a second to import
 
     row, column = linear_sum_assignment(share, maximize=True)
     chosen = np.full(len(share), -1)
@@ -190,5 +190,5 @@ def _coupled(x: Touched) -> tuple[Array, Array]:
     value, vector = np.linalg.eig(state)
     swings = value.imag > 1e-6 * scale
     q = vector[:n, swings].T
-    q = q[:, : len(x.lam)] / np.linalg.norm(q, axis=1, keepdims=True)  # of those of partners, little
+    q = q[:, : len(x.lam)] / np.linalg.norm(q, axis=1, keepdims=True)  # small for partners' modes
     return value[swings], q

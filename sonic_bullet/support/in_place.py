@@ -128,7 +128,7 @@ def touched_rows(
 def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Array, stands: Array) -> InPlace:
     """Make the record of poles s (m,) and motions q (m, N)."""
     modes = q[:, :m]
-    q = q / np.exp(0.5j * np.angle((modes * modes).sum(axis=1)))[:, None]  # as real as can be
+    q = q / np.exp(0.5j * np.angle((modes * modes).sum(axis=1)))[:, None]  # rotated to be as real as possible
     q *= np.where(np.diag(q.real) < 0, -1, 1)[:, None]
     left, _, right = np.linalg.svd(q[:, :m].real.T)
     turn = left @ right  # the orthogonal matrix nearest to them [Schönemann 1966]

@@ -121,7 +121,7 @@ def _listen(
         if waits:
             waits = False
             begin = m + int(np.ceil(memory[late_at + ((at + m) & mask)]))
-            if begin > i:  # nothing of it has arrived yet
+            if begin > i:  # none of it has arrived yet
                 begin = begin if begin < n else n
                 newest = _newest(emitted, i, begin, newest)
                 i = begin
@@ -129,7 +129,7 @@ def _listen(
         if not arrives:
             arrives = True
             clear(observed, 0, n)
-        base = m + 1  # the rule: one sample further than that before, for a whole group
+        base = m + 1  # usual case: a whole group, one sample further
         count = leading(memory, late_at + ((at + base) & mask), base - i)
         if count == 0:
             base = m

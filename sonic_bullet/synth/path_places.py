@@ -105,7 +105,7 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
     The distance of what emits is greatest at an end of the step. Silence needs no fade: a silent body keeps its place.
     """
     channels, long = len(microphone_m), source.shape[1]
-    free, wrong = np.int64(0), DONE  # a plain 0 is a type of its own, and each callee is compiled for it too
+    free, wrong = np.int64(0), DONE  # a plain 0 has its own type, and each callee would be compiled for it too
     for b in range(len(sources)):
         body = sources[b]
         most = greatest(source, b * long + first, pushed, 3 * b * long + first, long, n)
@@ -144,7 +144,7 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
 def move_body(step, sources, places, b, p):  # pragma: no cover - compiled
     """Give body b the present place p; the one it had becomes a left one."""
     old = places[p].body
-    if old >= 0:  # out of the chain that it was asleep in
+    if old >= 0:  # remove it from its former chain
         if sources[old].oldest == p:
             sources[old].oldest = places[p].next
         else:

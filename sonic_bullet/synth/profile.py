@@ -218,7 +218,7 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
         coarsest += 1
     inverse = 2.0**finest / (LONGEST_M * LATTICE)
     first, last = (int(work[0] * inverse) - 1) & -2, (int(swept * inverse) + 2) | 1
-    size = last - first + 1 + 4 * LANES  # and what is written beyond
+    size = last - first + 1 + 4 * LANES  # with room for values written beyond the end
     if len(work) < 2 * whole + 4 * size:
         longer = np.empty(2 * whole + 4 * size)
         for i in range(2 * whole):

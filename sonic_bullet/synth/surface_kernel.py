@@ -164,7 +164,7 @@ def sound_voices(pairs, voices, count, x, sr, force):
             rate[i] = 0.0
         for lane in range(LANES):
             filled = first + lane < count
-            v = voices[first + lane if filled else count - 1].order  # lanes that are left over repeat the last
+            v = voices[first + lane if filled else count - 1].order  # unused lanes repeat the last
             voice, at = voices[v], v * _ROWS
             pair = pairs[voice.slot]
             for side in range(2):
@@ -176,7 +176,7 @@ def sound_voices(pairs, voices, count, x, sr, force):
                         pair.swept_m[side], begin, end, x, pair.seed[side], height0, height1, 1.0 / sr, work, rate,
                         lane * whole,
                     )  # fmt: skip
-            if pair.substeps == 0:  # a new contact already moves with what it rolls over
+            if pair.substeps == 0:  # a new contact starts with the profile's velocity
                 constants[at + _LIFT] = rate[lane * whole] * constants[at + _RATE_UNIT]
             for row in range(_ROWS):
                 lanes[row * LANES + lane] = constants[at + row]

@@ -27,7 +27,7 @@ def limited(memory: int, seconds: int) -> None:
 
         for what, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds)):
             resource.setrlimit(what, (most, most))
-    except (ImportError, ValueError):  # then the parent's limit on time alone guards
+    except (ImportError, ValueError):  # then only the parent's time limit applies
         pass
 
 
@@ -45,7 +45,7 @@ def main() -> None:
     corner = given["vertex"][given["face"]]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    file = Path("in.stl")  # text, for a binary one holds float32
+    file = Path("in.stl")  # text, as binary STL holds float32
     rows = np.concatenate([normal[:, None], corner], axis=1).reshape(-1, 12)
     np.savetxt(file, rows, fmt=FACET, header="solid body", footer="endsolid body", comments="")
     wanted = netgen.meshing.MeshingParameters(maxh=float(given["edge"]), grading=GRADING, closeedgefac=None)

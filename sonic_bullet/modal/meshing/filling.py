@@ -27,7 +27,7 @@ from sonic_bullet.records.errors import MeshError
 Filler = Literal["any", "netgen", "simple", "lattice"]
 """How a surface that no rule fits is filled: by Netgen or a substitute, by Netgen or not at all, with its detail left
 out, by a lattice of this edge or not at all."""
-LATTICE = "lattice"  # how the note of a solid filled by one begins
+LATTICE = "lattice"  # first word of the note of a solid filled by a lattice
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
 FILLED = (0.6, 1.7)
@@ -43,10 +43,10 @@ refuse: slivers of unions, on which it takes ten times as long.
 WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
-LATTICE_LEAST = 0.4  # of it: an edge below which the lattice gets no finer
+LATTICE_LEAST = 0.4  # of a wall's thickness: least edge of a lattice
 LATTICE_TETS, LATTICE_MORE = 8000, 1.25
 """Tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts."""
-WALL_TETS = 20.0  # a wall as wide as an edge and a bit: elements in a square of its width
+WALL_TETS = 20.0  # elements in a square of a wall about an edge wide
 
 
 class TooThinError(MeshError):
@@ -155,7 +155,7 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str],
             corner, tet = stuffed(skin.vertex_m, skin.face, edge)
             _check_filled(skin, corner, tet)
             break
-        except MeshError as error:  # some of its walls are thinner than it is on the whole, and than an edge
+        except MeshError as error:  # some walls are thinner than the mean, and than an edge
             if edge <= least:
                 raise TooThinError(
                     f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE_TETS} tetrahedra for its walls"

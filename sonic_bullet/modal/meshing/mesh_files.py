@@ -20,7 +20,8 @@ def read_mesh(path: Path | str, scale: float = 1.0) -> Shape:
 
     Parameters
     ----------
-    scale : factor on all lengths, 0.001 for a file in millimetres
+    scale
+        Factor on all lengths, 0.001 for a file in millimetres.
 
     Raises
     ------

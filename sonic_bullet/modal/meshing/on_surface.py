@@ -14,7 +14,7 @@ from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.solid import TET_EDGE, TET_FACE, Solid, corner_volume_m3
 from sonic_bullet.records import Array
 
-FARTHEST = 0.25  # of an edge's length: a chord of a right angle strays 0.21
+FARTHEST = 0.25  # of an edge's length: a chord of a right angle deviates by 0.21
 LEAST_DET = 0.3  # of the straight element's: below it counts as folded
 LATTICE = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
 """Where an element's Jacobian is checked: corners and middles of its edges."""
@@ -48,7 +48,7 @@ def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
     middle, at, count = np.unique(outer[:, 3:].ravel(), return_inverse=True, return_counts=True)
     owner = np.repeat(np.arange(len(outer)), 3)
     total = np.stack([np.bincount(at, normal[owner, x], len(middle)) for x in range(3)], axis=1)
-    # |n₁ + n₂| = 2 cos(angle/2); more than two faces meet where pieces touch: as good as a crease
+    # |n₁ + n₂| = 2 cos(angle/2); where pieces touch more than two faces meet: a crease, too
     crease = (np.linalg.norm(total, axis=1) < 2 * np.cos(CREASE_RAD / 2)) | (count != 2)
     ends = np.stack([outer[:, [0, 1, 2]], outer[:, [1, 2, 0]]], axis=-1).reshape(-1, 2)
     edge = np.empty((len(middle), 2), np.int64)

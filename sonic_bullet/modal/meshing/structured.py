@@ -51,7 +51,7 @@ def _refined(corner: Array, simplex: Array, n: int) -> tuple[Array, Array]:
     Neighbours match across shared faces.
     """
     d = simplex.shape[1] - 1
-    simplex = np.sort(simplex, axis=1)  # one order for all: neighbours then cut their shared face alike
+    simplex = np.sort(simplex, axis=1)  # one order for all, so that neighbours cut their shared face in the same way
     cells = _lattice(n, d)
     pieces = []
     for path in permutations(range(d)):

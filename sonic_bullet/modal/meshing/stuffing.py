@@ -51,7 +51,7 @@ def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
         part = np.where(across, phi[a], 0) / np.where(across, phi[a] - phi[b], 1)
         near = np.zeros(len(phi), bool)
         near[a[across & (part < reach)]] = near[b[across & (1 - part < reach)]] = True
-        near[kind] &= distance[kind] < WARP_SHORT * edge_m  # at a hole's rim the surface is elsewhere
+        near[kind] &= distance[kind] < WARP_SHORT * edge_m  # at a hole's rim the surface is far
         near[: kind.start], near[kind.stop or len(near) :] = False, False
         node_m[near], phi[near] = foot[near], 0.0
     node_m, tet = _cut(node_m, tet[(phi[tet] > 0).any(axis=1)], phi)

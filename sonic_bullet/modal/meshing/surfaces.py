@@ -26,7 +26,7 @@ CAP_PART = 0.05
 """Of a piece's area: flat caps on its holes, below which it encloses a volume."""
 OPEN_PART = 0.025
 """Mean winding number just outside: a ball with a hole of 5 % of its area has it."""
-SAMPLES = 2000  # faces outside which it is asked for
+SAMPLES = 2000  # faces outside which it is evaluated
 SHEET_PART = 0.02
 FLAT_PART = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
 SIZE_M = (1e-5, 1e4)
@@ -61,7 +61,7 @@ def _flips(face: Array) -> Array:
     key = edge.min(axis=1) * (int(face.max()) + 1) + edge.max(axis=1)
     order = np.argsort(key, kind="stable")
     _, first, count = np.unique(key[order], return_index=True, return_counts=True)
-    first = first[count == 2]  # where three faces meet nobody knows which two are neighbours
+    first = first[count == 2]  # where three faces meet it is undetermined which two are neighbours
     one, two = order[first], order[first + 1]
     against = (edge[one, 0] == edge[two, 0]).astype(np.int64)  # both run the same way: they disagree
     graph = coo_array(

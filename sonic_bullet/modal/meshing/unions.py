@@ -20,7 +20,7 @@ from sonic_bullet.records import Array
 
 GROWTH = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 """Of the diagonal: how far each piece's surface moves outward; the least that joins them is taken."""
-ONE = 0.99  # of the volume in the largest piece: the rest is crumbs
+ONE = 0.99  # of the volume in the largest piece: the rest is negligible
 
 
 def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:

@@ -20,8 +20,8 @@ from sonic_bullet.records.errors import ModalError
 MOST_AROUND = 400  # waves around
 CURVED = 1.3  # wave number of a curved wall over that of a flat one of as many modes: membranes take the low ones away
 FINER = 1.5  # sides shorter by this leave FINER^-q of the error, q from 1.1 at notches to 6
-HIGHER = 4.0  # λ over that of the last try, where that held too few modes
-FEWEST_NODES = 120  # so few cost nothing
+HIGHER = 4.0  # factor on λ where the last try held too few modes
+FEWEST_NODES = 120  # fewer save no time
 LEFT = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
 
 

@@ -27,7 +27,7 @@ GAP = (
     0.45  # radians: the widest gap between neighbours on a ring; with fewer than 14 the area is 3 % less than a disc's
 )
 BORE = 1e-3  # of the diagonal: the least radius of a ring
-BETWEEN = 1.02  # length of a detour over a third ring, over the direct way, that makes the direct one no side
+BETWEEN = 1.02  # a detour over a third ring of less than this times the direct length replaces the direct side
 ALIKE = 0.3  # relative difference of sides that are taken for chords of one arc
 SAME = 0.02  # relative difference of volumes
 ARC = 256  # sides of a half circle: its area to 5e-5
@@ -202,7 +202,7 @@ def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
     widest = np.zeros(len(count))
     np.maximum.at(widest, ring[order], step)
     filled = np.bincount(ring[order], np.sin(step)) / (2 * np.pi)
-    filled[pole] = 1.0  # no area at all: its neighbour's share would do as well
+    filled[pole] = 1.0  # no area: any fraction does
     middle[pole, 0] = 0
     good = pole | ((widest < GAP) & (middle[:, 0] > BORE * diagonal))
     number = np.where(good, np.cumsum(good) - 1, -1)
@@ -222,7 +222,7 @@ def _sides(
     ends = np.unique(triple[(triple == triple[:, :1]).all(axis=1), 0])
     wide, narrow = np.where(middle[edge[:, :1], 0] > middle[edge[:, 1:], 0], edge, edge[:, ::-1]).T
     level = np.abs(middle[wide, 1] - middle[narrow, 1]) < 1e-3 * np.abs(middle[wide, 0] - middle[narrow, 0])
-    ends = np.setdiff1d(ends, wide[level])  # ears of a flat ring: it ends at the narrower one
+    ends = np.setdiff1d(ends, wide[level])  # a flat ring ends at the narrower radius
     added = np.stack([ends, len(middle) + np.arange(len(ends))], axis=1)
     middle = np.concatenate([middle, np.stack([np.zeros(len(ends)), middle[ends, 1]], axis=1)])
     filled = np.concatenate([filled, filled[ends]])

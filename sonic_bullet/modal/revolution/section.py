@@ -23,7 +23,7 @@ WALL, LONG = 0.5, 3.0  # a triangle's side over the wall's thickness, at a corne
 WAVE = 0.25  # a triangle's side over the shortest wave
 PIECES = 600  # of an outline, about, for which the size is found
 BENT = 0.3  # radians that a side may turn
-CORNER = 0.15  # radians: a turn that is kept as a corner
+CORNER = 0.15  # radians: a larger turn is a corner
 GROWTH = 0.5  # of size over distance
 MOST_NODES = 15_000  # three unknowns each: a second or two for each wave around
 

@@ -63,7 +63,7 @@ def factorise(matrix: Any) -> Factor:
     from scipy.sparse import tril
 
     lower = tril(matrix, format="csc")
-    del matrix  # a caller's sum: as large as K
+    del matrix  # frees the caller's temporary sum, as large as K
     lower.sort_indices()
     left: dict[int, list[tuple[Array, Array]]] = {}  # parent -> rows of its children, and their rest, packed
     made = []

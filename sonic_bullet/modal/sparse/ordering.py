@@ -65,6 +65,6 @@ def dissection(node_m: Array, tet: Array) -> Array:
         if best is None or len(best[1]) == 0:
             order.append(nodes)
             continue
-        # taken from the end: both halves, then what parts them
+        # taken from the end: both halves, then their separator
         todo += [(best[3], True), (best[2], False), (best[1], False)]
     return np.concatenate(order)

@@ -55,8 +55,8 @@ STAND = np.dtype(
         ("stale_s", "f8"),  # since when
         ("wait_s", "f8"),  # until they may be made again
         ("wanted", "i8"),  # 1: they are to be made before this step rings
-        ("points", "i8"),  # held points that its poles are of
-        ("steps", "i8"),  # steps that it rang on them, and of those, in how many some contact was beyond its law
+        ("points", "i8"),  # tracked points of its poles
+        ("steps", "i8"),  # steps that it rang on them, and below those with contact separation
         ("lifted", "i8"),
     ],
     align=True,
@@ -151,7 +151,7 @@ def _smooth(one, rows, begin, end, share, near, follow, target, place):
     for k in range(one.count):
         one.load_n[k] += follow * (target[k] - one.load_n[k])
         whole += one.load_n[k]
-        if target[k] > 0.0:  # what it adds to the load it brings its place with: the moment is smoothed as the load is
+        if target[k] > 0.0:  # its position enters with its added load, so that the moment is smoothed as the load is
             share = follow * target[k] / one.load_n[k]
             for side in range(2):
                 for x in range(3):
@@ -185,7 +185,7 @@ def _take_rows(one, rows, begin, end, share, near, target, place):
             one.point_m[k] = rows[r].point_m
         target[k] += load
         total += load
-        if old == 0 and load > most:  # a pair that begins: its heaviest row's normal, then the mean
+        if old == 0 and load > most:  # a new pair takes its heaviest row's normal, then the mean
             most = load
             one.outward[:] = rows[r].outward
         for side in range(2):
@@ -280,7 +280,7 @@ def choose_bodies(
         one = stand[best]
         sounds[best] = one.stale = 0
         one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, AGAIN_S, points[best]
-        if points[best]:  # its own poles are there at once
+        if points[best]:  # its free poles are known
             credit_s[0] -= price_s(bodies[best].modes, points[best])
         wanted += 1
     return wanted

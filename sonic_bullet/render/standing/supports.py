@@ -151,7 +151,7 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
         if other not in partners:
             partners.append(other)
         if not sum(state.resonators[one].side.compliance_per_pa for one in both):
-            continue  # both rigid: nobody says what they are made of
+            continue  # both rigid: their materials are unknown
         axes = _axes(held, quaternion[both])
         (own, bent, off), (there, also, away) = (_places(state, both[s], held, s, axes[s]) for s in (side, 1 - side))
         load = held["load_n"][: held["count"]]

@@ -30,7 +30,7 @@ and the next that fits, 2π less this one the other way, is no three times as fa
 def check_orientations(names: Sequence[str], turn: Array) -> None:
     """Raise AnimationError, with body and frame, where a quaternion (t, b, 4) is not finite or has not the length 1."""
     if turn.ndim != 3 or turn.dtype.kind not in "fiu":
-        return  # the record's own check says so
+        return  # the record's own check reports it
     length = np.linalg.norm(turn.astype(float), axis=2)
     wrong = ~(np.abs(length - 1) <= UNIT)
     if wrong.any():
@@ -49,10 +49,13 @@ class Animation:
 
     Attributes
     ----------
-    fps : frames a second
-    position_m, quaternion_xyzw : (t, b, 3), (t, b, 4) body frames (centre of mass, principal axes), right-handed world
+    fps
+        Frames a second.
+    position_m, quaternion_xyzw : (t, b, 3), (t, b, 4)
+        Body frames (centre of mass, principal axes), right-handed world.
     gravity_m_s2 : (3,)
-    materials : by a body's name, a preset's name or file; other bodies are silent partners
+    materials
+        By a body's name, a preset's name or file; other bodies are silent partners.
     """
 
     fps: float

@@ -87,9 +87,12 @@ def score_animation(
 
     Parameters
     ----------
-    rules : materials of bodies, by name; the first that states something counts
-    material : of bodies that move and have none
-    tail_db : as of `scene.render_scene`
+    rules
+        Materials of bodies, by name; the first that states something counts.
+    material
+        Of bodies that move and have none.
+    tail_db
+        As of `scene.render_scene`.
 
     Raises
     ------
@@ -124,7 +127,7 @@ def score_animation(
             hidden_m_s = 0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps)
             find_steps(animation, stage, steps, half, hidden_m_s=hidden_m_s)
             steps = _forced(animation, stage, steps, unforced(animation, noise_m))
-        except KeyboardInterrupt as error:  # those so far are played and kept
+        except KeyboardInterrupt as error:  # steps so far are played and kept
             stopped = error
         dt_s = 1 / animation.fps / substeps_of(animation.fps)
         notes += _driven_notes(animation.bodies) + _noise_notes(animation, noise_m)

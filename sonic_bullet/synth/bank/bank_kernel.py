@@ -128,7 +128,7 @@ def list_forces(
                 first[drive_body[d, s] + 1] += 1
     for b in range(count):
         first[b + 1] += first[b]
-    # counting sort: each body's beginning moves to its end, and all ends one place on again
+    # counting sort: first advances to each body's end, and is shifted back afterwards
     for d in range(drive_count):
         for s in range(2):
             b = drive_body[d, s]
@@ -176,7 +176,7 @@ def _drive(
     due = scratch[PUSH_SCRATCH + DRIVEN * LANES + DRIVEN : DRIVE_SCRATCH]
     ringing[b].driven = 1
     sets, last = len(observed), passing.last_set(b, ringing, observed, passes)
-    for w in range(last + 1):  # what of the body is heard, set after set: the state goes on with the last
+    for w in range(last + 1):  # each active weight set in turn: the state advances with the last
         j, v = w // sets - 1, w % sets  # of partner j, where it is 0 or above
         if w > 0 and not (observed[v, b] if j < 0 else passing.sounds(passes[b, j].phase)):
             continue
@@ -256,7 +256,7 @@ def _advance_modes(
 ):  # fmt: skip  # pragma: no cover - compiled
     """Compute samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
     start, stop, modes = bodies[b].start, bodies[b].stop, law.shape[1]
-    i = np.int64(0)  # a literal would be a type of its own, and what it is passed to compiled twice
+    i = np.int64(0)  # a literal has its own type, and its callees would be compiled twice
     while i < n:
         place = (at + i) % BLOCK
         if place == 0:
@@ -268,7 +268,7 @@ def _advance_modes(
         if ringing[b].driven or f1 > f0 or ringing[b].strike >= 0:
             end = min(end, i + DRIVEN - (at + i) % DRIVEN)
         if ringing[b].driven or f1 > f0 or begins(b, at + end, ringing, strikes):
-            # what begins to be driven begins with the poles of what rings then
+            # driven motion begins with the poles of the free ringing
             if bodies[b].bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
                 poles.bend_poles(z, driven, np.int64(DRIVEN), law, start, stop, pole, block)
             _drive(

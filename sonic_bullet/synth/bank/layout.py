@@ -56,7 +56,7 @@ RINGING = np.dtype(
     [
         ("ringing", "i8"),  # 1: z is not zero
         ("driven", "i8"),  # 1: driven is not zero
-        ("tiled", "i8"),  # 1: the block's free sound is
+        ("tiled", "i8"),  # 1: the block's free sound is not zero
         ("moving", "i8"),  # 1: a translation's state is not zero
         ("fresh", "i8"),  # 1: other poles at the next block's start
         ("passes", "i8"),  # passes that are not off
@@ -82,7 +82,7 @@ STRIKE = np.dtype(
         ("first", "i8"),  # sample at or after the first node
         ("within", "i8"),  # nodes up to it
         ("upcoming", "i8"),  # next node
-        ("phase", "f8"),  # of the sample before behind the last node
+        ("phase", "f8"),  # of the sample before, after the last node
         ("rigid", "i8"),  # 1 while cells are to come
         ("cells", "i8"),  # a sample
         ("cell_first", "i8"),
