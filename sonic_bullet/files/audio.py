@@ -91,7 +91,8 @@ class AudioWriter:
     `write` appends (channels, n) pascals to a partial file. Leaving the block reads it back and gives it the name
     NAME.EXT. Leaving it with an error, or with Ctrl-C, keeps the samples as a valid file NAME.partial.EXT, which the
     error names; NAME.EXT is untouched. gain_per_pa: file units for one pascal. expected_frames: chooses RF64 over WAV
-    where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV. scale: whether the file states its full scale.
+    where the file will pass 4 GiB. chunks: of `wave_chunks`, for a WAV. scale: whether the file states its full scale;
+    False: the level is unknown.
     """
 
     def __init__(

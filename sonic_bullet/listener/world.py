@@ -176,8 +176,8 @@ class World(ABC):
     def reset(self) -> None:
         """Restart, as a world just opened to which the same bodies were added, in the order in which they last were.
 
-        Steps and indices count from 0, bodies met by contact alone are met anew, ended records are dropped, `notes` are
-        empty.
+        Steps and indices count from 0, other bodies get records at their next contact, ended records are dropped,
+        `notes` are empty.
 
         Raises
         ------

@@ -90,7 +90,7 @@ class Listener:
     def reset(self) -> None:
         """Restart: the same bytes as of a listener just attached, with the same bodies added in the same order.
 
-        Vibration and sound on its way, log, unread frames, sound and time are cleared; bodies never added are met anew;
+        Vibration and sound on its way, log, unread frames, sound and time are cleared; other bodies get new records;
         removed bodies are dropped. Settings, and added bodies, stay. Without hooks removals are not observed: after a
         resetSimulation, a body of the same id, name and shape counts as the one that was added. Raises SceneError,
         having changed nothing: detached, called while a step is made, connection lost, or a `World` that cannot
