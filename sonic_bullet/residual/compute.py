@@ -182,8 +182,8 @@ def residual_record(
 
     Parameters
     ----------
-    left : (s, n) beside all features
-    rest : (s, n) beside the modes as the model plays them
+    left : (s, n) recording without all features
+    rest : (s, n) recording without the modes as the model plays them
     lines : frequency, decay, amplitude (l,), mean square over the strikes, of the rest of the features
     """
     if not len(recorded) or recorded.shape != left.shape or recorded.shape != rest.shape:

@@ -98,7 +98,7 @@ class ModePairs:
 
 
 def source_modes(residual: Residual) -> StruckModes:
-    """Return the modes a residual was taken beside."""
+    """Return the modes with which a residual was measured."""
     return StruckModes(residual.mode_freq_hz, residual.mode_decay_per_s, residual.mode_amplitude)
 
 
@@ -242,7 +242,7 @@ def transfer(
 ) -> Array:
     """Compute P_t (k, n) at target frequencies (k,) and times (n,) from the onset on.
 
-    The residual was taken beside ``source`` and is now beside ``target``.
+    The residual was measured with modes ``source`` and is played with modes ``target``.
     """
     pairs = pairs or pair(source, target)
     merged_source, _ = merged(source)

@@ -295,8 +295,8 @@ def advance(
 ):  # fmt: skip  # pragma: no cover - compiled
     """Compute samples at … at + n - 1 into source (W, b, n or more) and pushed (b, 3, n or more).
 
-    sounds (b, 2): 1 where a body's rows of source, of pushed are not zero; its other rows are zero as they were passed
-    in, where sounds said so. See layout.py for the tables; all in place.
+    sounds (b, 2): 1 where a body's rows of source, of pushed are not zero. On entry it must hold for the rows passed
+    in: rows that stay silent are cleared only where it is 1. See layout.py for the tables; all in place.
     """
     period = 1.0 / sr
     list_forces(n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal)
