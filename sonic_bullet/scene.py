@@ -7,7 +7,7 @@ returns its cast, a dictionary from a body (or (body, link), or (body, "all")) t
 `Listener.add`. The file may also hold `SECONDS`, `MICROPHONE` and `act(client, time_s)`, called before every step. A
 plain script connects, loads and steps as any PyBullet script does; windows become DIRECT, sleeps are skipped. Where it
 attaches a listener of its own (kept in a top-level name), that one is used; otherwise every body that it loads sounds
-as ``material``.
+as ``material``. A .gltf or .glb with KHR_physics_rigid_bodies is a scene, too (`session.gltf_in`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,31 +25,25 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener import (
     Finding,
-    body_ids,
     diagnose_world,
-    direct_client,
-    is_static,
-    links_with_shapes,
     own_clients,
-    run_script,
     seen_settings,
-    watch_settings,
 )  # fmt: skip
 from sonic_bullet.machine.progress import Say, says_so
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
-from sonic_bullet.records.coerce import as_call, as_flag, as_number, as_path, as_whole, shown
+from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.render import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
-from sonic_bullet.session.arguments import MicrophoneLike, as_material, as_sensors
-from sonic_bullet.session.links_of_script import add_links, named_links
+from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.gltf_in.running import run_gltf
+from sonic_bullet.session.gltf_in.scene_reader import is_gltf
 from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choosing
-from sonic_bullet.session.scene_file import defines_build, scene_module, user_code, uses_sonic_bullet
+from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_added
+from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
 
-DEFAULT_SECONDS = 4.0
-DEFAULT_MATERIAL = "plastic"
 Progress = Callable[[float], None]
 
 
@@ -165,11 +158,6 @@ def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None
         return (*diagnose_world(listener.world, seen=seen), *find_nothing_added(listener), *find_mute_bodies(listener))
 
 
-def as_seconds(seconds: object, name: str) -> float:
-    """Return a length of physics time; raises SceneError."""
-    return as_number(seconds, name, "give seconds of physics time, above 0", above=0, most=1e6, error=SceneError)
-
-
 @dataclass(slots=True)
 class _Stage:
     """A scene being run: its file, and its listener. adds: the script chose the bodies of its own listener."""
@@ -185,6 +173,7 @@ class _Stage:
     listener: Listener | None = None
     adds: bool = False
     client: Any = None
+    gain_db: dict[int, float] = field(default_factory=dict)
     folder: str | None = None
     clients: ExitStack = field(default_factory=ExitStack)
 
@@ -205,7 +194,7 @@ class _Stage:
     def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # they are in the result's notes
-            run = _run_built if defines_build(self.path) else _run_plain
+            run = run_gltf if is_gltf(self.path) else run_built if defines_build(self.path) else run_plain
             with running_scene(self.path), choosing(self.choice):
                 return run(self, seconds, progress, say)
 
@@ -239,8 +228,12 @@ class _Stage:
         listener = self.need_listener()
         notes = (*notes, *listener.left_out)
         log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
+        if self.gain_db:
+            louder = tuple(replace(body, gain_db=self.gain_db.get(body.body_id, 0.0)) for body in log.bodies)
+            log = replace(log, bodies=louder)
         if (
-            listener.sr == self.sr
+            not self.gain_db
+            and listener.sr == self.sr
             and listener.keeps_sound
             and self.microphones is None
             and listener.supports == log.supports
@@ -264,82 +257,3 @@ def _stage(path: str | Path, **options: Any) -> _Stage:
     if not place.is_file():
         raise SceneError(f"{shown(name)} is no scene file", remedy)
     return _Stage(place, **options)
-
-
-def _run_built(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
-    module = scene_module(stage.path)
-    stage.client = client = direct_client()  # dropped, it would end before its world is looked at
-    watch_settings(client)  # build sets friction and the like
-    cast = user_code(stage.path, module.build, client)
-    if not isinstance(cast, dict):
-        what = f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}"
-        raise SceneError(what, "return a dictionary from bodies to materials")
-    places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
-    stage.listener = listener = stage.attached(client, places)
-    stage.microphones = None
-    user_code(stage.path, partial(listener.add_all, cast, progress=say))
-    said: tuple[str, ...] = ()
-    if stage.choice:
-        stage.check_names()
-        static = partial(is_static, client._client)
-        said = add_links(listener, named_links(listener.world, stage.choice), static, say)
-    act = getattr(module, "act", None)
-    stage.ready()
-    own = getattr(module, "SECONDS", DEFAULT_SECONDS)
-    total = seconds if seconds is not None else as_seconds(own, f"SECONDS of scene '{stage.path.name}'")
-    while listener.time_s < total - 1e-9:
-        if act is not None:
-            user_code(stage.path, act, client, listener.time_s)
-        client.stepSimulation()
-        if progress is not None:
-            progress(min(listener.time_s / total, 1.0))
-    return said
-
-
-def _run_plain(stage: _Stage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
-    total = seconds if seconds is not None else DEFAULT_SECONDS
-    if uses_sonic_bullet(stage.path):
-        names: dict[str, Any] = {}
-
-        def look(_: int) -> None:
-            stage.listener = stage.listener or _listener_in(names)
-            if stage.begin is not None and stage.listener is not None:
-                if stage.microphones is not None:
-                    raise SceneError(f"scene '{stage.path.name}' has microphones of its own", "leave yours out")
-                stage.ready()
-
-        try:
-            run_script(stage.path, (look, None), total, names=names, progress=progress)
-        finally:  # where it fails, the sound so far is kept too
-            stage.listener = _listener_in(names)
-        stage.adds = True
-        if stage.listener is None:
-            what = f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name"
-            raise SceneError(what, "write listener = sonic_bullet.attach(...)")
-        return ()
-    material = stage.choice.everyone or as_material(DEFAULT_MATERIAL)
-    places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
-    stage.microphones = None
-    known: set[int] = set()
-    said: list[str] = []
-
-    def before(client: int) -> None:
-        if stage.listener is None:
-            stage.listener = stage.attached(client, places)
-        came = [body for body in body_ids(client) if body not in known]
-        known.update(came)
-        if new := [who for body in came for who in links_with_shapes(client, body)]:
-            said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client), say))
-        stage.ready()
-
-    def after(_: int) -> None:
-        stage.need_listener().step()
-
-    run_script(stage.path, (before, after), total, progress=progress)
-    apart = ", ".join(f"{name} as {one.name}" for name, one in stage.choice.named.items())
-    but = f", but {apart}" if apart else ""
-    return (f"every body sounds as {material.name}{but}: the script names no materials", *said)
-
-
-def _listener_in(names: dict[str, Any]) -> Listener | None:
-    return next((value for value in names.values() if isinstance(value, Listener)), None)

@@ -21,8 +21,9 @@ import numpy as np
 
 from sonic_bullet.bake.baked_form import FORMAT, ExtrasForm, common_form, model_of
 from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties
+from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_values
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
-from sonic_bullet.files.gltf.gltf_writer import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, GltfBuffer, write_gltf
+from sonic_bullet.files.gltf.gltf_writer import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GltfBuffer, write_gltf
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import FileError
@@ -30,7 +31,6 @@ from sonic_bullet.records.errors import FileError
 EXTENSION = "KHR_audio_rigid_bodies"
 EXTRAS = "sonic_bullet"
 REMEDY = "write it again as glTF 2.0 with that extension"
-INDEX_TYPES = (5123, 5125)
 BULK = {
     "density": "density_kg_m3",
     "youngsModulus": "youngs_pa",
@@ -133,16 +133,13 @@ def read_gltf_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
 def _read_model(tree: GltfTree, audio: Mapping[str, Any], number: int) -> BakedModel:
     entry = audio["modalModels"][number]
     name = str(entry.get("name") or f"model {number}")
-    freq = _values(tree, entry, "frequencies", name, "SCALAR")[:, 0]
-    decay = _values(tree, entry, "decayRates", name, "SCALAR", len(freq))[:, 0]
-    point = _values(tree, entry, "positions", name, "VEC3")
-    shape = _values(tree, entry, "shapes", name, "VEC3", len(freq) * len(point)).reshape(len(freq), len(point), 3)
+    freq = named_values(tree, entry, "frequencies", name, "SCALAR")[:, 0]
+    decay = named_values(tree, entry, "decayRates", name, "SCALAR", len(freq))[:, 0]
+    point = named_values(tree, entry, "positions", name, "VEC3")
+    shape = named_values(tree, entry, "shapes", name, "VEC3", len(freq) * len(point)).reshape(len(freq), len(point), 3)
     face = np.zeros((0, 3), np.int64)
     if "indices" in entry:
-        index = _values(tree, entry, "indices", name, "SCALAR", whole=True)[:, 0]
-        if len(index) % 3 or index.max(initial=0) >= len(point):
-            raise FileError(f"{name}: indices are no triangles of its {len(point)} points", REMEDY)
-        face = index.reshape(-1, 3)
+        face = named_triangles(tree, entry, name, len(point))
     body: dict[str, Any] = {
         "name": name, "point_m": point, "face": face, "shape": shape.transpose(1, 2, 0),
     }  # fmt: skip
@@ -156,37 +153,6 @@ def _read_model(tree: GltfTree, audio: Mapping[str, Any], number: int) -> BakedM
         mass=_mass(entry.get("massProperties"), name),
         **body,
     )
-
-
-def _values(
-    tree: GltfTree,
-    entry: Mapping[str, Any],
-    key: str,
-    name: str,
-    kind: str,
-    count: int | None = None,
-    whole: bool = False,
-) -> Array:
-    """Read an accessor (n, width) that a model names, checked against the draft. Raises FileError."""
-    index, all_of_them = entry.get(key), tree.tree.get("accessors", ())
-    if index is None:
-        raise FileError(f"{name} has no {key}", REMEDY)
-    if not isinstance(index, int) or not 0 <= index < len(all_of_them):
-        raise FileError(f"{name}: {key} is accessor {shown(index)} of {len(all_of_them)}", REMEDY)
-    it = all_of_them[index]
-    types = INDEX_TYPES if whole else (FLOAT,)
-    if it.get("type") != kind or it.get("componentType") not in types:
-        raise FileError(
-            f"{name}: {key} are {it.get('type')} of component type {it.get('componentType')}, wanted {kind} of "
-            f"{' or '.join(map(str, types))}",
-            REMEDY,
-        )
-    found = tree.accessor(index)
-    if count is not None and len(found) != count:
-        raise FileError(f"{name} has {len(found)} {key}, wanted {count}", REMEDY)
-    if not np.isfinite(found).all():
-        raise FileError(f"{name}: {key} hold numbers that are none", REMEDY)
-    return found
 
 
 def _extras(entry: Mapping[str, Any], freq_hz: Array, decay_per_s: Array, name: str) -> ExtrasForm | None:

@@ -1,6 +1,6 @@
 """The command line: parses, calls, exits.
 
-    render SCENE.py | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
+    render SCENE.py | .gltf | LOG.npz -> RenderResult -> WAV, contact log, picture, JSON
     play SCENE.py | LOG.npz   -> the same, on a sound card
     film SCENE.py | LOG.npz   -> the same, with pictures: .mp4 .mov .mkv
     score ANIMATION           -> a baked animation's sound and contact log

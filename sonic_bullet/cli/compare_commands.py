@@ -20,6 +20,7 @@ from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_st
 from sonic_bullet.cli.parameters import json_option
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
+from sonic_bullet.records.file_endings import SCENE_ENDINGS
 
 COMPARE_EPILOG = """\b
 Examples:
@@ -80,7 +81,9 @@ def _check(a: str, b: str | None, ref: str | None, report: str | None) -> None:
         raise CompareError("compare needs two things", "give A and B, or A and --ref REV")
     for name in (a, b):
         if name is not None and not Path(name).exists():
-            raise CompareError(f"there is no {name}", "give a scene (.py), a contact log (.npz), a recording, a folder")
+            raise CompareError(
+                f"there is no {name}", "give a scene (.py .gltf .glb), a contact log (.npz), a recording, a folder"
+            )
     if b is not None and Path(a).is_dir() != Path(b).is_dir():
         raise CompareError("one is a folder, the other a file", "give two folders, or two files")
     if report is not None and not report.endswith((".html", ".htm")):
@@ -94,7 +97,7 @@ def _check_options(a: str, b: str | None, options: Any) -> None:
     of_scenes = [f"--{name}" for name in ("audible", "seconds", "sr") if options[name]]
     scenes = _of_scenes(a, b)
     if a.lower().endswith(".json"):
-        if not (b or "").lower().endswith(".py"):
+        if not (b or "").lower().endswith(SCENE_ENDINGS):
             raise CompareError(f"{b} is no scene to hold against a baseline", "give a scene (.py) after the baseline")
         if of_scenes:
             raise CompareError(f"a baseline says itself what {of_scenes[0]} would", f"leave {of_scenes[0]} out")
@@ -104,7 +107,7 @@ def _check_options(a: str, b: str | None, options: Any) -> None:
 
 def _of_scenes(a: str, b: str | None) -> bool:
     """Tell whether a side may hold a scene."""
-    return a.lower().endswith(".py") or (b or a).lower().endswith(".py") or Path(a).is_dir()
+    return a.lower().endswith(SCENE_ENDINGS) or (b or a).lower().endswith(SCENE_ENDINGS) or Path(a).is_dir()
 
 
 def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
@@ -115,7 +118,7 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
     from sonic_bullet.comparing.tolerance import found_closeness
 
     def side(path: Path, *, old: bool = False) -> Any:
-        if path.suffix.lower() != ".py":
+        if path.suffix.lower() not in SCENE_ENDINGS:
             return path
         given = {"seconds": options["seconds"], "sr": options["sr"] or 48_000}
         return SceneSide(path, **given, revision=options.get("revision") if old else None)

@@ -23,6 +23,7 @@ from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, shown
 from sonic_bullet.records.errors import CompareError, SonicBulletError
+from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.render import render_kept
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener
@@ -31,7 +32,7 @@ from sonic_bullet.session.wanted_bodies import WantedBody
 Say = Callable[[str], None]
 OF_WHOM = ("body", "links", "parts", "own_shapes")
 """Fields of a `WantedBody` that identify it and its shape; all others are inputs."""
-REMEDY = "give a scene (.py), a contact log (.npz), a recording, or a folder of them"
+REMEDY = "give a scene (.py .gltf .glb), a contact log (.npz), a recording, or a folder of them"
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +221,7 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
     place = Path(name)
     if not place.is_file():
         raise CompareError(f"no file {shown(name)}", REMEDY)
-    if place.suffix.lower() == ".py":
+    if place.suffix.lower() in SCENE_ENDINGS:
         return run(SceneSide(name), side, say=say)
     if place.suffix.lower() == ".npz":
         return of_log(read_log(name), name)

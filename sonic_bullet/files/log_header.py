@@ -45,6 +45,7 @@ class _Material(msgspec.Struct, omit_defaults=True):
     source: str
     residual: _Residual | None = None
     includes_radiation: bool = False
+    octave_rms_m: tuple[float, ...] | None = None
 
 
 class _Body(msgspec.Struct):
@@ -131,6 +132,7 @@ def pack_material(x: Material) -> _Material:
         if x.residual is None
         else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
         includes_radiation=bool(x.includes_radiation),
+        octave_rms_m=None if x.octave_rms_m is None else tuple(float(rms) for rms in x.octave_rms_m),
     )
 
 

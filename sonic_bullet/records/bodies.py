@@ -28,6 +28,7 @@ from sonic_bullet.records.coerce import (
 )
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
+from sonic_bullet.records.roughness import OCTAVES
 
 __all__ = [
     "Array",
@@ -77,6 +78,8 @@ class Material:
         rms height of the surface profile.
     hurst
         Hurst exponent of the profile (spectrum ∝ k^-(1+2·hurst)).
+    octave_rms_m : Array, shape (octaves,)
+        rms heights by wavelength in place of both (`records.roughness`).
     restitution
         Of an impact against a rigid wall, for pulses only.
     residual
@@ -100,6 +103,7 @@ class Material:
     residual: Residual | None = None
     effects: tuple[Any, ...] = ()
     includes_radiation: bool = False
+    octave_rms_m: Array | None = None
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -150,6 +154,10 @@ class Material:
             effects=as_items(self.effects, f"{where}: effects", "give effects of sonic_bullet.effects"),
             includes_radiation=as_flag(self.includes_radiation, f"{where}: includes_radiation"),
         )
+        if self.octave_rms_m is not None:
+            heights = frozen_array(self.octave_rms_m, float, (OCTAVES,), f"{where}: octave_rms_m")
+            require(bool((heights >= 0).all()), f"{where}: octave_rms_m is below 0", "give rms heights in m")
+            store(self, octave_rms_m=heights)
         as_text(self.source, f"{where}: source", "give a text")
         if self.residual is not None:
             as_kind(self.residual, Residual, f"{where}: residual", "give a Residual, or none")

@@ -130,6 +130,8 @@ class BodyTable:
         row["restitution"] = np.inf if material is None else material.restitution
         row["roughness_m"] = 0.0 if material is None else material.roughness_m
         row["hurst"] = 0.7 if material is None else material.hurst
+        given = None if material is None else material.octave_rms_m
+        row["octave_rms_m"] = -1.0 if given is None else given
         row["size_m"], row["volume_m3"] = resonator.size_m, body.volume_m3
         row["curvature_per_m"] = body.curvature_per_m
         row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)

@@ -19,7 +19,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Body
 from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
 from sonic_bullet.render.strike_pulses import STEEPEST
-from sonic_bullet.synth.profile import height_octaves
+from sonic_bullet.synth.profile import given_octaves, height_octaves
 from sonic_bullet.synth.surface_kernel import FASTEST_M_S, contact_radius_m, damping_ratio, sound_voices
 
 FOLLOW_S = 0.02
@@ -192,7 +192,10 @@ def _begin(pair, bodies, rows, begin, end, faces, nodes, quaternion):
     for side in range(2):
         body = bodies[high if side else low]
         pair.swept_m[side], pair.seed[side] = 0.0, body.surface_seed
-        height_octaves(body.roughness_m, body.hurst, pair.height_m[side])
+        if body.octave_rms_m[0] < 0.0:
+            height_octaves(body.roughness_m, body.hurst, pair.height_m[side])
+        else:
+            given_octaves(body.octave_rms_m, pair.height_m[side])
         mobility += 1.0 / body.mass_kg if body.mass_kg > 0.0 else 0.0
     pair.mass_kg, curvature, square, strongest = 1.0 / mobility, 0.0, 0.0, begin
     for r in range(begin, end):

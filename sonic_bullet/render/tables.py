@@ -31,6 +31,7 @@ BODY = np.dtype(
         ("restitution", "f8"),  # infinite where it has no material
         ("roughness_m", "f8"),
         ("hurst", "f8"),
+        ("octave_rms_m", "f8", (OCTAVES,)),  # the first below 0: roughness and hurst tell
         ("size_m", "f8"),  # cube root of the volume
         ("volume_m3", "f8"),
         ("curvature_per_m", "f8"),  # of a shape that has one everywhere; NaN: that of its faces

@@ -32,6 +32,7 @@ from sonic_bullet.records import Array, Body, Material, ModalModel
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.roughness import with_roughness as with_roughness_of
 from sonic_bullet.session.material_choice import as_choice
 
 SURFACES, PLACES, MATERIALS = VARIED = ("surfaces", "places", "materials")
@@ -204,7 +205,8 @@ def vary_body(body: Body, factors: Mapping[str, float]) -> Body:
     if material.alpha_per_s is not None and material.beta_s is not None:
         changed["alpha_per_s"] = material.alpha_per_s * factors.get("alpha_per_s", loss)
         changed["beta_s"] = material.beta_s * factors.get("beta_s", loss)
-    made = replace(material, **changed)
+    rough = with_roughness_of(material, changed.pop("roughness_m"))
+    made = replace(rough, **changed)
     model = None if body.model is None else _vary_model(body.model, material, made, stiff / dense, dense)
     return replace(body, material=made, model=model)
 
@@ -251,7 +253,7 @@ def with_roughness(log: ContactLog, roughness_m: Mapping[str, float], where: str
             raise SceneError(f"{body.name} has no surface: it was no sounding body", "give it a --material, too")
         height = roughness_m.get(found or "")
         if height is not None and body.material is not None:
-            body = replace(body, material=replace(body.material, roughness_m=height))  # noqa: PLW2901 - the same body
+            body = replace(body, material=with_roughness_of(body.material, height))  # noqa: PLW2901 - the same body
         bodies.append(body)
     return replace(log, bodies=tuple(bodies))
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
@@ -33,6 +33,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeWarning, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
+from sonic_bullet.records.roughness import with_roughness
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
@@ -87,7 +88,7 @@ def wanted_body(
     made = as_material(material)
     if roughness_m is not None:
         remedy = "give an rms height in m, zero or above"
-        made = replace(made, roughness_m=as_number(roughness_m, "roughness_m", remedy, least=0))
+        made = with_roughness(made, as_number(roughness_m, "roughness_m", remedy, least=0))
     made = with_material(made)
     asked = ModalOptions(**options)
     if model is not None:

@@ -40,15 +40,15 @@ from numba import types
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records.roughness import LONGEST_M, OCTAVES, WAVE_M
 from sonic_bullet.synth.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
 
-OCTAVES = 14
-LONGEST_M = 0.1
+__all__ = ["LATTICE", "OCTAVES", "SLOWEST_HZ", "gained_heights", "given_octaves", "height_octaves", "sweep_profile"]
+
 LATTICE = 0.30
 """An octave on a lattice Δ carries most of the self-affine spectrum at λ = Δ/0.30: there x^2.5 sinc(x)^8 peaks."""
 SLOWEST_HZ = 8.0
 
-_WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
 _UNIT_RMS = np.sqrt(3.0 * 315 / 151)
 """Makes n_j unit variance: lattice values uniform on ±1 have 1/3, the mean square of the B-spline is 151/315."""
 
@@ -58,7 +58,7 @@ def height_octaves(roughness_m, hurst, out):
     """Write A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
     total = 0.0
     for j in range(OCTAVES):
-        out[j] = _WAVE_M[j] ** hurst
+        out[j] = WAVE_M[j] ** hurst
         total += out[j] * out[j]
     scale = np.sqrt(total)
     for j in range(OCTAVES):
@@ -66,14 +66,21 @@ def height_octaves(roughness_m, hurst, out):
 
 
 @njit(nogil=True, error_model="numpy")
+def given_octaves(octave_rms_m, out):
+    """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms heights (OCTAVES,) in m."""
+    for j in range(OCTAVES):
+        out[j] = octave_rms_m[j] * _UNIT_RMS
+
+
+@njit(nogil=True, error_model="numpy")
 def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
     """Write g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
     for j in range(OCTAVES):
-        f = speed_m_s / _WAVE_M[j]
+        f = speed_m_s / WAVE_M[j]
         fine, slow = (0.4 - f / sr) / 0.2, f / SLOWEST_HZ - 1.0
         fine, slow = 0.0 if fine < 0.0 else fine, 0.0 if slow < 0.0 else slow
         fine, slow = 1.0 if fine > 1.0 else fine, 1.0 if slow > 1.0 else slow
-        out[j] = height_m[j] * (fine * slow / np.sqrt(1.0 + patch_radius_m / _WAVE_M[j]))
+        out[j] = height_m[j] * (fine * slow / np.sqrt(1.0 + patch_radius_m / WAVE_M[j]))
 
 
 @intrinsic

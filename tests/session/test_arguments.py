@@ -75,6 +75,7 @@ MATERIAL = {
     "residual": None,
     "effects": (),
     "includes_radiation": False,
+    "octave_rms_m": np.full(14, 1e-7),
 }
 MODEL = dict(
     freq_hz=[100.0],
@@ -358,6 +359,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "source": TEXT,
         "residual": RECORD,
         "effects": ["x", 5, None, object(), {}],
+        "octave_rms_m": ["x", 5, object(), [1e-6], [math.nan] * 14, [-1.0] * 14],
         "includes_radiation": FLAG,
     },
     "Material.isotropic": {

@@ -34,7 +34,7 @@ REFRESH_S = 0.25  # of the line on a terminal
 
 
 @click.command(epilog=EPILOG)
-@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
 @click.option(
     "--device", metavar="D", help="Name or number of a sound card; 'null' for none. [default: the system's own]"
 )

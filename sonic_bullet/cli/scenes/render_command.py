@@ -15,7 +15,7 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 
 
 @click.command(epilog=RENDER_EPILOG)
-@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
 @click.option(
     "-o",
     "--output",

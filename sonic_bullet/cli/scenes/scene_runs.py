@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import quiet_stderr
 from sonic_bullet.records.errors import AudioError, FileError, MaterialError, SonicBulletError
+from sonic_bullet.records.file_endings import SCENE_ENDINGS
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
@@ -89,10 +90,11 @@ def is_log(scene: str) -> bool:
 def check_scene_file(scene: str, verb: str) -> None:
     """Raise FileError where there is neither a scene nor a contact log to render or play."""
     if not Path(scene).is_file():
-        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py) or a contact log (.npz)")
-    if Path(scene).suffix.lower() not in (".py", ".npz"):
+        raise FileError(f"cannot read {scene}: no such file", "give a scene (.py .gltf .glb) or a contact log (.npz)")
+    if Path(scene).suffix.lower() not in (*SCENE_ENDINGS, ".npz"):
         raise FileError(
-            f"cannot {verb} {scene}: neither a scene nor a contact log", "give a file that ends in .py or .npz"
+            f"cannot {verb} {scene}: neither a scene nor a contact log",
+            "give a file that ends in .py, .gltf, .glb or .npz",
         )
 
 

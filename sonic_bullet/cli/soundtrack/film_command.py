@@ -42,7 +42,7 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 
 
 @click.command(epilog=EPILOG)
-@click.argument("scene", metavar="SCENE.py|LOG.npz")
+@click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
 @click.option("-o", "--output", required=True, metavar="NAME.mp4", help="Film: .mp4 .mov .mkv")
 @click.option("--seconds", type=float, metavar="S", help="How long. [default: the scene's own, else 4; all of a log]")
 @click.option("--fps", default="30", show_default=True, metavar="F", help="Pictures a second: 24, 25, 30000/1001, 60 …")

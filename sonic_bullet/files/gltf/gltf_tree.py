@@ -29,12 +29,17 @@ WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GltfTree:
-    """The JSON tree, and the bytes of each buffer. error, remedy: raised where they do not fit."""
+    """The JSON tree, and the bytes of each buffer. error, remedy: raised where they do not fit; folder: its own."""
 
     tree: dict[str, Any]
     buffer: tuple[bytes, ...]
     error: type[SonicBulletError]
     remedy: str
+    folder: Path = Path()
+
+    def neighbour(self, name: str) -> bytes:
+        """Read a file that lies beside it; raises ``error`` where it would lie elsewhere."""
+        return _neighbour(name, self.folder, self.error)
 
     def accessor(self, index: int) -> Array:
         """Read an accessor (n, width) as float, or integer where it is not normalised; raises ``error``."""
@@ -78,7 +83,7 @@ def read_tree(path: Path, error: type[SonicBulletError], remedy: str) -> GltfTre
     if packed:
         raise error(f"{path} is compressed with {packed[0]}", "export it without compression")
     buffers = tuple(_buffer(one, chunk, path, error, remedy) for one in tree.get("buffers", ()))
-    return GltfTree(tree, buffers, error, remedy)
+    return GltfTree(tree, buffers, error, remedy, path.parent)
 
 
 def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path, error: type[SonicBulletError], remedy: str) -> bytes:
@@ -88,11 +93,15 @@ def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path, error: type[SonicB
     elif uri.startswith("data:"):
         data = base64.b64decode(uri.split(",", 1)[1])
     else:
-        name = Path(unquote(uri))
-        if name.is_absolute() or ".." in name.parts:
-            raise error(f"buffer {shown(uri)} lies outside its folder", "keep it beside the .gltf")
-        refuse_lfs_pointer(path.parent / name, error)
-        data = (path.parent / name).read_bytes()
+        data = _neighbour(unquote(uri), path.parent, error)
     if len(data) < int(one.get("byteLength", 0)):
         raise error("a buffer is shorter than it claims", remedy)
     return data
+
+
+def _neighbour(uri: str, folder: Path, error: type[SonicBulletError]) -> bytes:
+    name = Path(uri)
+    if name.is_absolute() or ".." in name.parts:
+        raise error(f"{shown(uri)} lies outside its folder", "keep it beside the .gltf")
+    refuse_lfs_pointer(folder / name, error)
+    return (folder / name).read_bytes()

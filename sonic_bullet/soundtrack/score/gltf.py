@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
@@ -172,7 +173,7 @@ def _objects(
         if "skin" in node:
             notes.append(f"{name} is skinned, which is no rigid motion: it is left out")
             continue
-        vertex, face = _mesh(file, file.tree["meshes"][node["mesh"]])
+        vertex, face = mesh_triangles(file, file.tree["meshes"][node["mesh"]])
         if not len(face):
             notes.append(f"{name} has no triangles: it is left out")
             continue
@@ -227,23 +228,6 @@ def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
             f"{shown(name)} changes its size at frame {int(wrong.argmax())}", "animate position and rotation alone"
         )
     return stretch, matrix[:, :3, 3].copy(), Rotation.from_matrix(frame).as_quat()
-
-
-def _mesh(file: GltfTree, mesh: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Read vertices (v, 3) and triangles (f, 3) of all primitives of a mesh that are triangles [3.7.2]."""
-    vertices, faces, at = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
-    for part in mesh.get("primitives", ()):
-        if part.get("mode", 4) != 4:
-            continue
-        vertex = file.accessor(part["attributes"]["POSITION"]).astype(float)
-        index = file.accessor(part["indices"])[:, 0] if "indices" in part else np.arange(len(vertex))
-        face = index.astype(np.int64)[: len(index) // 3 * 3].reshape(-1, 3)
-        if len(face) and (face.min() < 0 or face.max() >= len(vertex)):
-            raise AnimationError("a face names no vertex", _REMEDY)
-        vertices.append(vertex)
-        faces.append(face + at)
-        at += len(vertex)
-    return np.concatenate(vertices), np.concatenate(faces)
 
 
 def _stated(name: str, node: Mapping[str, Any]) -> Rule:

@@ -1,0 +1,227 @@
+"""KHR_physics_rigid_bodies and KHR_implicit_shapes -> colliders, motion, friction, drives [Khronos, drafts of 2024-26].
+
+    motion: mass, centerOfMass, inertiaDiagonal, inertiaOrientation, linearVelocity, angularVelocity, gravityFactor
+    collider: geometry (shape | mesh), physicsMaterial: dynamicFriction, restitution, their combine rules
+    joint with locked turns and one velocity drive -> SpeedDrive
+
+What is none of these is named in notes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files.gltf.checked_accessors import one_of
+from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.rigid_scene import PhysicsMaterial, SpeedDrive
+from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
+
+PHYSICS, SHAPES = "KHR_physics_rigid_bodies", "KHR_implicit_shapes"
+UP_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""Turns a shape whose axis is z so that it is y."""
+MOTION = {"isKinematic", "mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation"} | {
+    "linearVelocity", "angularVelocity", "gravityFactor", "extensions", "extras"
+}  # fmt: skip
+COLLIDER = {"geometry", "physicsMaterial", "extensions", "extras"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyFrame:
+    """Where a body's frame is: centre (3,) and turn (3, 3), world; and in its node, centre before its scale."""
+
+    centre_m: Array
+    turn: Array
+    local_centre: Array
+    local_turn: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyMotion:
+    """What moves a body. mass_kg None: not said."""
+
+    mass_kg: float | None
+    inertia_kg_m2: Array
+    velocity_m_s: Array
+    spin_rad_s: Array
+    gravity_factor: float
+
+
+def body_nodes(nodes: Nodes) -> dict[int, list[int]]:
+    """Find each body's node and its colliders': what moves with what hangs on it, else each by itself."""
+    found: dict[int, list[int]] = {}
+    for i in nodes.in_scene():
+        own = nodes.extension(i, PHYSICS)
+        if "motion" in own:
+            found.setdefault(i, [])
+        if "collider" in own:
+            chain = (i, *nodes.ancestors(i))
+            mover = next((one for one in chain if "motion" in nodes.extension(one, PHYSICS)), i)
+            found.setdefault(mover, []).append(i)
+    return found
+
+
+def body_frame(nodes: Nodes, index: int) -> BodyFrame:
+    """Of a node's body: at its centre of mass, along its principal axes."""
+    from scipy.spatial.transform import Rotation
+
+    placed, said = nodes.placed(index), nodes.extension(index, PHYSICS).get("motion", {})
+    centre = _vector(said, "centerOfMass", f"{nodes.name(index)}: centerOfMass")
+    turn = Rotation.from_quat(said.get("inertiaOrientation", (0.0, 0.0, 0.0, 1.0))).as_matrix()
+    return BodyFrame(placed.position_m + placed.turn @ (placed.scale * centre), placed.turn @ turn, centre, turn)
+
+
+def motion_of(nodes: Nodes, index: int, notes: list[str]) -> BodyMotion:
+    """Read a node's `motion`; without one, a body stands still."""
+    name, own = nodes.name(index), nodes.extension(index, PHYSICS)
+    said = own.get("motion")
+    zero = np.zeros(3)
+    if said is None:
+        return BodyMotion(0.0, zero, zero, zero, 1.0)
+    notes += [f"{name}: motion.{key} is not known" for key in sorted(set(said) - MOTION)]
+    if said.get("isKinematic"):
+        notes.append(f"{name} is kinematic: it stands still, for nothing here moves it")
+        return BodyMotion(0.0, zero, zero, zero, 1.0)
+    turn = nodes.placed(index).turn  # velocities are in the node's space [KHR_physics_rigid_bodies, Motions]
+    mass = said.get("mass")
+    return BodyMotion(
+        None if mass is None else as_number(mass, f"{name}: mass", "give kilograms above 0", above=0),
+        _vector(said, "inertiaDiagonal", f"{name}: inertiaDiagonal"),
+        turn @ _vector(said, "linearVelocity", f"{name}: linearVelocity"),
+        turn @ _vector(said, "angularVelocity", f"{name}: angularVelocity"),
+        as_number(said.get("gravityFactor", 1.0), f"{name}: gravityFactor", "give a number"),
+    )
+
+
+def _vector(said: Mapping[str, Any], key: str, name: str) -> Array:
+    values = said.get(key, (0.0, 0.0, 0.0))
+    return np.array([as_number(x, name, "give three numbers") for x in values], float).reshape(3)
+
+
+def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[str]) -> list[Shape]:
+    """Read a collider's geometry in its body's frame, scaled as its node is."""
+    from scipy.spatial.transform import Rotation
+
+    tree, name = nodes.tree, nodes.name(collider)
+    said = nodes.extension(collider, PHYSICS)["collider"]
+    notes += [f"{name}: collider.{key} is not simulated" for key in sorted(set(said) - COLLIDER)]
+    placed, geometry = nodes.placed(collider), said.get("geometry", {})
+    position = frame.turn.T @ (placed.position_m - frame.centre_m)
+    turn = frame.turn.T @ placed.turn
+
+    def quaternion(more: Array | None = None) -> Array:
+        return np.asarray(Rotation.from_matrix(turn if more is None else turn @ more).as_quat())
+
+    if "shape" not in geometry:
+        vertex, face = mesh_triangles(tree, _mesh_of(nodes, geometry, name))
+        if len(vertex) < 4:
+            raise tree.error(f"{name}: the mesh of its collider is flat or none", tree.remedy)
+        return [
+            Shape("mesh", position_m=position, quaternion_xyzw=quaternion(), vertex_m=vertex * placed.scale, face=face)
+        ]
+    known = tree.tree.get("extensions", {}).get(SHAPES, {}).get("shapes", ())
+    shape = one_of(tree, known, geometry["shape"], f"{name}: shape")
+    kind = str(shape.get("type"))
+    own = shape.get(kind, {})
+    if kind == "box":
+        size = np.array(own.get("size", (1.0, 1.0, 1.0)), float) * placed.scale
+        _check_lengths(nodes, name, size)
+        return [Shape("box", size, position, quaternion())]
+    if kind == "plane":
+        if "sizeX" in own or "sizeZ" in own:
+            notes.append(f"{name} is a plane of finite size: it is endless here")
+        return [Shape("plane", np.zeros(3), position, quaternion(UP_TO_Y))]
+    if kind not in ("sphere", "capsule", "cylinder"):
+        raise tree.error(f"{name}: its shape is a {kind}", "give a box, sphere, capsule, cylinder, plane or mesh")
+    if not placed.uniform:
+        raise tree.error(f"{name}: a {kind} of uneven scale", "scale it evenly, or give a mesh")
+    scale = float(placed.scale[0])
+    if kind == "sphere":
+        radius = as_number(own.get("radius", 0.5), f"{name}: radius", "give metres above 0", above=0)
+        return [Shape("sphere", np.array([radius * scale, 0.0, 0.0]), position, quaternion())]
+    ends = [as_number(own.get(key, 0.25), f"{name}: {key}", "give metres") for key in ("radiusTop", "radiusBottom")]
+    if ends[0] != ends[1]:
+        notes.append(f"{name}: a {kind} that narrows is not simulated: both its ends have the mean radius")
+    height = as_number(own.get("height", 0.5), f"{name}: height", "give metres above 0", above=0)
+    size = np.array([sum(ends) / 2 * scale, height * scale, 0.0])
+    _check_lengths(nodes, name, size[:2])
+    return [Shape("capsule" if kind == "capsule" else "cylinder", size, position, quaternion(UP_TO_Y))]
+
+
+def _check_lengths(nodes: Nodes, name: str, size: Array) -> None:
+    if not (np.isfinite(size).all() and (size > 0).all()):
+        raise nodes.tree.error(f"{name}: a length of its shape is not above 0", "give metres above 0")
+
+
+def _mesh_of(nodes: Nodes, geometry: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    index = geometry.get("mesh")
+    if "node" in geometry:
+        index = one_of(nodes.tree, nodes.entry, geometry["node"], f"{name}: node").get("mesh")
+    return one_of(nodes.tree, nodes.tree.tree.get("meshes", ()), index, f"{name}: mesh")
+
+
+def physics_of(nodes: Nodes, colliders: list[int], name: str, notes: list[str]) -> PhysicsMaterial:
+    """Friction and restitution of a body's colliders: those of the first."""
+    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS, {}).get("physicsMaterials", ())
+    indices = [nodes.extension(i, PHYSICS)["collider"].get("physicsMaterial") for i in colliders]
+    if len(set(indices)) > 1:
+        notes.append(f"{name} has several physics materials: that of its first collider counts")
+    if not indices or indices[0] is None:
+        return PhysicsMaterial()
+    said = one_of(nodes.tree, known, indices[0], f"{name}: physicsMaterial")
+    sliding = said.get("dynamicFriction", 0.6)
+    if (static := said.get("staticFriction", sliding)) != sliding:
+        words = f"static friction {static:g} is not simulated: PyBullet has one, the dynamic {sliding:g} is taken"
+        if words not in notes:
+            notes.append(words)
+    return PhysicsMaterial(
+        sliding,
+        said.get("restitution", 0.0),
+        said.get("frictionCombine", "average"),
+        said.get("restitutionCombine", "average"),
+    )
+
+
+def drive_of(nodes: Nodes, index: int, number_of: Mapping[int, int], notes: list[str]) -> SpeedDrive | None:
+    """Read a node's joint as a drive; None where it has none, or one that PyBullet lacks, which is named.
+
+    number_of: bodies by the numbers of their nodes.
+    """
+    said = nodes.extension(index, PHYSICS).get("joint")
+    if said is None:
+        return None
+    name = nodes.name(index)
+    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS, {}).get("physicsJoints", ())
+    joint = one_of(nodes.tree, known, said.get("joint"), f"{name}: joint")
+    limits, drives = joint.get("limits", ()), joint.get("drives", ())
+    locked = all(
+        set(x.get("angularAxes", ())) == {0, 1, 2} and x.get("min") == x.get("max") == 0 and "linearAxes" not in x
+        for x in limits
+    )
+    speed = len(drives) == 1 and drives[0].get("type") == "linear" and not drives[0].get("stiffness")
+    owner = next((one for one in (index, *nodes.ancestors(index)) if one in number_of), None)
+    if not (locked and speed and "velocityTarget" in drives[0]) or owner is None:
+        kinds = sorted({axis for x in limits for axis in x if axis.endswith("Axes")})
+        words = ", ".join([*kinds, *(f"{x.get('type')} drive" for x in drives)]) or "none"
+        notes.append(f"{name}: its joint ({words}) is not simulated: PyBullet makes no such one between two bodies")
+        return None
+    drive, partner = drives[0], said.get("connectedNode")
+    axis = nodes.placed(index).turn[:, int(drive.get("axis", 0))]
+    return SpeedDrive(
+        body=number_of[owner],
+        partner=number_of.get(partner, -1),
+        direction=axis / np.linalg.norm(axis),
+        speed_m_s=-drive["velocityTarget"],  # of the partner in the body's joint space
+        damping_n_s_m=drive.get("damping", 0.0),
+        most_n=drive.get("maxForce", 1e9),
+        turns_locked=bool(limits),
+    )
+
+
+GRAVITY_M_S2 = UPRIGHT @ np.array([0.0, -9.81, 0.0])
+"""KHR_physics_rigid_bodies leaves gravity to the engine; y is up."""

@@ -1,0 +1,128 @@
+"""A .gltf or .glb with KHR_physics_rigid_bodies -> RigidScene.
+
+tree -> a body a node that moves, and a body a collider that does not -> shapes, motion, material, model -> RigidBody
+     -> joints -> drives;  what is not understood -> notes
+
+A dynamic body with an acoustic material and no model is solved here where no body of the file has a model; else it is
+silent on purpose [Attaching to Nodes].
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
+from sonic_bullet.files.reading import reading
+from sonic_bullet.geometry import volume_m3
+from sonic_bullet.records import Shape
+from sonic_bullet.records.errors import SceneError
+from sonic_bullet.records.file_endings import GLTF_ENDINGS
+from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
+from sonic_bullet.session.gltf_in.acoustics import AUDIO, as_given, audio_of, material_of, model_of, said_of
+from sonic_bullet.session.gltf_in.node_frames import Nodes
+from sonic_bullet.session.gltf_in.physics import (
+    GRAVITY_M_S2,
+    PHYSICS,
+    SHAPES,
+    body_frame,
+    body_nodes,
+    collider_shapes,
+    drive_of,
+    motion_of,
+    physics_of,
+)
+
+BYTES_MAX = 1 << 30
+REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
+READ = {PHYSICS, SHAPES, AUDIO, "KHR_texture_transform", "KHR_mesh_quantization"}
+LOOKS = ("KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "EXT_meshopt", "KHR_xmp")
+"""Beginnings of extensions that only change what is seen."""
+
+
+def is_gltf(path: str | os.PathLike[str]) -> bool:
+    """Whether it is a glTF by its name."""
+    return Path(path).suffix.lower() in GLTF_ENDINGS
+
+
+def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
+    """Bodies, materials and models of a scene. Raises FileError, SceneError, RecordError, each one line."""
+    with reading(path, "glTF scene", SceneError, REMEDY):
+        if Path(path).stat().st_size > BYTES_MAX:
+            raise SceneError(f"{path} is larger than a gigabyte", "split it")
+        return _scene_of(read_tree(Path(path), SceneError, REMEDY), Path(path).name)
+
+
+def _scene_of(tree: GltfTree, name: str) -> RigidScene:
+    nodes, notes = Nodes(tree), list[str]()
+    used = [str(x) for x in tree.tree.get("extensionsUsed", ())]
+    notes += [f"{name} uses {x}, which is not read" for x in used if x not in READ and not x.startswith(LOOKS)]
+    if tree.tree.get("animations"):
+        notes.append(f"animations of {name} are not played: sonic-bullet score gives them their sound")
+    found = body_nodes(nodes)
+    if not found:
+        raise SceneError(f"{name} has no rigid body: its extensions are {', '.join(used) or 'none'}", REMEDY)
+    modelled = bool(audio_of(nodes).get("modalModels"))
+    bodies: list[RigidBody] = []
+    number_of: dict[int, int] = {}
+    for index, colliders in found.items():
+        if not colliders:
+            notes.append(f"{nodes.name(index)} moves and has no collider: it is left out")
+            continue
+        number_of[index] = len(bodies)
+        bodies.append(_body(nodes, index, colliders, modelled, notes))
+    joined = [drive_of(nodes, index, number_of, notes) for index in nodes.in_scene()]
+    return RigidScene(tuple(bodies), tuple(x for x in joined if x is not None), GRAVITY_M_S2, _once(notes))
+
+
+def _once(notes: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(notes))
+
+
+def _body(nodes: Nodes, index: int, colliders: list[int], modelled: bool, notes: list[str]) -> RigidBody:
+    from scipy.spatial.transform import Rotation
+
+    name, frame, motion = nodes.name(index), body_frame(nodes, index), motion_of(nodes, index, notes)
+    shapes = [shape for one in colliders for shape in collider_shapes(nodes, one, frame, notes)]
+    physics = physics_of(nodes, colliders, name, notes)
+    said, owner = said_of(nodes, index, colliders, notes)
+    material, bulk = material_of(nodes, said, index, physics, notes)
+    model = None
+    if "modalModel" in said and material is not None:
+        model = model_of(nodes, said["modalModel"], owner, frame, motion.mass_kg, bulk, notes)
+        material = as_given(material)
+    mass = motion.mass_kg
+    if mass is None:
+        mass = model.mass_kg if model is not None and model.mass_kg else _solid_mass(shapes, bulk)
+        notes.append(f"{name} says no mass: {mass:.4g} kg is taken")
+    solved = mass > 0 and model is None and bool(bulk) and not modelled
+    if "modalModel" not in said and material is not None and mass > 0 and modelled:
+        notes.append(f"{name} has no modal model: it touches and does not ring")
+    return RigidBody(
+        name, tuple(shapes), mass, motion.inertia_kg_m2, frame.centre_m, Rotation.from_matrix(frame.turn).as_quat(),
+        motion.velocity_m_s, motion.spin_rad_s, physics, motion.gravity_factor, material, model, solved,
+        said.get("gain", 1.0),
+    )  # fmt: skip
+
+
+def _solid_mass(shapes: Sequence[Shape], bulk: Mapping[str, Any]) -> float:
+    """Of shapes without a model: their volume by their material's density, or water's."""
+    return float(sum(map(_volume_m3, shapes)) * bulk.get("density", 1000.0))
+
+
+def _volume_m3(shape: Shape) -> float:
+    size = shape.size_m
+    match shape.kind:
+        case "box":
+            return float(np.prod(size))
+        case "mesh":
+            return abs(volume_m3(shape.vertex_m, shape.face))
+        case "plane":
+            return 0.0
+    length = 0.0 if shape.kind == "sphere" else float(size[1])
+    ends = 0.0 if shape.kind == "cylinder" else 4 / 3 * float(size[0])
+    return float(np.pi * size[0] ** 2 * (length + ends))

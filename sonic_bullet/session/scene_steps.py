@@ -1,0 +1,148 @@
+"""The steps of a scene, made with a listener on it: of a file with `build`, and of a plain script.
+
+stage (file, microphones, choice of materials) -> world -> listener -> steps -> notes
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+from sonic_bullet.listener import (
+    body_ids,
+    direct_client,
+    is_static,
+    links_with_shapes,
+    run_script,
+    watch_settings,
+)
+from sonic_bullet.machine.progress import Say
+from sonic_bullet.records import Sensor
+from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.errors import SceneError
+from sonic_bullet.session.arguments import MicrophoneLike, as_material
+from sonic_bullet.session.links_of_script import add_links, named_links
+from sonic_bullet.session.listening import Listener
+from sonic_bullet.session.material_choice import MaterialChoice
+from sonic_bullet.session.scene_file import scene_module, user_code, uses_sonic_bullet
+
+DEFAULT_SECONDS = 4.0
+DEFAULT_MATERIAL = "plastic"
+Progress = Callable[[float], None]
+
+
+class SceneStage(Protocol):
+    """A scene being run. adds: a script chose whom its own listener listens to; gain_db: by bodies' ids."""
+
+    path: Path
+    microphones: tuple[Sensor, ...] | None
+    choice: MaterialChoice
+    begin: Callable[[Listener], object] | None
+    listener: Listener | None
+    adds: bool
+    client: Any
+    gain_db: dict[int, float]
+
+    def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
+        """Make a listener on a client."""
+        ...
+
+    def ready(self) -> None:
+        """Tell that the listener knows its bodies."""
+        ...
+
+    def need_listener(self) -> Listener:
+        """Return the listener; raises SceneError where there is none."""
+        ...
+
+    def check_names(self) -> tuple[str, ...]:
+        """Lines on names of the choice."""
+        ...
+
+
+def as_seconds(seconds: object, name: str) -> float:
+    """Return a length of physics time; raises SceneError."""
+    return as_number(seconds, name, "give seconds of physics time, above 0", above=0, most=1e6, error=SceneError)
+
+
+def run_built(stage: SceneStage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
+    """Run a file with `build` for so many seconds of physics time; notes a user should read."""
+    module = scene_module(stage.path)
+    stage.client = client = direct_client()  # dropped, it would end before its world is looked at
+    watch_settings(client)  # build sets friction and the like
+    cast = user_code(stage.path, module.build, client)
+    if not isinstance(cast, dict):
+        what = f"scene '{stage.path.name}': build(client) returned {type(cast).__name__}"
+        raise SceneError(what, "return a dictionary from bodies to materials")
+    places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
+    stage.listener = listener = stage.attached(client, places)
+    stage.microphones = None
+    user_code(stage.path, partial(listener.add_all, cast, progress=say))
+    said: tuple[str, ...] = ()
+    if stage.choice:
+        stage.check_names()
+        static = partial(is_static, client._client)
+        said = add_links(listener, named_links(listener.world, stage.choice), static, say)
+    act = getattr(module, "act", None)
+    stage.ready()
+    own = getattr(module, "SECONDS", DEFAULT_SECONDS)
+    total = seconds if seconds is not None else as_seconds(own, f"SECONDS of scene '{stage.path.name}'")
+    while listener.time_s < total - 1e-9:
+        if act is not None:
+            user_code(stage.path, act, client, listener.time_s)
+        client.stepSimulation()
+        if progress is not None:
+            progress(min(listener.time_s / total, 1.0))
+    return said
+
+
+def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
+    """Run a script for so many seconds of physics time; notes a user should read."""
+    total = seconds if seconds is not None else DEFAULT_SECONDS
+    if uses_sonic_bullet(stage.path):
+        names: dict[str, Any] = {}
+
+        def look(_: int) -> None:
+            stage.listener = stage.listener or _listener_in(names)
+            if stage.begin is not None and stage.listener is not None:
+                if stage.microphones is not None:
+                    raise SceneError(f"scene '{stage.path.name}' has microphones of its own", "leave yours out")
+                stage.ready()
+
+        try:
+            run_script(stage.path, (look, None), total, names=names, progress=progress)
+        finally:  # where it fails, the sound so far is kept too
+            stage.listener = _listener_in(names)
+        stage.adds = True
+        if stage.listener is None:
+            what = f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name"
+            raise SceneError(what, "write listener = sonic_bullet.attach(...)")
+        return ()
+    material = stage.choice.everyone or as_material(DEFAULT_MATERIAL)
+    places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
+    stage.microphones = None
+    known: set[int] = set()
+    said: list[str] = []
+
+    def before(client: int) -> None:
+        if stage.listener is None:
+            stage.listener = stage.attached(client, places)
+        came = [body for body in body_ids(client) if body not in known]
+        known.update(came)
+        if new := [who for body in came for who in links_with_shapes(client, body)]:
+            said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client), say))
+        stage.ready()
+
+    def after(_: int) -> None:
+        stage.need_listener().step()
+
+    run_script(stage.path, (before, after), total, progress=progress)
+    apart = ", ".join(f"{name} as {one.name}" for name, one in stage.choice.named.items())
+    but = f", but {apart}" if apart else ""
+    return (f"every body sounds as {material.name}{but}: the script names no materials", *said)
+
+
+def _listener_in(names: dict[str, Any]) -> Listener | None:
+    return next((value for value in names.values() if isinstance(value, Listener)), None)
