@@ -129,14 +129,8 @@ class Material:
         )
         for name in ("alpha_per_s", "beta_s"):
             if getattr(self, name) is not None:
-                store(
-                    self,
-                    **{
-                        name: as_number(
-                            getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0
-                        )
-                    },
-                )
+                damping = as_number(getattr(self, name), f"{where}: {name}", "damping must be zero or above", least=0)
+                store(self, **{name: damping})
         require(
             (self.alpha_per_s is None) == (self.beta_s is None),
             f"{where}: only one of alpha_per_s, beta_s is given",
