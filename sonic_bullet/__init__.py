@@ -17,9 +17,22 @@ if TYPE_CHECKING:
     from sonic_bullet.comparing.compared_sides import compare
     from sonic_bullet.files import read_audio, read_log, write_audio
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.files.sofa.heads import read_head
     from sonic_bullet.listener import keep_restitution
     from sonic_bullet.presets import list_materials, load_material
-    from sonic_bullet.records import Air, Material, Microphone, ModalModel, ModalSum, Shape, Vibrometer
+    from sonic_bullet.records import (
+        Air,
+        Ambisonics,
+        Binaural,
+        Head,
+        Material,
+        Microphone,
+        MicrophonePath,
+        ModalModel,
+        ModalSum,
+        Shape,
+        Vibrometer,
+    )
     from sonic_bullet.records.contacts import Contacts, Step
     from sonic_bullet.records.errors import SonicBulletError
     from sonic_bullet.render import render_log
@@ -29,11 +42,15 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Air": "records",
+    "Ambisonics": "records",
+    "Binaural": "records",
     "ContactLog": "files",
     "Contacts": "records.contacts",
+    "Head": "records",
     "Listener": "session",
     "Material": "records",
     "Microphone": "records",
+    "MicrophonePath": "records",
     "ModalModel": "records",
     "ModalSum": "records",
     "Shape": "records",
@@ -47,6 +64,7 @@ _HOME = {
     "load_material": "presets",
     "read_audio": "files",
     "read_baked": "bake",
+    "read_head": "files.sofa.heads",
     "read_log": "files",
     "render_log": "render",
     "write_audio": "files",
@@ -54,11 +72,15 @@ _HOME = {
 
 __all__ = [
     "Air",
+    "Ambisonics",
+    "Binaural",
     "ContactLog",
     "Contacts",
+    "Head",
     "Listener",
     "Material",
     "Microphone",
+    "MicrophonePath",
     "ModalModel",
     "ModalSum",
     "Shape",
@@ -72,6 +94,7 @@ __all__ = [
     "load_material",
     "read_audio",
     "read_baked",
+    "read_head",
     "read_log",
     "render_log",
     "write_audio",

@@ -22,7 +22,7 @@ from sonic_bullet.environments.episode_world import EpisodeWorld, connected_clie
 from sonic_bullet.environments.repeated_episodes import RepeatedEpisodes
 from sonic_bullet.environments.sounding_cast import Cast, MaterialsLike, add_fillable, as_materials, cast_of, same_cast
 from sonic_bullet.files import check_sr
-from sonic_bullet.records import Air, Array, Material
+from sonic_bullet.records import Air, Array, Material, channels_of
 from sonic_bullet.records.coerce import as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.session import Listener, attach
@@ -101,7 +101,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         parts = dict(inner.spaces) if isinstance(inner, Dict) else {"observation": inner}
         if AUDIO in parts:
             raise SceneError(f"the observation has '{AUDIO}' already", "wrap the environment once")
-        self._shape = len(self._options["microphone"]), ceil(sr * self._step_s)
+        self._shape = channels_of(self._options["microphone"]), ceil(sr * self._step_s)
         self.observation_space = Dict({**parts, AUDIO: Box(-np.inf, np.inf, self._shape, np.float32)})
 
     @property

@@ -5,7 +5,7 @@ Body, Material, Sensor, Change -> structs (msgspec) -> JSON -> structs -> the sa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -14,7 +14,20 @@ import numpy as np
 from sonic_bullet.files.container import REMEDY, take
 from sonic_bullet.files.models import LoggedModel, as_json_text
 from sonic_bullet.machine.json_text import json_bytes
-from sonic_bullet.records import Array, Body, Material, Microphone, ModalSum, Residual, Sensor, Vibrometer
+from sonic_bullet.records import (
+    Ambisonics,
+    Array,
+    Binaural,
+    Body,
+    Head,
+    Material,
+    Microphone,
+    MicrophonePath,
+    ModalSum,
+    Residual,
+    Sensor,
+    Vibrometer,
+)
 from sonic_bullet.records.contacts import Event
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -27,6 +40,7 @@ RESIDUAL_ARRAYS: dict[str, tuple[int | None, ...]] = {
     "power_per_hz": (None, None),
 }
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 class _Residual(msgspec.Struct):
@@ -72,8 +86,21 @@ class _Change(msgspec.Struct):
     values: dict[str, float | None]
 
 
-class _Microphone(msgspec.Struct, tag="microphone"):
+class _Path(msgspec.Struct, omit_defaults=True):
+    time_s: list[float]
+    position_m: list[Vector]
+    quaternion_xyzw: list[Quaternion] | None = None
+
+
+class _Microphone(msgspec.Struct, tag="microphone", omit_defaults=True):
     position_m: Vector
+    quaternion_xyzw: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    body_id: int | None = None
+    link: int = -1
+    path: _Path | None = None
+    ambisonics: int | None = None
+    head: str | None = None
+    head_sr: int = 0
 
 
 class _Vibrometer(msgspec.Struct, tag="vibrometer"):
@@ -179,10 +206,40 @@ def unpack_change(x: _Change) -> Change:
 def pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
     """Convert a sensor to the header's struct."""
     if isinstance(sensor, Microphone):
-        return _Microphone(_vector(sensor.position_m))
+        return _pack_microphone(sensor)
     if isinstance(sensor, Vibrometer):
         return _Vibrometer(int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
     return _ModalSum(float(sensor.scale))
+
+
+def _pack_microphone(one: Microphone) -> _Microphone:
+    path, head = one.path, one.head if isinstance(one, Binaural) else None
+    turned = None if path is None or path.quaternion_xyzw is None else [_turned(row) for row in path.quaternion_xyzw]
+    return _Microphone(
+        _vector(one.position_m),
+        _turned(one.quaternion_xyzw),
+        None if one.body_id is None else int(one.body_id),
+        int(one.link),
+        None if path is None else _Path(path.time_s.tolist(), [_vector(row) for row in path.position_m], turned),
+        one.order if isinstance(one, Ambisonics) else None,
+        None if head is None else as_json_text(head.name),
+        0 if head is None else int(head.sr),
+    )
+
+
+def head_arrays(sensors: Sequence[Sensor]) -> dict[str, Array]:
+    """List the arrays that lie beside the header: responses of heads, by the number of their sensor."""
+    return {
+        f"head{i}_{name}": getattr(sensor.head, name)
+        for i, sensor in enumerate(sensors)
+        if isinstance(sensor, Binaural)
+        for name in ("direction", "response")
+    }
+
+
+def _turned(array: Array) -> Quaternion:
+    x, y, z, w = (float(value) for value in array)
+    return x, y, z, w
 
 
 def _vector(array: Array) -> Vector:
@@ -200,10 +257,12 @@ def unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index
     return Residual(**parts, clip_energy=header.clip_energy, source=header.source)
 
 
-def unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
-    """Build the sensor of that entry; raises RecordError."""
+def unpack_sensor(
+    sensor: _Microphone | _Vibrometer | _ModalSum, arrays: Mapping[str, Array], index: int, path: object
+) -> Sensor:
+    """Build the sensor of entry ``index``; raises LogError, RecordError."""
     if isinstance(sensor, _Microphone):
-        return Microphone(np.array(sensor.position_m))
+        return _unpack_microphone(sensor, arrays, index, path)
     if isinstance(sensor, _Vibrometer):
         made = Vibrometer(sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
         # already of unit length: dividing again would move its last bit
@@ -211,6 +270,28 @@ def unpack_sensor(sensor: _Microphone | _Vibrometer | _ModalSum) -> Sensor:
         made.direction.setflags(write=False)
         return made
     return ModalSum(sensor.scale)
+
+
+def _unpack_microphone(x: _Microphone, arrays: Mapping[str, Array], index: int, path: object) -> Microphone:
+    along = None
+    if x.path is not None:
+        along = MicrophonePath(
+            np.array(x.path.time_s),
+            np.array(x.path.position_m),
+            None if x.path.quaternion_xyzw is None else np.array(x.path.quaternion_xyzw),
+        )
+    how: dict[str, Any] = {
+        "position_m": None if along is not None else np.array(x.position_m),
+        "quaternion_xyzw": np.array(x.quaternion_xyzw),
+        "body_id": x.body_id,
+        "link": x.link,
+        "path": along,
+    }
+    if x.head is not None:
+        direction = take(arrays, f"head{index}_direction", float, (None, 3), path)
+        response = take(arrays, f"head{index}_response", float, (len(direction), 2, None), path)
+        return Binaural(**how, head=Head(direction, response, x.head_sr, x.head))
+    return Microphone(**how) if x.ambisonics is None else Ambisonics(**how, order=x.ambisonics)
 
 
 def pick(things: list[Any], index: int | None, path: object) -> Any:

@@ -22,6 +22,8 @@ their own:
       model<i>_shape u2, model<i>_shape_exponent (m,) i2
           in place of _shape f4, where shapes are whole multiples of powers of two, as those solved here are:
           `differences` of those numbers, and the powers (records/mode_shapes.py)
+      head<i>_direction (d, 3) f8, head<i>_response (d, 2, n) f8
+          of sensor i, where it is a head
       models (in the header)
           each model without its arrays; or its SHA-256, where it is in the cache
       events (in the header)
@@ -52,6 +54,7 @@ from sonic_bullet.files.levels import check_sr
 from sonic_bullet.files.log_header import (
     RESIDUAL_ARRAYS,
     LogHeader,
+    head_arrays,
     material_key,
     pack_body,
     pack_change,
@@ -114,7 +117,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
             float
         ),
     }
-    arrays |= model_arrays
+    arrays |= model_arrays | head_arrays(log.sensors)
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
@@ -167,7 +170,7 @@ def _unpack_log(
     return ContactLog(
         bodies=tuple(bodies),
         steps=read_steps(arrays, b, path),
-        sensors=tuple(unpack_sensor(sensor) for sensor in header.sensors),
+        sensors=tuple(unpack_sensor(sensor, arrays, i, path) for i, sensor in enumerate(header.sensors)),
         sr=header.sr,
         seed=header.seed,
         air=Air(header.air_density_kg_m3, header.air_sound_speed_m_s),

@@ -97,7 +97,9 @@ def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, A
 
 def quantity(sensor: Sensor) -> tuple[str, str]:
     """Return the quantity of a sensor's samples, and their unit."""
-    return {Microphone: ("pressure", "Pa"), Vibrometer: ("velocity", "m/s")}.get(type(sensor), ("modal sum", "1"))
+    if isinstance(sensor, Microphone):
+        return "pressure", "Pa"
+    return ("velocity", "m/s") if isinstance(sensor, Vibrometer) else ("modal sum", "1")
 
 
 def check_picture_output(path: str | os.PathLike[str]) -> Path:

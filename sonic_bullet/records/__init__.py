@@ -21,17 +21,32 @@ if TYPE_CHECKING:
         ShapeKind,
         isotropic_stiffness_pa,
     )
+    from sonic_bullet.records.receivers import Head, MicrophonePath
     from sonic_bullet.records.residual import Residual
-    from sonic_bullet.records.sensors import Air, Microphone, ModalSum, Sensor, Vibrometer
+    from sonic_bullet.records.sensors import (
+        Air,
+        Ambisonics,
+        Binaural,
+        Microphone,
+        ModalSum,
+        Sensor,
+        Vibrometer,
+        channel_sensors,
+        channels_of,
+    )
     from sonic_bullet.records.simulated import Body
 
 __all__ = [
     "ORTHOTROPIC",
     "Air",
+    "Ambisonics",
     "Array",
+    "Binaural",
     "Body",
+    "Head",
     "Material",
     "Microphone",
+    "MicrophonePath",
     "ModalModel",
     "ModalSum",
     "Residual",
@@ -39,16 +54,22 @@ __all__ = [
     "Shape",
     "ShapeKind",
     "Vibrometer",
+    "channel_sensors",
+    "channels_of",
     "frozen_array",
     "isotropic_stiffness_pa",
 ]
 
 _HOME = {
     "Air": "sensors",
+    "Ambisonics": "sensors",
     "Array": "arrays",
+    "Binaural": "sensors",
     "Body": "simulated",
     "Material": "bodies",
+    "Head": "receivers",
     "Microphone": "sensors",
+    "MicrophonePath": "receivers",
     "ModalModel": "bodies",
     "ModalSum": "sensors",
     "ORTHOTROPIC": "bodies",
@@ -57,6 +78,8 @@ _HOME = {
     "Shape": "bodies",
     "ShapeKind": "bodies",
     "Vibrometer": "sensors",
+    "channel_sensors": "sensors",
+    "channels_of": "sensors",
     "frozen_array": "arrays",
     "isotropic_stiffness_pa": "bodies",
 }

@@ -2,23 +2,101 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
-from sonic_bullet.records.coerce import as_number, as_whole
+from sonic_bullet.records.coerce import as_kind, as_number, as_whole
+from sonic_bullet.records.receivers import AHEAD_XYZW, Head, MicrophonePath, unit_quaternions
+
+MOST_ORDER = 3
+"""Of ambisonics: the microphone arrays that are sold, and most players, end there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Microphone:
-    """A point that records pressure in Pa. position_m (3,): world frame, fixed."""
+    """A point that records pressure in Pa.
 
-    position_m: Array
+    position_m (3,): in the world, fixed; with body_id in the frame of that body, with which it moves; None with a path:
+    where that begins. quaternion_xyzw (4,): how it is turned there, which matters to ambisonics and heads alone.
+    """
+
+    position_m: Array = None  # type: ignore[assignment]  # a path's first, in its stead
+    quaternion_xyzw: Array = field(default_factory=lambda: AHEAD_XYZW)
+    body_id: int | None = None
+    link: int = -1
+    path: MicrophonePath | None = None
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        store(self, position_m=frozen_array(self.position_m, float, (3,), "microphone: position_m"))
+        path, remedy = self.path, "give one of position_m, in the world or in a body's frame, and path"
+        if path is not None:
+            path = as_kind(path, MicrophonePath, "microphone: path", "give a MicrophonePath(time_s, position_m)")
+            given = path.position_m[0] if self.position_m is None else self.position_m
+            require(np.array_equal(given, path.position_m[0]), "microphone: it has two places", remedy)
+            require(self.body_id is None, "microphone: it follows both a path and a body", "give one of both")
+        require(path is not None or self.position_m is not None, "microphone: it has no place", remedy)
+        place = self.position_m if path is None else path.position_m[0]
+        store(
+            self,
+            position_m=frozen_array(place, float, (3,), "microphone: position_m"),
+            quaternion_xyzw=unit_quaternions(self.quaternion_xyzw, (4,), "microphone: quaternion_xyzw"),
+            body_id=None
+            if self.body_id is None
+            else as_whole(self.body_id, "microphone: body_id", "give the id of the body that it moves with"),
+            link=as_whole(self.link, "microphone: link", "give -1 (the base) or a link's number"),
+        )
+
+    @property
+    def moves(self) -> bool:
+        """Return whether it may be elsewhere at another time."""
+        return self.path is not None or self.body_id is not None
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ambisonics(Microphone):
+    """A point that hears where sound comes from: (order + 1)² channels of ambiX.
+
+    Their order is ACN, their weights are SN3D, so that the first is a `Microphone` there. Order 1 to 3; axes: x ahead,
+    y left, z up, turned by quaternion_xyzw.
+    """
+
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        Microphone.__post_init__(self)
+        remedy = f"give 1, 2 or {MOST_ORDER}"
+        store(self, order=as_whole(self.order, "ambisonics: order", remedy, least=1, most=MOST_ORDER))
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return (self.order + 1) ** 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Binaural(Microphone):
+    """Two ears, left and right, of a head whose middle is the place: x ahead, y left, z up, turned by it."""
+
+    head: Head = None  # type: ignore[assignment]  # fields before it have defaults
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        Microphone.__post_init__(self)
+        store(self, head=as_kind(self.head, Head, "binaural: head", "give one, such as read_head('FILE.sofa')"))
+
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +140,16 @@ class ModalSum:
 
 
 Sensor = Microphone | Vibrometer | ModalSum
+
+
+def channels_of(sensors: Sequence[Sensor]) -> int:
+    """Count the channels of sensors."""
+    return sum(sensor.channels if isinstance(sensor, Microphone) else 1 for sensor in sensors)
+
+
+def channel_sensors(sensors: Sequence[Sensor]) -> tuple[Sensor, ...]:
+    """List the sensor of each channel."""
+    return tuple(s for s in sensors for _ in range(s.channels if isinstance(s, Microphone) else 1))
 
 
 @dataclass(frozen=True, slots=True)

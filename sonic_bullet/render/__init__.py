@@ -19,7 +19,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Microphone
+from sonic_bullet.records import Air, Array, Microphone, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.counts import format_count
@@ -134,7 +134,7 @@ def render_kept(
     """
     tail_db = as_tail_db(tail_db)
     log, residual = _checked(log, sr, residual, progress, say)
-    spool, synth = SoundSpool(len(log.sensors)), _synthesizer(log, residual)
+    spool, synth = SoundSpool(channels_of(log.sensors)), _synthesizer(log, residual)
     try:
         for block in _blocks(log, synth, progress, say):
             if spool.tail[0]:

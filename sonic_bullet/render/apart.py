@@ -62,7 +62,7 @@ def render_apart(
         if steps[0].body is not state.present:
             admit(setup, state, steps[0], log.bodies)
         body, frame = state.body, advance(setup, state, steps)
-        yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])
+        yield body, frame.reshape(len(body), setup.channels, frame.shape[1])
         done, last = done + len(steps), steps[-1]
         if state.present is not state.body and done >= looked + LOOK_EVERY:
             looked = done
@@ -70,11 +70,11 @@ def render_apart(
         if progress is not None:
             progress(done / len(log.steps))
     body, frame = state.body, drained(setup, state, last)
-    yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])
+    yield body, frame.reshape(len(body), setup.channels, frame.shape[1])
     missing = 0 if frames is None or last is None else frames - clock_after(state).sample(log.sr)
     for block in ring_on(setup, state, last) if missing > 0 and last is not None else ():
         frame = block[:, :missing]
-        yield body, frame.reshape(len(body), len(log.sensors), frame.shape[1])
+        yield body, frame.reshape(len(body), setup.channels, frame.shape[1])
         missing -= frame.shape[1]
         if missing <= 0:
             break

@@ -187,7 +187,7 @@ def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - 
 
 @njit(nogil=True, error_model="numpy")
 def advance_steps(  # noqa: PLR0911 - one return a reason to come back
-    first, taken, start, pause, resume, found, drives, sr, steps, contacts, position, quaternion, teleported,
+    first, taken, start, pause, resume, found, drives, sr, steps, contacts, position, quaternion, teleported, aim_m,
     window, window_position, window_quaternion, window_teleported, rows,
     bodies, faces, nodes, shapes, frequency_hz, spectrum, pairs, active, counts, free, gain,
     held, stand, credit_s, pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
@@ -205,6 +205,7 @@ def advance_steps(  # noqa: PLR0911 - one return a reason to come back
     start : sample of out's first
     contacts : of all steps
     position, quaternion, teleported : (k, b, 3), (k, b, 4), (k, b)
+    aim_m : (k + 1, b, c, 3) as `path_kernel.hear` has it, at each step's start and the last one's end; (0, …): at rest
     pressure : (microphones, as out)
     pause : return before `hear` of the first step
     resume : progress of the first step
@@ -256,7 +257,8 @@ def advance_steps(  # noqa: PLR0911 - one return a reason to come back
                     return done, PAUSED, found, drives
             status = finish(
                 number, step, start, x, window_position, window_teleported, source, pushed, microphone_m,
-                samples_per_m, sources, places, lines, memory, taps, reads, apart, pressure, out,
+                aim_m[i : i + 2] if len(aim_m) > 0 else aim_m, samples_per_m, sources, places, lines, memory, taps,
+                reads, apart, pressure, out,
             )  # fmt: skip
             if status != DONE:
                 return done, status, found, drives
@@ -266,8 +268,8 @@ def advance_steps(  # noqa: PLR0911 - one return a reason to come back
 
 @njit(nogil=True, error_model="numpy")
 def finish(
-    number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, samples_per_m, sources,
-    places, lines, memory, taps, reads, apart, pressure, out,
+    number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, aim_m, samples_per_m,
+    sources, places, lines, memory, taps, reads, apart, pressure, out,
 ):  # fmt: skip  # pragma: no cover - compiled
     """Write step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``.
 
@@ -276,8 +278,8 @@ def finish(
     here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
     status = hear(
         step.sample, number, step.count, np.int64(0), source[0], pushed, window_position[here], window_position[there],
-        window_teleported[there], x, microphone_m, samples_per_m, sources, places, lines, memory, taps, np.zeros(WORK),
-        pressure, at, apart,
+        window_teleported[there], x, microphone_m, aim_m, samples_per_m, sources, places, lines, memory, taps,
+        np.zeros(WORK), pressure, at, apart,
     )  # fmt: skip
     if status != DONE:
         return status

@@ -14,9 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.records import Array, Body
+from sonic_bullet.records import Array, Body, Microphone
 from sonic_bullet.records.contacts import Step, first_bodies
 from sonic_bullet.records.errors import LogError
+from sonic_bullet.render.space.inside import check_outside
 from sonic_bullet.render.synthesis_state import Setup, State, StepScratch, with_bodies
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.strikes import SPAN
@@ -40,7 +41,11 @@ def admit(setup: Setup, state: State, step: Step, bodies: Records) -> None:
             f"body {coming[0]} of the log comes again, or after body {state.newest}", "use an unbroken contact log"
         )
     if len(coming):
-        with_bodies(setup, state, [bodies[i] for i in coming.tolist()], step.position_m[new], step.quaternion_xyzw[new])
+        records, place, turned = [bodies[i] for i in coming.tolist()], step.position_m[new], step.quaternion_xyzw[new]
+        check_outside([one for one in setup.sensors if isinstance(one, Microphone)], records, place, turned)
+        with_bodies(setup, state, records, place, turned)
+        if state.space is not None:
+            state.space.with_bodies(place, turned)
         state.newest = int(coming[-1])
     _name(state, np.concatenate([state.body, coming]))
     state.present = state.body if len(step.body) == len(state.body) else step.body
@@ -85,6 +90,8 @@ def release(state: State) -> None:
     for first, stop in state.window.step["row"].tolist():
         stays[state.window.row["body"][first:stop]] = True
     stays[[grain.body for grain in state.grains]] = True
+    if state.space is not None:
+        stays |= ~state.space.silent()
     stays[[body for low, high, _ in state.rubs for body in (low, high)]] = True
     if not stays.all():
         state.lifted = lifted(state, np.flatnonzero(~stays))
@@ -118,6 +125,8 @@ def subset(state: State, keep: Array) -> None:
     state.stand = state.stand[keep]
     state.travelling = path.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
+    if state.space is not None:
+        state.space.subset(keep)
     state.pairs.subset(number)
     state.grains = tuple(replace(grain, body=int(number[grain.body])) for grain in state.grains)
     state.rubs = {(int(number[low]), int(number[high]), side): one for (low, high, side), one in state.rubs.items()}

@@ -67,8 +67,9 @@ def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, t
     """
     if last is None or not len(setup.sensors):
         return sound
+    microphone_m = setup.microphone_m if state.space is None else state.space.place_m
     travel_s = max(
-        (float(np.linalg.norm(last.position_m - m, axis=1).max(initial=0.0)) for m in setup.microphone_m), default=0.0
+        (float(np.linalg.norm(last.position_m - m, axis=1).max(initial=0.0)) for m in microphone_m), default=0.0
     )
     quiet_s = BLOCK_S + travel_s / setup.air.sound_speed_m_s
     weakest, peak = 10 ** (tail_db / 20), sound.peaks()

@@ -16,7 +16,7 @@ from sonic_bullet.files.levels import as_sound
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.radiation.compact import COMPACT
 from sonic_bullet.radiation.radiated import radiation_note
-from sonic_bullet.records import Array, Body, Microphone, Vibrometer
+from sonic_bullet.records import Array, Body, Microphone, Vibrometer, channel_sensors
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.simulated import with_body_id
@@ -55,7 +55,8 @@ def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...
 def is_silent(samples: Array | KeptSound, log: ContactLog) -> bool:
     """Return whether no pressure in (channels, n) samples is above the threshold of hearing, 20 µPa."""
     peaks = as_sound(samples).peaks()
-    least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in log.sensors])
+    sensors = channel_sensors(log.sensors)
+    least = np.array([REFERENCE_PRESSURE_PA if isinstance(sensor, Microphone) else 0.0 for sensor in sensors])
     return not bool((peaks > least).any())
 
 
@@ -197,7 +198,7 @@ def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
 
 def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     """Detect that the sound of the first contact would reach every microphone only after the end."""
-    places = [sensor.position_m for sensor in log.sensors if isinstance(sensor, Microphone)]
+    places = [one.position_m for one in log.sensors if isinstance(one, Microphone) and not one.moves]
     if len(places) < len(log.sensors):
         return None
     first = log.steps[int(log.step[mine[0]])]

@@ -12,12 +12,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from sonic_bullet.records import Air, Array, Body, Microphone, Sensor
+from sonic_bullet.records import Air, Array, Body, Microphone, Sensor, channels_of
 from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
+from sonic_bullet.render.space.space_state import SpaceState, is_spatial
 from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
 from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
@@ -34,7 +35,7 @@ from sonic_bullet.synth.strikes import SPAN
 class Setup:
     """Constants of listening.
 
-    sr in Hz; sensors: a channel each; residual: whether those of materials sound; supports: whether resting contacts
+    sr in Hz; sensors; residual: whether those of materials sound; supports: whether resting contacts
     act on modes; apart: whether frames are (b·channels, n), body by body, instead of their sum.
     """
 
@@ -51,6 +52,11 @@ class Setup:
     def microphone_m(self) -> Array:
         """Positions (c, 3) of the microphones among the sensors."""
         return np.array([s.position_m for s in self.sensors if isinstance(s, Microphone)]).reshape(-1, 3)
+
+    @property
+    def channels(self) -> int:
+        """Number of channels of the sensors."""
+        return channels_of(self.sensors)
 
     @property
     def reads(self) -> Array:
@@ -198,8 +204,8 @@ class State:
     have left, and ring on where they were); newest: the highest so far. quenches: steps before which all ringing stops.
     voices (b): residuals; grains, rubs: their grains and sections under way. witness: called with every step once it
     rings, then one at a time. stand (b,) STAND: support state; credit_s (1,): time left for new poles, (0,) where
-    nothing supports. lifted: of bodies that left, by name, the steps that they rang on contacts, and those with contact
-    separation.
+    nothing supports. space: of microphones that move, ambisonics and heads. lifted: of bodies that left, by name, the
+    steps that they rang on contacts, and those with contact separation.
     """
 
     window: Window
@@ -227,6 +233,7 @@ class State:
     stand: Array = field(default_factory=lambda: np.zeros(0, STAND))
     credit_s: Array = field(default_factory=lambda: np.zeros(0))
     lifted: dict[str, tuple[int, int]] = field(default_factory=dict)
+    space: SpaceState | None = None
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -269,6 +276,7 @@ class State:
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.witness, self.stand.copy(), self.credit_s.copy(), dict(self.lifted),
+            None if self.space is None else self.space.copy(),
         )  # fmt: skip
 
 
@@ -296,7 +304,11 @@ def start(setup: Setup) -> State:
     )
     pairs = TouchingPairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)), np.zeros(0, HELD))
     credit_s = np.full(1 if setup.supports else 0, SAVED_S)
-    return State(window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads, credit_s=credit_s)
+    state = State(
+        window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads, credit_s=credit_s
+    )
+    state.space = SpaceState(setup.sensors, setup.sr, setup.air) if is_spatial(setup.sensors) else None
+    return state
 
 
 def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array) -> None:
@@ -328,5 +340,7 @@ def quench(state: State) -> None:
     state.path, state.travelling = path.append_bodies(air, travelling, radius)
     state.ringing = bank.silence(state.ringing)
     state.grains, state.rubs = (), {}
+    if state.space is not None:
+        state.space.quench()
     state.changed()
     state.quenches = frozenset(number for number in state.quenches if number > state.number)

@@ -24,11 +24,13 @@ from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.ringing_on import with_tail
+from sonic_bullet.render.space.space_state import hears_apart
 from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.clock import Clock, exact_step
+from sonic_bullet.synth.path_kernel import AT_REST
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 LATENCY_STEPS = LOOKAHEAD
@@ -80,7 +82,7 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
     return np.frombuffer(table, driver.STEP), clock, waiting
 
 
-def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # noqa: PLR0912 - a branch a reason
     """Advance by steps without a quench between; by one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
     table, clock, waiting = _schedule(sr, state, steps)
@@ -88,7 +90,11 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
-    groups, microphones = len(state.body) if setup.apart else 1, len(state.path.microphone_m)
+    aim, by_body = AT_REST, setup.apart or hears_apart(setup.sensors)
+    if state.space is not None:
+        next_s = clock.after(waiting[0]).time_s
+        aim = state.space.aim(table, next_s, poses, state.resonators)
+    groups, microphones = len(state.body) if by_body else 1, len(state.path.microphone_m)
     out = np.zeros((groups * len(setup.sensors), stop - begin))
     pressure = out if microphones == len(setup.sensors) else np.zeros((groups * microphones, stop - begin))
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
@@ -97,8 +103,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     done, resume, taken, found, drives = 0, driver.ANEW, state.taken, 0, 0
     while done < len(steps):
         arguments = (
-            done, taken, begin, pause, resume, found, drives, float(sr), table, contacts, *poses, *state.tables(),
-            int(setup.apart), pressure, out,
+            done, taken, begin, pause, resume, found, drives, float(sr), table, contacts, *poses, aim,
+            *state.tables(), int(by_body), pressure, out,
         )  # fmt: skip
         if not getattr(driver.advance_steps, "overloads", True):
             make_driver(arguments)
@@ -126,7 +132,9 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     state.taken += len(steps)
     state.clock, state.waiting = clock, waiting
     state.ringing.at = state.travelling.at = stop
-    return out
+    if state.space is None or not hears_apart(setup.sensors):
+        return out
+    return state.space.channels(table, out, pressure, apart=setup.apart)
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
@@ -182,7 +190,7 @@ def drained(setup: Setup, state: State, last: Step | None) -> Array:
     """
     missing = len(state.waiting)
     if last is None or not missing:
-        return np.zeros((len(setup.sensors) * (len(state.body) if setup.apart else 1), 0))
+        return np.zeros((setup.channels * (len(state.body) if setup.apart else 1), 0))
     state = state.copy()
     count = clock_after(state).sample(setup.sr) - state.clock.sample(setup.sr)
     still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
@@ -221,9 +229,9 @@ class Synthesizer:
         """Begin anew at time 0, in silence, as one just made."""
         self._state = start(self._setup)
         self._clock = Clock()
-        self._sound = SoundSpool(len(self._setup.sensors), "attach with keep_sound=False") if self._keep else None
+        self._sound = SoundSpool(self._setup.channels, "attach with keep_sound=False") if self._keep else None
         self.unkept: FileError | None = None
-        self._lag = np.zeros((len(self._setup.sensors), 0))
+        self._lag = np.zeros((self._setup.channels, 0))
         self._last: Step | None = None
         self._failed: AudioError | None = None
         self._steps = 0
@@ -248,7 +256,7 @@ class Synthesizer:
         before = self._clock
         self._clock = before.after(step.dt_s)
         count = self._clock.sample(self._setup.sr) - before.sample(self._setup.sr)
-        channels = len(self._setup.sensors)
+        channels = self._setup.channels
         first = self._steps == 0
         self._steps += 1
         if channels == 0:
@@ -299,7 +307,7 @@ class Synthesizer:
 
     def rest(self) -> Array:
         """Render the rest of the steps taken in, (channels, n), as if nothing touched any more."""
-        channels = len(self._setup.sensors)
+        channels = self._setup.channels
         if not channels:
             return np.zeros((0, self._clock.sample(self._setup.sr)))
         return drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
@@ -316,7 +324,7 @@ class Synthesizer:
         """
         if self._sound is None:
             raise AudioError("the sound is not kept", "attach with keep_sound=True, or read() the frames")
-        rest = self.rest() if self.unkept is None else np.zeros((len(self._setup.sensors), 0))
+        rest = self.rest() if self.unkept is None else np.zeros((self._setup.channels, 0))
         sound = KeptSound(self._sound, len(self._sound), rest)
         return sound if self.unkept is not None else self.with_tail(sound, tail_db)
 

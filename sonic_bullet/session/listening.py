@@ -23,7 +23,7 @@ from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
 from sonic_bullet.machine.progress import says_so
-from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
+from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options, shown
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
@@ -79,12 +79,12 @@ class Listener:
         self._attached = True
         self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
         self._begin()
-        self._frame: Array | None = np.zeros((len(self.sensors), 0))
+        self._frame: Array | None = np.zeros((channels_of(self.sensors), 0))
         self.world.listen(self.step)
 
     def _begin(self) -> None:
         """Start with an empty log."""
-        self._kept = KeptRun(len(self.sensors), keep_log=self.world.logged)
+        self._kept = KeptRun(channels_of(self.sensors), keep_log=self.world.logged)
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
@@ -196,7 +196,7 @@ class Listener:
         returned_s = 0.0 if self._playback is None else time.perf_counter()
         step = self.world.after_step()
         if not self.world.stepped:
-            self._frame = np.zeros((len(self.sensors), 0))
+            self._frame = np.zeros((channels_of(self.sensors), 0))
             return self._frame
         if self.world.emptied != self._emptied:
             self._emptied = self.world.emptied
@@ -239,7 +239,7 @@ class Listener:
         self._playback = start_playback(
             device,
             sr=self.sr,
-            channels=len(self.sensors),
+            channels=channels_of(self.sensors),
             lag_steps=self.latency_steps,
             full_scale_pa=full_scale_pa,
             ahead_s=ahead_s,

@@ -22,6 +22,7 @@ from sonic_bullet.files.levels import FileLevel, find_level
 from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
+from sonic_bullet.records import channels_of
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.apart import render_apart
 from sonic_bullet.render.synthesis_state import Witness
@@ -56,7 +57,7 @@ def render_stems(
     if not log.sensors:
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
     who = [index for index, body in enumerate(log.bodies) if body.model is not None]
-    spools = {index: SoundSpool(len(log.sensors)) for index in who}
+    spools = {index: SoundSpool(channels_of(log.sensors)) for index in who}
     for body, frame in render_apart(log, sr=sr, frames=frames, witness=witness, progress=progress, say=say):
         there = dict(zip(body.tolist(), frame, strict=True))
         nothing = np.zeros(frame.shape[1:])

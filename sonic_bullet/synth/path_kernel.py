@@ -37,6 +37,8 @@ _HISTORY = 3 * AHEAD
 _SPAN = BLOCK + LANES
 WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
 """Doubles of scratch that `hear` uses."""
+AT_REST = np.zeros((0, 0, 0, 3))
+"""``aim_m`` where no microphone moves."""
 
 
 @njit(nogil=True, error_model="numpy")
@@ -177,8 +179,10 @@ def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):
 
 
 @njit(nogil=True, error_model="numpy")
-def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, samples_per_m,
-         sources, places, lines, memory, taps, work, out, out_at, apart=0):  # fmt: skip  # pragma: no cover - compiled
+def hear(  # noqa: PLR0912 - a branch a case, in one kernel
+    at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, aim_m, samples_per_m, sources,
+    places, lines, memory, taps, work, out, out_at, apart=0,
+):  # fmt: skip  # pragma: no cover - compiled
     """Compute the pressure (Pa) at samples at … at + n - 1 of the step into out (c, ·) from column out_at on.
 
     Bodies are summed in order; below 1e-30 Pa: 0. Returns DONE, or what is in the way (`path_places`).
@@ -188,6 +192,8 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
     source, pushed : (≥ b, ·) in Pa·m, (≥ b, 3, ·) in Pa·m along each axis, from column ``first`` on
     x : (·) position of each sample between the step's ends, 0 … 1, from column ``first`` on
     begin_m, end_m, teleported : (≥ b, 3), (≥ b, 3), (≥ b,)
+    aim_m : (2, b, c, 3) place of each microphone when it receives what a body emits at the step's ends; (0, …): as
+        microphone_m
     step : ≥ 0, number of the step that these samples are (part of)
     sources, places, lines, memory : (b,) SOURCE, (t,) PLACE, (t·c,) LINE and histories, changed in place
     taps : `tap_polynomials`
@@ -196,14 +202,15 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
     """
     source, pushed, begin_m, end_m = borrowed(source), borrowed(pushed), borrowed(begin_m), borrowed(end_m)
     sources, places, lines, memory = borrowed(sources), borrowed(places), borrowed(lines), borrowed(memory)
-    x, microphone_m, taps = borrowed(x), borrowed(microphone_m), borrowed(taps)
+    x, microphone_m, taps, aim_m = borrowed(x), borrowed(microphone_m), borrowed(taps), borrowed(aim_m)
     work, out = borrowed(work), borrowed(out)
     status = survey(
-        step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m, sources, places, lines
+        step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, aim_m, samples_per_m, sources, places,
+        lines,
     )  # fmt: skip
     if status != DONE:
         return status
-    channels = len(microphone_m)
+    channels, moves = len(microphone_m), len(aim_m) > 0
     rows = channels * (len(sources) if apart else 1)
     for row in range(rows):
         clear(out, row * out.shape[1] + out_at, n)
@@ -231,6 +238,9 @@ def hear(at, step, n, first, source, pushed, begin_m, end_m, teleported, x, micr
                     stop = end_m[b, axis] if present else place.rest_m[axis]
                     start = begin_m[b, axis] if fade == 0 else stop
                     geometry[axis], geometry[3 + axis] = microphone_m[c, axis] - start, stop - start
+                    if moves:
+                        here, there = aim_m[0, b, c, axis], aim_m[1, b, c, axis]
+                        geometry[axis], geometry[3 + axis] = here - start, (stop - start) - (there - here)
                 ring_at, mask, lo = place.memory_at + c * 2 * (place.size + MIRRORED), place.size - 1, 0
                 while lo < n:  # a block that lies in one piece
                     count = place.size - ((at + lo) & mask)

@@ -98,7 +98,7 @@ def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover 
 
 
 @njit(nogil=True, error_model="numpy")
-def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, samples_per_m,
+def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, aim_m, samples_per_m,
            sources, places, lines):  # fmt: skip  # pragma: no cover - compiled
     """Mark which bodies emit, find new places for those teleported in this step, and return what is in the way.
 
@@ -117,6 +117,8 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
             here, there = 0.0, 0.0
             for axis in range(3):
                 u, v = begin_m[b, axis] - microphone_m[c, axis], end_m[b, axis] - microphone_m[c, axis]
+                if len(aim_m) > 0:
+                    u, v = begin_m[b, axis] - aim_m[0, b, c, axis], end_m[b, axis] - aim_m[1, b, c, axis]
                 here += u * u
                 there += v * v
             start, stop = start if here <= start else here, stop if there <= stop else there

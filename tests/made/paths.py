@@ -7,7 +7,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.synth.fractional_delay import tap_polynomials
 from sonic_bullet.synth.path import Path, PathState, grow
-from sonic_bullet.synth.path_kernel import WORK, hear
+from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear
 from sonic_bullet.synth.path_places import DONE
 
 
@@ -39,7 +39,8 @@ def propagate(
     while True:
         status = hear(
             state.at, step, n, 0, source, pushed, position0_m, position1_m, moved, progress, path.microphone_m,
-            path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), work, out, 0,
+            AT_REST, path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(),
+            work, out, 0,
         )  # fmt: skip
         if status == DONE:
             break

@@ -24,6 +24,7 @@ from sonic_bullet.records.errors import (
     SceneError,
     SonicBulletError,
 )
+from tests.made import heads
 from tests.made.models import STEEL
 from tests.made.worlds import box, plate_model
 
@@ -107,6 +108,23 @@ LOG = {
     "residual": True,
     "supports": True,
 }
+
+
+PLACED = {
+    "position_m": [0, 0, 0],
+    "quaternion_xyzw": [0, 0, 0, 1],
+    "body_id": None,
+    "link": -1,
+    "path": None,
+}
+ALONG = {"time_s": [0.0, 1.0], "position_m": [[0, 0, 0], [1, 0, 0]], "quaternion_xyzw": None}
+HEAD = {"direction": [[1.0, 0, 0], [0, 1, 0]], "response": np.ones((2, 2, 4)), "sr": 48_000, "name": "head"}
+
+
+def written_head(folder: Path) -> Path:
+    """A head's file."""
+    heads.write_sofa(folder / "head.sofa", sb.Head(**HEAD))
+    return folder / "head.sofa"
 
 
 def one_step() -> sb.ContactLog:
@@ -229,7 +247,11 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
         sb.Material.isotropic,
         {"name": "m", "youngs_pa": 1e9, "poisson": 0.3, "density_kg_m3": 1000},
     ),
-    "Microphone": lambda *_: (sb.Microphone, {"position_m": [0, 0, 0]}),
+    "Ambisonics": lambda *_: (sb.Ambisonics, {**PLACED, "order": 1}),
+    "Binaural": lambda *_: (sb.Binaural, {**PLACED, "head": sb.Head(**HEAD)}),
+    "Head": lambda *_: (sb.Head, HEAD),
+    "Microphone": lambda *_: (sb.Microphone, PLACED),
+    "MicrophonePath": lambda *_: (sb.MicrophonePath, ALONG),
     "ModalModel": lambda *_: (sb.ModalModel, MODEL),
     "ModalSum": lambda *_: (sb.ModalSum, {"scale": 1}),
     "Shape": lambda *_: (sb.Shape, SHAPE),
@@ -244,6 +266,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "load_material": lambda *_: (sb.load_material, {"name": "steel"}),
     "read_audio": reading_audio,
     "read_baked": reading_baked,
+    "read_head": lambda _, folder: (sb.read_head, {"path": written_head(folder)}),
     "read_log": reading_log,
     "render_log": lambda *_: (
         sb.render_log,
@@ -279,6 +302,13 @@ TEXT = [None, 5, b"m", ["m"]]
 RECORD = ["helium", 5, object(), {}]
 WHOLE = [*NUMBER, 1.5]
 CLIENT = [None, "client", 99, -1, 10**30, True, object(), pybullet.connect]
+PLACED_BAD: dict[str, list[Any]] = {
+    "position_m": [*ARRAY, [0, 0]],
+    "quaternion_xyzw": [*ARRAY, [0, 0, 0, 0]],
+    "body_id": [*OPTIONAL, 1.5],
+    "link": WHOLE,
+    "path": RECORD,
+}
 BAD: dict[str, dict[str, list[Any]]] = {
     "Air": {"density_kg_m3": [*NUMBER, 0, -1], "sound_speed_m_s": [*NUMBER, 0]},
     "ContactLog": {
@@ -368,7 +398,20 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "poisson": [*NUMBER, 0.5, -1],
         "density_kg_m3": [*NUMBER, 0],
     },
-    "Microphone": {"position_m": [*ARRAY, [0, 0]]},
+    "Ambisonics": {**PLACED_BAD, "order": [*WHOLE, 0, 4]},
+    "Binaural": {**PLACED_BAD, "head": [*RECORD, None]},
+    "Head": {
+        "direction": [*ARRAY, [[0, 0, 0]] * 2, []],
+        "response": [*ARRAY, np.ones((2, 3, 4)), np.ones((2, 2, 0)), np.full((2, 2, 4), math.nan)],
+        "sr": [*NUMBER, 0],
+        "name": TEXT,
+    },
+    "Microphone": PLACED_BAD,
+    "MicrophonePath": {
+        "time_s": [*ARRAY, [], [1.0, 1.0]],
+        "position_m": [*ARRAY, [[0, 0, 0]]],
+        "quaternion_xyzw": [*(value for value in ARRAY if value is not None), [[0, 0, 0, 0]] * 2],
+    },
     "ModalModel": {
         **{name: [*ARRAY, 5] for name in ("freq_hz", "shape", "vertex_m", "face", "curvature_per_m")},
         "face": [*ARRAY, [[0, 1, 1.5]] * 4],
@@ -426,6 +469,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "load_material": {"name": [None, 5, b"steel", object(), ["steel"]]},
     "read_audio": {"path": PATH},
     "read_baked": {"path": PATH},
+    "read_head": {"path": PATH},
     "read_log": {"path": PATH},
     "render_log": {
         "log": [*RECORD, None],

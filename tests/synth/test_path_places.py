@@ -11,7 +11,7 @@ from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.fractional_delay import AHEAD, KAISER_BETA, TAPS, tap_polynomials
 from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, grow
-from sonic_bullet.synth.path_kernel import WORK, hear
+from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear
 from sonic_bullet.synth.path_places import DONE, MEMORY_SHORT, NOT_FINITE, PLACES_SHORT, TOO_FAR
 from tests.made.paths import propagate
 
@@ -42,8 +42,8 @@ def called(
     push = np.zeros((1, 3, n)) if pushed is None else pushed
     status = hear(
         state.at, step, n, 0, source, push, begin_m, end_m, np.array([moved]), np.arange(n) / n, path.microphone_m,
-        path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), np.zeros(WORK),
-        out, 0,
+        AT_REST, path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(),
+        np.zeros(WORK), out, 0,
     )  # fmt: skip
     return status, out
 
@@ -177,8 +177,8 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
     for k in range(steps):
         status = hear(
             k * n, k, n, k * n, source, pushed, place[k], place[k + 1], still, along, path.microphone_m,
-            path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(), work, out,
-            k * n + 3,
+            AT_REST, path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(),
+            work, out, k * n + 3,
         )  # fmt: skip
         assert status == DONE
     assert np.isnan(out[:, :3]).all()

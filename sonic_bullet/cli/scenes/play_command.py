@@ -117,7 +117,7 @@ def _play_log(path: str, given: dict[str, Any], materials: WantedMaterials, show
 
     from sonic_bullet.files import check_sr, read_log
     from sonic_bullet.live import start_playback
-    from sonic_bullet.records import Microphone
+    from sonic_bullet.records import Microphone, channels_of
     from sonic_bullet.records.coerce import as_number
     from sonic_bullet.render import LATENCY_STEPS, log_frames
     from sonic_bullet.session.chosen_in_log import with_choice
@@ -133,7 +133,11 @@ def _play_log(path: str, given: dict[str, Any], materials: WantedMaterials, show
     log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     frames = log_frames(log, say=show.tell)
     with start_playback(
-        show.card.pop("device", None), sr=log.sr, channels=len(log.sensors), lag_steps=LATENCY_STEPS, **show.card
+        show.card.pop("device", None),
+        sr=log.sr,
+        channels=channels_of(log.sensors),
+        lag_steps=LATENCY_STEPS,
+        **show.card,
     ) as show.playback:
         for number, frame in enumerate(frames, start=1):
             show.playback.push(frame, time.perf_counter())

@@ -20,6 +20,8 @@ from sonic_bullet.cli.scenes.scene_runs import (
     simulated,
     standing_collector,
 )
+from sonic_bullet.cli.scenes.space_options import OPTIONS as SPACE_OPTIONS
+from sonic_bullet.cli.scenes.space_options import SpaceWish
 from sonic_bullet.cli.scenes.take_options import OPTIONS as TAKE_OPTIONS
 from sonic_bullet.cli.scenes.take_options import TakesWish
 from sonic_bullet.cli.scenes.take_outputs import write_takes
@@ -64,6 +66,7 @@ def run_render(
     materials = WantedMaterials.read(material, silent)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
+    space = SpaceWish.read(**{name: others.pop(name) for name in SPACE_OPTIONS})
     takes = TakesWish.read(**{name: others.pop(name) for name in TAKE_OPTIONS})
     session = SessionWish(**{name: others.pop(name) for name in SESSION_OPTIONS}).checked(others["stems"])
     if output is None and session.folder is None:
@@ -89,10 +92,10 @@ def run_render(
                     tail_db=level.tail_db,
                 )  # fmt: skip
                 result: RenderResult | Replay
-                if not takes:
+                if not takes and not space:
                     result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
                 else:
-                    log, said = _log_of(scene, wish)
+                    log, said = _log_of(scene, wish, space)
                     if takes.takes is None:
                         log, more = takes.changed(log, scene)
                         result = rendered(log, wish, (*said, *more))
@@ -107,13 +110,17 @@ def run_render(
     write_json(json_to, described)
 
 
-def _log_of(scene: str, wish: Wish) -> tuple[ContactLog, tuple[str, ...]]:
+def _log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
     if is_log(scene):
         log, _, said = prepared(scene, wish)
+    else:
+        result = simulated(scene, replace(wish, tail_db=0.0))
+        log, said = result.log, result.notes
+    if not space:
         return log, said
-    result = simulated(scene, replace(wish, tail_db=0.0))
-    return result.log, result.notes
+    log, more = space.applied(log if wish.rate is None else replace(log, sr=wish.rate), scene)
+    return log, (*said, *more)
 
 
 def _check_takes_alone(outputs_given: dict[str, Any], others: dict[str, Any], session: SessionWish) -> None:

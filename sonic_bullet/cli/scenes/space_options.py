@@ -1,0 +1,182 @@
+"""Where a render is listened from, and how: microphones that move, ambisonics, heads.
+
+SpaceWish (options) -> checked -> sensors of a log, in the place of its own
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sonic_bullet.cli.parameters import Numbers
+from sonic_bullet.records.errors import FileError, SceneError
+
+if TYPE_CHECKING:
+    from sonic_bullet.files import ContactLog
+    from sonic_bullet.records import Array, Head, Microphone
+
+OPTIONS = ("ambisonics", "head", "facing", "microphone_path", "microphone_on")
+COLUMNS = (4, 8)
+"""Of a path's table: time and place, and, it may be, the quaternion."""
+
+
+def space_options(command: Any) -> Any:
+    """Add the options of `SpaceWish`."""
+    for option in reversed(
+        (
+            click.option(
+                "--ambisonics",
+                type=click.IntRange(1, 3),
+                metavar="ORDER",
+                help="Each microphone hears directions: 4, 9 or 16 channels of ambiX (ACN, SN3D).",
+            ),
+            click.option(
+                "--head",
+                metavar="FILE.sofa",
+                help="Each microphone is a head: two channels through its responses. Extra: head.",
+            ),
+            click.option(
+                "--facing",
+                type=Numbers("X,Y,Z"),
+                help="Where ambisonics and heads look, in the world, in m. [default: along x]",
+            ),
+            click.option(
+                "--microphone-path",
+                multiple=True,
+                metavar="FILE.csv",
+                help="A microphone that moves: rows of time in s, x, y, z in m, and x, y, z, w of how it is turned; "
+                "repeatable.",
+            ),
+            click.option(
+                "--microphone-on",
+                multiple=True,
+                metavar="NAME[=X,Y,Z]",
+                help="A microphone that moves with the body NAME, at X,Y,Z of its frame, in m; repeatable.",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceWish:
+    """What is asked for; paths: read; on: names of bodies and places in their frames."""
+
+    ambisonics: int | None = None
+    head: Head | None = None
+    facing: tuple[float, float, float] | None = None
+    paths: tuple[Microphone, ...] = ()
+    on: tuple[tuple[str, tuple[float, ...]], ...] = ()
+
+    @classmethod
+    def read(
+        cls,
+        ambisonics: int | None,
+        head: str | None,
+        facing: tuple[float, float, float] | None,
+        microphone_path: tuple[str, ...],
+        microphone_on: tuple[str, ...],
+    ) -> SpaceWish:
+        """Read the options. Raises FileError where a file cannot be read, or options contradict each other."""
+        if ambisonics is not None and head is not None:
+            raise FileError("--ambisonics and --head say both how a microphone hears", "give one of both")
+        on = []
+        for given in microphone_on:
+            name, _, place = given.partition("=")
+            numbers = Numbers("X,Y,Z").convert(place, None, None) if place else (0.0, 0.0, 0.0)
+            on.append((name, numbers))
+        found = None
+        if head is not None:
+            from sonic_bullet.files.sofa.heads import read_head
+
+            found = read_head(head)
+        return cls(ambisonics, found, facing, tuple(read_path(path) for path in microphone_path), tuple(on))
+
+    def __bool__(self) -> bool:
+        """Return whether anything is asked for."""
+        return bool(self.ambisonics or self.head or self.facing or self.paths or self.on)
+
+    def applied(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
+        """Give the log such sensors, and what a user should read of them. Raises SceneError."""
+        from sonic_bullet.records import Ambisonics, Binaural, Microphone
+
+        moving = [*self.paths, *(_on_body(log, name, place, where) for name, place in self.on)]
+        sensors, notes = list(moving or log.sensors), []
+        for i, one in enumerate(sensors):
+            if not isinstance(one, Microphone):
+                continue
+            how: dict[str, Any] = {name: getattr(one, name) for name in ("quaternion_xyzw", "body_id", "link", "path")}
+            how["position_m"] = None if one.path is not None else one.position_m
+            if self.facing is not None:
+                how["quaternion_xyzw"] = turn_to(one.position_m, self.facing)
+            if self.ambisonics is not None:
+                sensors[i] = Ambisonics(**how, order=self.ambisonics)
+            elif self.head is not None:
+                sensors[i] = Binaural(**how, head=self.head)
+                if self.head.sr != log.sr:
+                    notes.append(f"{self.head.name} is resampled from {self.head.sr} Hz to {log.sr} Hz")
+            elif self.facing is not None:
+                sensors[i] = replace(one, quaternion_xyzw=how["quaternion_xyzw"])
+        return replace(log, sensors=tuple(sensors)), tuple(dict.fromkeys(notes))
+
+
+def _on_body(log: ContactLog, name: str, place: tuple[float, ...], where: str) -> Microphone:
+    """Put a microphone on the body of that name."""
+    import numpy as np
+
+    from sonic_bullet.records import Microphone
+    from sonic_bullet.records.coerce import nearest
+
+    known = {body.name: body for body in log.bodies if body.material is not None}
+    if name not in known:
+        raise SceneError(f"--microphone-on {name}: nothing that sounds in {where} is called that", nearest(name, known))
+    return Microphone(np.array(place), body_id=known[name].body_id, link=known[name].link)
+
+
+def turn_to(place_m: Array, target_m: tuple[float, float, float]) -> Array:
+    """Compute the quaternion that turns x towards a point, y level. Raises SceneError where the point is the place."""
+    import numpy as np
+
+    toward = np.array(target_m, float) - place_m
+    length = float(np.linalg.norm(toward))
+    if length < 1e-9:
+        raise SceneError("--facing is where the microphone is", "give another point")
+    azimuth, elevation = np.arctan2(toward[1], toward[0]), np.arcsin(np.clip(toward[2] / length, -1, 1))
+    (sz, cz), (sy, cy) = ((np.sin(a / 2), np.cos(a / 2)) for a in (azimuth, -elevation))
+    return np.array([-sz * sy, cz * sy, sz * cy, cz * cy])
+
+
+def read_path(path: str) -> Microphone:
+    """Read the microphone of the path that a table of numbers has. Raises FileError."""
+    import numpy as np
+
+    from sonic_bullet.records import Microphone, MicrophonePath
+
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "no text"
+        raise FileError(f"cannot read {path}: {why}", "give a table: time in s, x, y, z in m") from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, 1):
+        parts = line.replace(";", ",").split(",")
+        try:
+            row = [float(part) for part in parts]
+        except ValueError:
+            if line.strip() and rows:
+                raise FileError(f"{path}:{number}: no row of numbers", "give time in s, x, y, z in m") from None
+            continue  # a heading, an empty line
+        if len(row) not in COLUMNS or (rows and len(row) != len(rows[0])):
+            raise FileError(
+                f"{path}:{number}: {len(row)} numbers", "give time in s, x, y, z in m, and x, y, z, w of it"
+            )
+        rows.append(row)
+    if not rows:
+        raise FileError(f"{path} holds no row of numbers", "give time in s, x, y, z in m")
+    table = np.array(rows)
+    turned = table[:, 4:] if table.shape[1] == 8 else None
+    return Microphone(path=MicrophonePath(table[:, 0], table[:, 1:4], turned))

@@ -1,0 +1,84 @@
+"""What microphones need that move, turn or have ears: a path in time, and a head's responses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sonic_bullet.records.arrays import Array, frozen_array, require, store
+from sonic_bullet.records.coerce import as_text, as_whole
+
+AHEAD_XYZW = np.array([0.0, 0.0, 0.0, 1.0])
+"""Turned nowhere: x is ahead, y left, z up, in the world as in ambiX and in SOFA files."""
+
+
+def unit_quaternions(value: object, shape: tuple[int | None, ...], name: str) -> Array:
+    """Normalise quaternions (…, 4), x, y, z, w; raises RecordError where one is zero."""
+    turned = frozen_array(value, float, shape, name)
+    length = np.linalg.norm(turned, axis=-1, keepdims=True)
+    require(bool((length > 1e-12).all()), f"{name} is zero", "give x, y, z, w of a rotation; 0, 0, 0, 1 turns nothing")
+    if (np.abs(length - 1) > 1e-12).any():
+        turned = np.asarray(turned / length)
+        turned.setflags(write=False)
+    return turned
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MicrophonePath:
+    """Path of a microphone.
+
+    time_s (t,): ascending; position_m (t, 3): in the world; quaternion_xyzw (t, 4): how
+    it is turned, None: as its microphone says. Straight between two times, at rest before the first and after the last.
+    """
+
+    time_s: Array
+    position_m: Array
+    quaternion_xyzw: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        time_s = frozen_array(self.time_s, float, (None,), "microphone path: time_s")
+        require(len(time_s) > 0, "microphone path: time_s is empty", "give at least one time and place")
+        require(
+            bool((np.diff(time_s) > 0).all()),
+            "microphone path: time_s does not ascend",
+            "sort its rows by time, each time once",
+        )
+        store(self, time_s=time_s)
+        store(self, position_m=frozen_array(self.position_m, float, (len(time_s), 3), "microphone path: position_m"))
+        if self.quaternion_xyzw is not None:
+            turned = unit_quaternions(self.quaternion_xyzw, (len(time_s), 4), "microphone path: quaternion_xyzw")
+            store(self, quaternion_xyzw=turned)
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class Head:
+    """Responses of a head's two ears to sound from far away.
+
+    response (d, 2, n), left and right, at sr Hz, over the
+    pressure at its middle without it; direction (d, 3): where the sound comes from, x ahead, y left, z up.
+    """
+
+    direction: Array
+    response: Array
+    sr: int
+    name: str = "head"
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        direction = frozen_array(self.direction, float, (None, 3), "head: direction")
+        require(len(direction) > 0, "head: direction is empty", "give the responses of at least one direction")
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        require(bool((length > 0).all()), "head: direction holds a zero vector", "give where each sound comes from")
+        unit = direction if (np.abs(length - 1) < 1e-12).all() else np.asarray(direction / length)
+        unit.setflags(write=False)
+        response = frozen_array(self.response, float, (len(unit), 2, None), "head: response")
+        require(response.shape[2] > 0, "head: response is empty", "give at least one sample")
+        store(
+            self,
+            direction=unit,
+            response=response,
+            sr=as_whole(self.sr, "head: sr", "give the rate in Hz", least=1000, most=1_000_000),
+            name=as_text(self.name, "head: name", "give a text"),
+        )
