@@ -88,6 +88,7 @@ def test_the_shell_block_names_what_there_is() -> None:
     assert {path.name for path in (REPO / "scenes").glob("*.py")} == set(re.findall(r"\| `(\w+\.py)` \|", README))
 
 
+@pytest.mark.slow
 def test_every_line_of_the_shell_block_runs(tmp_path: Path) -> None:
     """In the README's order and one folder; the table-top, which is long, is replaced by the bar, and each run is
     short.

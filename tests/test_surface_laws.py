@@ -1,4 +1,4 @@
-"""A rolling ball keeps the measured laws through the whole chain; `benchmarks/rolling_laws.py` prints the full tables.
+"""A rolling ball keeps the measured laws through the whole chain; `studies/rolling_laws.py` prints the full tables.
 
 Held here: 0.1 … 0.8 m/s, a board of 60 modes. n is not one number: the contact's patch takes what is shorter than
 itself, so where the heard modes lie above v/a (1 kHz at 0.1 m/s) the level grows faster, as v^(H + ½) at most, and
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-BENCH: dict[str, Any] = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "rolling_laws.py"))
+BENCH: dict[str, Any] = runpy.run_path(str(Path(__file__).parents[1] / "studies" / "rolling_laws.py"))
 SPEEDS, ROUGHNESS = np.geomspace(0.1, 0.8, 5), np.geomspace(0.3e-6, 5e-6, 5)
 M, N = (0.63, 1.16), (0.5, 0.96)
 """Bands of the exponents of level against roughness and speed that were measured on real pairs."""

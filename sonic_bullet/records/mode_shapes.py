@@ -5,7 +5,7 @@
 |q| <= 2^B is a whole number, and q·2^e a float32, to the last bit. The error is at most half a multiple: 2^−B of the
 mode's largest component. Modes are rounded once, when they are computed: all that is derived from them later, live or
 from a file, has the same numbers. `BITS` keeps the sound of every scene within −60 dB of its peak, with a margin:
-benchmarks/shape_rounding.py.
+studies/shape_rounding.py.
 
 A file holds differences, which are smaller: of each vertex from the first of its neighbours that precedes it,
 d_i = q_i − q_parent(i) modulo 2^16, as 2d for d >= 0 and −2d − 1 else.

@@ -76,7 +76,7 @@ def damping_ratio(restitution):
 
     -ln e/√(π² + ln² e). The floor is a model's choice: a rolling contact also sends waves into both bodies, which the
     restitution of whole-body impacts (e = 0.95 would ring ten times) does not include. Below it the level laws of
-    rough, stiff, fast pairs bend (benchmarks/surface_law.py).
+    rough, stiff, fast pairs bend (studies/surface_law.py).
     """
     log = np.log(restitution if restitution > 1e-9 else 1e-9)
     log = 0.0 if log > 0.0 else log

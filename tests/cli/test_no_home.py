@@ -1,4 +1,4 @@
-"""Commands as another user, without a home, on a read-only install; benchmarks/no_home.py has all of them."""
+"""Commands as another user, without a home, on a read-only install; studies/no_home.py has all of them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ REPO = Path(__file__).resolve().parents[2]
 
 @pytest.mark.slow
 def test_commands_run_as_another_user_without_a_home_on_a_read_only_install() -> None:
-    words = [sys.executable, REPO / "benchmarks" / "no_home.py", "--json", "--commands", "modes"]
+    words = [sys.executable, REPO / "studies" / "no_home.py", "--json", "--commands", "modes"]
     done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=280)
     assert done.returncode == 0, done.stderr + done.stdout
     counts = json.loads(done.stdout)

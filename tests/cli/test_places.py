@@ -49,6 +49,7 @@ def write_scene(folder: Path, act: str = "") -> None:
     (folder / "scene.py").write_text(SCENE.format(ran=str(folder / "ran"), act=act))
 
 
+@pytest.mark.slow
 def test_a_scene_that_changes_the_folder_does_not_move_its_outputs(folder: Path) -> None:
     write_scene(folder)
     done = call_here(

@@ -114,6 +114,7 @@ def test_a_first_render_with_empty_caches_is_never_silent(tmp_path: Path) -> Non
     assert any("machine code of the run time" in line for _, line in run.progress), run.text
 
 
+@pytest.mark.slow
 def test_a_render_says_what_it_does_and_sounds_the_same(tmp_path: Path) -> None:
     (tmp_path / "four.py").write_text(FOUR_LINES)
     words = [*COMMAND, "render", "four.py", "--seconds", "2", "-o"]

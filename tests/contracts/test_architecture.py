@@ -18,7 +18,7 @@ PACKAGE = REPO / "sonic_bullet"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "__pycache__" not in path.parts)
 TEXTS = sorted(
     path
-    for folder in ("sonic_bullet", "tests", "scenes", "benchmarks", "tools", "assets", "docs", ".ci", ".")
+    for folder in ("sonic_bullet", "tests", "scenes", "benchmarks", "studies", "tools", "assets", "docs", ".ci", ".")
     for path in ((REPO / folder).rglob("*") if folder != "." else REPO.glob("*"))
     if path.is_file()
     and path.name != ".git"  # of a worktree: it names the machine's own folders
@@ -32,6 +32,11 @@ COLUMNS = 120
 IMPORT_S, HELP_S = 0.6, 0.3
 # importing numpy takes about that on the machine the limits are meant for; a slower or busier one gets the same ratio
 NUMPY_S = 0.15
+
+
+@cache
+def parse(module: Path) -> ast.Module:
+    return ast.parse(module.read_text())
 
 
 def best_s(code: str, runs: int = 3) -> float:
@@ -144,14 +149,14 @@ def called(tree: ast.AST) -> set[str]:
 def test_all_json_goes_through_one_encoder() -> None:
     """json.dumps knows no numpy.bool, and each place had its own answer to NaN."""
     own = {"json.dump", "json.dumps", "msgspec.json.encode", "msgspec.json.Encoder", "msgspec.json.format"}
-    who = {str(path.relative_to(PACKAGE)): called(ast.parse(path.read_text())) & own for path in MODULES}
+    who = {str(path.relative_to(PACKAGE)): called(parse(path)) & own for path in MODULES}
     assert {name for name, found in who.items() if found} == {"machine/json_text.py"}
 
 
 def test_materials_become_modes_in_one_place() -> None:
     """What solved a material's elasticity by itself left its effects out."""
     solving = {"modal.analyse", "analyse", "sonic_bullet.modal.analyse"}
-    who = {str(path.relative_to(PACKAGE)) for path in MODULES if called(ast.parse(path.read_text())) & solving}
+    who = {str(path.relative_to(PACKAGE)) for path in MODULES if called(parse(path)) & solving}
     assert who == {"session/body_models.py"}
 
 
@@ -178,7 +183,7 @@ def public_parts(tree: ast.Module) -> list[ast.FunctionDef | ast.ClassDef]:
 def test_everything_public_is_described_and_typed() -> None:
     missing, checked = [], 0
     for path in MODULES:
-        tree = ast.parse(path.read_text())
+        tree = parse(path)
         name = path.relative_to(REPO)
         if not ast.get_docstring(tree):
             missing.append(f"{name}: no docstring")
@@ -206,19 +211,24 @@ EXAMPLE_FILES = {"bar.py", "cup.py", "pour.py", "roll.py", "NAME.py", "SCENE.py"
 """Scenes of a user that docstrings speak of."""
 
 
+SOURCES = [f"/{path.relative_to(REPO).as_posix()}" for path in TEXTS if path.suffix == ".py"]
+
+
+@cache
+def exported_words(package: Path) -> set[str]:
+    return set(re.findall(r"\w+", (package / "__init__.py").read_text() if (package / "__init__.py").exists() else ""))
+
+
 def missing_modules(text: str) -> list[str]:
     """Modules that a docstring names, by a path (`synth/pulse.py`) or dots (`sonic_bullet.synth.pulse`), that are not
     there.
     """
-    known = [f"/{path.relative_to(REPO).as_posix()}" for path in TEXTS if path.suffix == ".py"]
     paths = [name for name in re.findall(r"(?<![\w/])(?:\w+/)*\w+\.py\b", text) if Path(name).name not in EXAMPLE_FILES]
-    missing = [name for name in paths if not any(path.endswith(f"/{name}") for path in known)]
+    missing = [name for name in paths if not any(path.endswith(f"/{name}") for path in SOURCES)]
     for name in re.findall(r"\bsonic_bullet(?:\.\w+)+|(?<=`)[a-z]\w*(?:\.\w+)+(?=`)", text):
         first, *rest = name.removeprefix("sonic_bullet.").split(".")
         module = PACKAGE / first / (rest[0] if rest else "__init__")
-        exported = rest and re.search(
-            rf"\b{rest[0]}\b", "".join(p.read_text() for p in (PACKAGE / first).glob("__init__.py"))
-        )
+        exported = rest and (PACKAGE / first).is_dir() and rest[0] in exported_words(PACKAGE / first)
         if (PACKAGE / first).is_dir() and not (module.is_dir() or module.with_suffix(".py").exists() or exported):
             missing.append(name)
     return missing
@@ -231,7 +241,7 @@ def test_docstrings_name_modules_that_exist() -> None:
     ]  # fmt: skip
     found, looked_at = [], 0
     for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(parse(path)):
             if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and (text := ast.get_docstring(node)):
                 looked_at += 1
                 found += [f"{path.relative_to(PACKAGE)}: {name}" for name in missing_modules(text)]

@@ -12,7 +12,10 @@ import pytest
 
 REPO = Path(__file__).resolve().parents[2]
 PAGES = sorted(
-    (*(REPO / "docs").rglob("*.md"), *(REPO / name for name in ("README.md", "CHANGELOG.md", "benchmarks/README.md")))
+    (
+        *(REPO / "docs").rglob("*.md"),
+        *(REPO / name for name in ("README.md", "CHANGELOG.md", "benchmarks/README.md", "studies/README.md")),
+    )
 )
 MOST_WORDS, MOST_COLUMNS = 40, 160
 PRIVATE = [
@@ -147,9 +150,9 @@ def test_links_lead_somewhere() -> None:
     assert count > 60
 
 
-NAMED = re.compile(r"`((?:sonic_bullet|tests|benchmarks|scenes|assets|docs|\.ci)/[\w./*-]*)(?:::?\w+)?`")
+NAMED = re.compile(r"`((?:sonic_bullet|tests|benchmarks|studies|scenes|assets|docs|\.ci)/[\w./*-]*)(?:::?\w+)?`")
 EXAMPLES = {"my_scene.py", "my_sim.py", "scene.py", "element_tri_p1.py"}
-IN_TEXT = re.compile(r"\b(?:benchmarks|tests|docs|scenes|assets)/[\w/-]+\.(?:py|md|json|obj|urdf)\b")
+IN_TEXT = re.compile(r"\b(?:benchmarks|studies|tests|docs|scenes|assets)/[\w/-]+\.(?:py|md|json|obj|urdf)\b")
 
 
 def test_named_files_exist() -> None:
@@ -161,7 +164,7 @@ def test_named_files_exist() -> None:
             count += 1
             if not (list(REPO.glob(name)) if "*" in name else (REPO / name).exists()):
                 gone.append(f"{name_of(page)}: {name}")
-    for folder in ("sonic_bullet", "benchmarks", "scenes", "tests"):
+    for folder in ("sonic_bullet", "benchmarks", "studies", "scenes", "tests"):
         for path in (REPO / folder).rglob("*"):
             if path.suffix not in {".py", ".json"} or path == Path(__file__).resolve():
                 continue
@@ -171,7 +174,7 @@ def test_named_files_exist() -> None:
                     gone.append(f"{name_of(path)}: {name}")
     tails = {
         path.relative_to(REPO).as_posix()
-        for folder in ("sonic_bullet", "benchmarks", "tests", "scenes", "docs")
+        for folder in ("sonic_bullet", "benchmarks", "studies", "tests", "scenes", "docs")
         for path in (REPO / folder).rglob("*.py")
     }
     for page in PAGES:

@@ -257,6 +257,7 @@ def test_in_a_room_dashpots_wait_for_a_tensor(
     assert seen == ["support-damping"]
 
 
+@pytest.mark.slow
 def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[list[str]] = []
     room = Room(1.1, 0.7, 11)

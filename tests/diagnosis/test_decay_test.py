@@ -50,6 +50,7 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     return found, any(by_lines(c, problem, now) for c in found)
 
 
+@pytest.mark.slow
 def test_a_law_in_a_room_is_told_by_lines() -> None:
     found, named = tried(LAW)
     assert found[0].lines > RULES.line_gain

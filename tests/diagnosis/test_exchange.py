@@ -31,6 +31,7 @@ def problem_of(body: Struck) -> DiagnosisProblem:
     return posed((body,), takes_of((body,)))
 
 
+@pytest.mark.slow
 def test_a_filter_that_came_first_goes_for_the_pulse_that_a_tilt_of_level_had_hidden() -> None:
     """√σ and the pulse together look like a gentler low-pass, until both are fitted at once."""
     body = recorded(PULSE, SOUNDING)

@@ -131,6 +131,7 @@ def of_somebody_else() -> ModuleType:
     return theirs
 
 
+@pytest.mark.slow
 def test_an_effect_of_somebody_else_is_tried_and_named() -> None:
     theirs = of_somebody_else()
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)

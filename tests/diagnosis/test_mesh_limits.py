@@ -97,6 +97,7 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
     assert (left < 0.3) == outside
 
 
+@pytest.mark.slow
 def test_a_name_is_judged_by_what_a_finer_mesh_would_leave() -> None:
     """More than half of what is open is the mesh's: a name that closes the rest is the right one; not where something
     else is open beside it.

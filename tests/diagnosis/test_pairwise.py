@@ -51,6 +51,7 @@ def tried(
     return first, pairwise(start, first, posed((body,), takes))
 
 
+@pytest.mark.slow
 def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
     """None of the first round's drops are looked at: they are zero here; and the pulse is not taken for the filter,
     which phases tell from it.
@@ -116,5 +117,6 @@ def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     assert room_anew((ROOM,), MASS) is None
 
 
+@pytest.mark.slow
 def test_what_moves_no_modes_is_not_tried_so() -> None:
     assert room_anew((PULSE, ROOM), PULSE) is None

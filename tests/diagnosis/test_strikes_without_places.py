@@ -52,6 +52,7 @@ def test_a_take_without_an_impulse_has_one_floor_and_distance_at_any_gain(tmp_pa
     assert take.least(other) == pytest.approx(take.least(one), abs=0.02)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_diagnosis_without_a_mesh_keeps_the_lines_that_play(tmp_path: Path) -> None:
     folder, out = case_of(tmp_path, 1), tmp_path / "d_preset.json"
     done = CliRunner().invoke(cli, ["diagnose", str(folder), "-o", str(out)])

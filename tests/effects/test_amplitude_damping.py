@@ -61,6 +61,7 @@ def test_choke_and_decays_are_told_to_a_few_percent(damping_growth: float, power
     assert base.gain * found.louder == pytest.approx(GAIN, rel=0.03)
 
 
+@pytest.mark.slow
 def test_twins_have_the_axes_that_their_envelopes_tell() -> None:
     model = with_twins()
     middle = float(model.freq_hz[PAIR[0]])
@@ -107,6 +108,7 @@ def test_levels_from_strike_to_strike_tell_the_axes_too() -> None:
     assert (fitted_decay(silent, 5.0).between > found.between.min() + 1.0).all()
 
 
+@pytest.mark.slow
 def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> None:
     """A stand that rings just beside every mode hides how these fall; once it is named, its sound is no part
     of theirs.

@@ -149,6 +149,7 @@ def test_a_limit_is_where_two_strikes_stand(peak: tuple[float, ...], limit: floa
         assert limit_of([loud[:1]], known=limit) == limit
 
 
+@pytest.mark.slow
 def test_clipped_strikes_tell_no_amplitudes() -> None:
     """Modes are the softer strikes' own; what a limit has cut out of the others is as wide as it is large."""
     plain = recorded()

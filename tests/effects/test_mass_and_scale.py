@@ -20,6 +20,7 @@ BAND = (50.0, 7_500.0)
 MASS = AddedMass((0.0477, 0.0371, 0.0), 0.03)
 
 
+@pytest.mark.slow
 def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyPatch) -> None:
     """All of the baseline's modes 10 % low: E/ρ, fitted to what the mass had lowered, went 19 % wrong."""
     monkeypatch.setattr(added_mass, "POINTS", 30)  # of a plate with 18 modes: a start within a wavelength of each

@@ -55,6 +55,7 @@ def test_modes_read_through_a_room() -> None:
     assert tails.dereverberated(dry, 5.0) is dry  # what is dry stays as it is
 
 
+@pytest.mark.slow
 def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     """By lines and by what they are read to be: a faint line of a mode that dies sooner may beat with the tail, and be
     heard to ring on.
@@ -75,6 +76,7 @@ def test_what_outlasts_a_room_is_left_as_it_was_heard() -> None:
     assert (tails.dereverberated(beats, RT60 / 0.9).decay_per_s > 4.0).all()
 
 
+@pytest.mark.slow
 def test_what_is_gone_at_once_or_is_not_like_its_mode_tells_no_decay() -> None:
     """Of a lossy body in a room most lines are the room's own: they would bend the material's law to the room's."""
     observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.9, 4), seconds=1.2)))
@@ -125,6 +127,7 @@ def test_fewer_lines_will_do_that_tell_a_tail_more_plainly(gain: tuple[float, ..
     assert _one(read, 1) == room
 
 
+@pytest.mark.slow
 @parametrize_few("rt60", [0.5, 1.6], 1)
 def test_the_rate_of_a_room(rt60: float) -> None:
     """Three rooms: how wet one sounds to a dozen lines is a matter of its taps, by a third."""
@@ -204,6 +207,7 @@ def test_what_the_model_says_nothing_of_stays_as_it_was_heard() -> None:
     assert np.isfinite(dry.amplitude).all()
 
 
+@pytest.mark.slow
 def test_what_rings_along_in_a_room_is_told_once() -> None:
     """A room makes several lines of one; outside it they are one, and as steady over the strikes as it was struck."""
     lodger = ForeignMode((1000.0, 2710.0), (9.0, 14.0), (1.2, 0.9), (0.0, 0.0))
@@ -215,6 +219,7 @@ def test_what_rings_along_in_a_room_is_told_once() -> None:
     assert found.freq_hz == pytest.approx((1000.0, 2710.0), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_what_is_read_to_ring_far_longer_than_it_is_heard_to_is_a_neighbour(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tail prolongs; of a strong slow mode close by, what is left between the patterns outlasts any lodger."""
     lodger = ForeignMode((1000.0, 2710.0), (60.0, 14.0), (1.2, 0.9), (0.0, 0.0))

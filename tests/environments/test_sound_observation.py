@@ -113,6 +113,7 @@ class CountedListener:
         self.world.unhook()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("listener", "steps"), [(sb.attach, 2_000), (CountedListener, 100_000)])
 def test_counts_add_up_to_the_samples_of_all_steps(
     opened: Any, monkeypatch: pytest.MonkeyPatch, listener: Any, steps: int

@@ -15,7 +15,7 @@ from tests.few_cases import parametrize_few
 def test_measured_objects_get_a_verdict(
     shared_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
 ) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "studies"))
     sys.modules.pop("measured_fit", None)
     from measured_fit import fitted
 

@@ -13,6 +13,7 @@ from sonic_bullet.estimator.lines.log_spectral import log_spectral_db, noise_flo
 from sonic_bullet.plots.fit_plot import circle
 
 
+@pytest.mark.slow
 def test_shared_lines_to_their_spreads() -> None:
     rng = np.random.default_rng(5)
     freq = np.array([210.0, 995.0, 1003.0, 2500.0, 4100.0, 6700.0, 9000.0, 9040.0])

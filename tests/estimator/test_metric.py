@@ -7,13 +7,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.ren2013.plain_image import plain_distance
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.perceptual.image import Image, distance, image
 from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, level_of_phon, loudness, phon, sone
 from sonic_bullet.estimator.perceptual.matching import match_ratio_product, points
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
+from studies.ren2013.plain_image import plain_distance
 from tests.few_cases import parametrize_few
 
 SR = 48000

@@ -40,6 +40,7 @@ def test_each_takes_of_what_is_left_and_the_true_ones_leave_nothing() -> None:
     assert len(selected(rings(TRUE, DECAY, SIZE), np.ones(2), doubled, SR, 10)) == 5  # the same again says nothing
 
 
+@pytest.mark.slow
 def test_low_lines_of_a_reverberant_recording_are_still_lines() -> None:
     """Forty modes in a room of 0.6 s: hundreds of starting poles, of which too few had been low ones' (none below 3 kHz
     in a case like this).
@@ -67,6 +68,7 @@ def test_of_no_pole_none_is_picked_and_what_no_line_takes_is_left() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_strike_that_a_gate_has_shut_is_no_silent_one() -> None:
     """Ten hits within 29 ms make a crowd; what is left after them is read back to the onset, but not where one
     recording is over by then.

@@ -1,5 +1,5 @@
 """A fitted preset sounds as recorded: rendered, fitted, and rendered again. All objects and sensors:
-benchmarks/round_trip.py.
+studies/round_trip.py.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from benchmarks import round_trip
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.preset_export import preset_of as kept_preset
 from sonic_bullet.effects.radiation import Radiation
@@ -20,6 +19,7 @@ from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.presets import total_damping
 from sonic_bullet.records.errors import FileError
+from studies import round_trip
 from tests.few_cases import parametrize_few
 from tests.made.case import write_box
 

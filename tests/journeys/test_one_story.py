@@ -60,6 +60,7 @@ def test_a_diagnosis_begins_from_the_distance_that_fit_prints(beside: Beside, tm
     assert not found["effects"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beside", [hum])
 def test_hum_is_taken_off_by_both(beside: Beside, tmp_path: Path) -> None:
     check_agree(with_sound(tmp_path, beside))

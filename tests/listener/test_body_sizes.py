@@ -149,6 +149,7 @@ def _piece(geometry: ElementTree.Element, folder: Path) -> tuple[np.ndarray, flo
     return 2 * radius * np.ones(3) + [0, 0, length], ball + np.pi * radius**2 * length
 
 
+@pytest.mark.slow
 def test_of_the_models_that_come_with_pybullet_grounds_alone_are_told_of() -> None:
     """All URDF files of it, each link at the size that it states, as if of steel."""
     told, links, files = set(), 0, sorted(DATA.rglob("*.urdf"))

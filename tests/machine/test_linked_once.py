@@ -147,6 +147,7 @@ def test_another_process_may_write_a_part(folder: Path) -> None:
     run(folder, KERNELS["handed.py"])
 
 
+@pytest.mark.slow
 def test_the_run_time_is_made_of_the_stages_that_two_processes_wrote(tmp_path: Path) -> None:
     (tmp_path / "cache").mkdir()
     assert run(tmp_path, FIRST_RUN) == "1 1 1 1 1"

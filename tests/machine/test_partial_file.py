@@ -38,9 +38,9 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def benchmark(name: str, *words: str) -> Any:
+def study(name: str, *words: str) -> Any:
     done = subprocess.run(
-        [sys.executable, REPO / "benchmarks" / f"{name}.py", "--json", *words],
+        [sys.executable, REPO / "studies" / f"{name}.py", "--json", *words],
         check=False,
         capture_output=True,
         text=True,
@@ -60,7 +60,7 @@ def test_a_disk_that_fills_up_never_ends_with_exit_0_and_a_bad_file() -> None:
     """The benchmark has every format at 40 fill levels; here are the compressed ones, whose last bytes are written at
     close, and an npz.
     """
-    found = benchmark("full_disk", "--levels", "8", "--kinds", ".flac,.ogg,.wav,.npz,preset")
+    found = study("full_disk", "--levels", "8", "--kinds", ".flac,.ogg,.wav,.npz,preset")
     if "skipped" in found:
         pytest.skip(f"no small disk can be mounted here: {found['skipped']} fill levels not tried")
     assert [counts["levels"] for counts in found.values()] == [8] * 5
@@ -211,7 +211,7 @@ def test_writers_that_sweep_each_other_lose_nothing(tmp_path: Path) -> None:
 
 def test_kills_leave_the_old_file_or_the_new_and_the_next_run_leaves_nothing_else() -> None:
     """The benchmark has 300."""
-    found = benchmark("kills", "--kills", "12", "--kinds", ".flac,.ogg,cache")["all"]
+    found = study("kills", "--kills", "12", "--kinds", ".flac,.ogg,cache")["all"]
     assert (found["kills"], found["whole"], found["litter"]) == (12, 12, 0)
     assert found["in a write"] >= 2  # they did hit
 

@@ -99,6 +99,7 @@ def test_walls_that_nobody_gave_are_as_thick_as_a_lattice_needs() -> None:
     assert wall_m > 0.03 * np.linalg.norm(np.ptp(crossing().vertex_m, axis=0)) and len(made.tet) < 1.5 * LATTICE_TETS
 
 
+@pytest.mark.slow
 def test_walls_that_somebody_gave_are_never_made_thicker() -> None:
     with pytest.raises(TooThinError, match="give thicker walls"):
         fill((crossing(),), None, 0.001, lambda text: None)

@@ -33,6 +33,7 @@ def test_ratios_of_the_independent_solver(case: str, shared_path: Path) -> None:
     assert np.abs(found / found[0] / (truth / truth[0]) - 1).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)  # of wall time, which a busy machine multiplies
 def test_ten_of_the_thousand_have_modes_or_a_name() -> None:
     import pybullet_data

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.ren2013 import cases
-from benchmarks.ren2013.published import MATERIALS
 from sonic_bullet.records import Material
+from studies.ren2013 import cases
+from studies.ren2013.published import MATERIALS
 from tests.made.case import make
 
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
@@ -39,6 +39,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_papers_procedure_and_the_fit_find_a_planted_material(data: Path) -> None:
     x = cases.recorded(data / "bar")
     for procedure in cases.PROCEDURES.values():

@@ -7,16 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.ren2013.optimise import fast, polish, reference
-from benchmarks.ren2013.problem import Problem, modes_of
-from benchmarks.ren2013.search_metric import aim_at, hybrid
-from benchmarks.ren2013.starts import circle, feature_eigenvalues, seed_starts, undominated
 from sonic_bullet.estimator.lines.extraction import extract
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.estimator.perceptual.metric import Constants
 from sonic_bullet.modal import analyse
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import RecordError
+from studies.ren2013.optimise import fast, polish, reference
+from studies.ren2013.problem import Problem, modes_of
+from studies.ren2013.search_metric import aim_at, hybrid
+from studies.ren2013.starts import circle, feature_eigenvalues, seed_starts, undominated
 from tests.few_cases import parametrize_few
 
 SR = 48000

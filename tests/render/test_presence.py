@@ -67,6 +67,7 @@ def heard() -> tuple[ContactLog, np.ndarray, int]:
     return found
 
 
+@pytest.mark.slow
 def test_what_is_gone_leaves_and_no_bit_hangs_on_when(
     heard: tuple[ContactLog, np.ndarray, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

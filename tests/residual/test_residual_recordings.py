@@ -1,6 +1,6 @@
 """Modal sound with its residual is nearer to recordings that were not fitted.
 
-The whole table: benchmarks/residual_table.py.
+The whole table: studies/residual_table.py.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import residual_table
+from studies import residual_table
 from tests.few_cases import parametrize_few
 
 

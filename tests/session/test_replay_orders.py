@@ -1,6 +1,6 @@
 """Random orders of add, remove, reset, save, restore, quench, disconnect …: the replay is what was heard.
 
-A thousand: benchmarks/replay_orders.py.
+A thousand: studies/replay_orders.py.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.replay_orders import Tally, play, run
 from sonic_bullet.session import Listener
+from studies.replay_orders import Tally, play, run
 
 
 def test_random_orders_replay_bit_for_bit() -> None:

@@ -90,6 +90,7 @@ def test_a_render_says_it_and_writes_the_others(tmp_path: Path) -> None:
     np.testing.assert_array_equal(sb.render_log(sb.read_log(str(tmp_path / "broken.npz"))).astype(np.float32), samples)
 
 
+@pytest.mark.slow
 def test_what_falls_on_cloth_overflows_nowhere(client: Any) -> None:
     """`RuntimeWarning: overflow encountered in divide` before: a soft body's mass is memory that nobody wrote."""
     client.resetSimulation(p.RESET_USE_DEFORMABLE_WORLD)

@@ -9,9 +9,9 @@ import pytest
 
 from benchmarks.suite import bricks
 from benchmarks.suite.bricks import OFFSET, Bricks
-from benchmarks.thin_walls.blocks import brick_volumes_m3, quad, swept, welded
-from benchmarks.thin_walls.bodies import BODIES, BRASS, FACETS, ThinBody
 from sonic_bullet import geometry
+from studies.thin_walls.blocks import brick_volumes_m3, quad, swept, welded
+from studies.thin_walls.bodies import BODIES, BRASS, FACETS, ThinBody
 
 EDGE_ENDS = {
     k: [int(np.flatnonzero((np.where(at == 1, side, at) == OFFSET).all(axis=1))[0]) for side in (0, 2)]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from benchmarks.suite import bricks
-from benchmarks.thin_walls import calculix, reference
-from benchmarks.thin_walls.blocks import brick_volumes_m3
-from benchmarks.thin_walls.bodies import BODIES
-from benchmarks.thin_walls.ours import compared
-from benchmarks.thin_walls.reference import Truth, truth
+from studies.thin_walls import calculix, reference
+from studies.thin_walls.blocks import brick_volumes_m3
+from studies.thin_walls.bodies import BODIES
+from studies.thin_walls.ours import compared
+from studies.thin_walls.reference import Truth, truth
 from tests.few_cases import parametrize_few
 
 KEPT = reference.read()["bodies"]

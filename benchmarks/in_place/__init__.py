@@ -1,1 +1,0 @@
-"""Bodies in place: what must hold of them, in one table (`python -m benchmarks.in_place`)."""

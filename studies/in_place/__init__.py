@@ -1,0 +1,1 @@
+"""Bodies in place: what must hold of them, in one table (`python -m studies.in_place`)."""
