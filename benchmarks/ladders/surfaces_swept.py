@@ -1,0 +1,224 @@
+"""Ladders of what slides and rolls: what the draft predicts of each, and what is measured here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from benchmarks.ladders.observed import SR, Observed
+from benchmarks.ladders.verdicts import AGREES, DIFFERS, LACKING, PARTLY, Verdict, within
+from sonic_bullet.records import Array
+
+Scenes = Mapping[str, Observed]
+FACES = (
+    "The draft: rough faces bear N = N₀ exp(δ/u₀), of stiffness N/u₀ with u₀ ∝ rms height [Persson 2007]. We take a "
+    "face for a blunt smooth cap"
+)
+
+
+def contact_pitch(scenes: Scenes) -> Verdict:
+    """Find rates at three masses."""
+    rates = [scenes[key].contact_rate_hz() for key in "abc"]
+    return Verdict(
+        "the contact's rate does not depend on mass",
+        f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} Hz at 5 g, 0.5, 50 kg",
+        AGREES if max(rates) < 1.2 * min(rates) else DIFFERS,
+        FACES,
+    )
+
+
+def finish_ladder(scenes: Scenes) -> Verdict:
+    """Find rates on three finishes."""
+    rates = [scenes[key].contact_rate_hz() for key in "abc"]
+    power = np.log(rates[2] / rates[0]) / np.log(1e3)
+    return Verdict(
+        "the contact's rate goes as roughness^(-1/2)",
+        f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} Hz: roughness^{power:.2f} over both rungs",
+        AGREES if within(power, -0.5, 0.1) else PARTLY if rates[0] > rates[1] > rates[2] else DIFFERS,
+        FACES + ": the rate falls because rougher faces fly longer",
+    )
+
+
+def shock_rate(scenes: Scenes) -> Verdict:
+    """Find rates over three correlation lengths."""
+    rates, wanted = [scenes[key].contact_rate_hz() for key in "abc"], (100, 500, 2000)
+    off = [rate / want for rate, want in zip(rates, wanted, strict=True)]
+    return Verdict(
+        "shocks at v/ℓ: 100, 500, 2000 a second",
+        f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} contacts a second: {off[0]:.1f}, {off[1]:.1f}, {off[2]:.1f} x",
+        AGREES if max(off) < 1.3 else PARTLY if rates[0] < rates[1] < rates[2] else DIFFERS,
+        "A finish has waves from ℓ down to ℓ/16, and each may strike; v/ℓ counts the longest alone. Rates go by the "
+        "spectrum's moments [Rice 1944; Nayak 1971, whom the draft cites]: its figure is a lower bound",
+    )
+
+
+def sliding_pair(scenes: Scenes) -> Verdict:
+    """Find levels with the roughness on either side."""
+    even, swept, unswept = (scenes[key].level_db() for key in "abc")
+    return Verdict(
+        "only a surface that is travelled along sounds",
+        f"rough and swept {swept:.1f} dB, rough and not swept {unswept:.1f} dB, both machined {even:.1f} dB",
+        AGREES if swept > even > unswept + 10 else DIFFERS,
+    )
+
+
+def friction_ladder(scenes: Scenes) -> Verdict:
+    """Find the direction of the contact force while all slide."""
+    wanted = (0.0, 0.025, 0.075)  # of the pair: the average of both bodies'
+    found = [_tangential_share(scenes[key], 0.3, 0.6) for key in "abc"]
+    levels = [scenes[key].level_db(0.1, 0.5) for key in "abc"]
+    near = all(abs(one - want) < 0.002 for one, want in zip(found, wanted, strict=True))
+    return Verdict(
+        "traction along the slip in proportion to friction: 0, 0.025, 0.075 of the pair",
+        "tangential over normal drive " + ", ".join(f"{x:.4f}" for x in found)
+        + "; levels " + ", ".join(f"{x:.1f}" for x in levels) + " dB, as the gripped ones slow down",
+        AGREES if near else DIFFERS,
+    )  # fmt: skip
+
+
+def _tangential_share(scene: Observed, start_s: float, end_s: float) -> float:
+    total = np.zeros(2)
+    for at, step in zip(scene.log.start_s, scene.log.steps, strict=True):
+        if start_s <= at < end_s and len(step.contacts.a):
+            normal = np.einsum("kx,kx->k", step.contacts.impulse_n_s, step.contacts.normal)
+            along = step.contacts.impulse_n_s - normal[:, None] * step.contacts.normal
+            total += np.linalg.norm(along.sum(axis=0)), np.abs(normal.sum())
+    return float(total[0] / total[1])
+
+
+def face_vs_point(scenes: Scenes) -> Verdict:
+    """Find how patches grow with load."""
+    face, point = scenes["a"], scenes["b"]
+    return Verdict(
+        "the box's patch is fixed by its face, the ball's grows with load",
+        f"both grow with load^(1/3) in what slides: radii of curvature {face.radius_m:.3f} and {point.radius_m:.3f} m; "
+        f"{face.level_db():.1f} and {point.level_db():.1f} dB",
+        PARTLY,
+        "The draft: a flat punch keeps its radius [Johnson 1985, eq. 3.36]. So do our impacts (PatchGrowth); slides "
+        "do not",
+    )
+
+
+def rolling_vs_sliding(scenes: Scenes) -> Verdict:
+    """Find sweeps and slips."""
+    (rolls, slips), (slides, _), (locked, _) = (_sweeps(scenes[key]) for key in "abc")
+    levels = [scenes[key].level_db() for key in "abc"]
+    ratio = min(locked) / max(locked)
+    return Verdict(
+        "rolling does not slip and sounds; sliding sweeps the ground alone; a large ball's sweeps are one",
+        f"rolling sweeps {rolls[0]:.3f} and {rolls[1]:.3f} m/s, slips {slips:.4f}, {levels[0]:.1f} dB; sliding sweeps "
+        f"{max(slides):.3f} and {min(slides):.3f} m/s, {levels[1]:.1f} dB; locked {ratio:.4f} of each other",
+        AGREES
+        if slips < 0.005 and levels[0] > 0 and min(slides) < 0.1 * max(slides) and within(ratio, 1, 0.02)
+        else PARTLY,
+    )
+
+
+def _sweeps(scene: Observed) -> tuple[Array, float]:
+    """Find mean sweeps (2,) and slip in m/s, by load, from 0.3 s on."""
+    total, sweep, slip = 0.0, np.zeros(2), 0.0
+    for at, step in zip(scene.log.start_s, scene.log.steps, strict=True):
+        if at >= 0.3 and len(step.contacts.a):
+            load = np.abs(np.einsum("kx,kx->k", step.contacts.impulse_n_s, step.contacts.normal))
+            total += load.sum()
+            sweep += load @ step.contacts.sweep_m_s
+            slip += load @ np.linalg.norm(step.contacts.slip_m_s, axis=1)
+    return sweep / total, slip / total
+
+
+def bounce_onset(scenes: Scenes) -> Verdict:
+    """Find levels and flight at three speeds."""
+    levels, flight = [scenes[key].level_db() for key in "abc"], [scenes[key].flight() for key in "abc"]
+    return Verdict(
+        "from a quiet ride to trains of bounces as speed rises",
+        ", ".join(f"{x:.1f} dB" for x in levels) + " with " + ", ".join(f"{100 * x:.0f} %" for x in flight)
+        + " of the time in flight, at 0.02, 0.1, 0.7 m/s",
+        AGREES if flight[0] < 0.1 < flight[2] else PARTLY,
+        "The draft: hills of curvature κ carry a ball up to v = √(g/κ), some 0.05 m/s. Our ball follows waves whose "
+        "valleys its roundness cannot reach",
+    )  # fmt: skip
+
+
+def landing(scenes: Scenes) -> Verdict:
+    """Find pulses on two finishes."""
+    machined, cast = (scenes[key].strongest.length_s for key in "ab")
+    return Verdict(
+        "the finish sets each landing's contact time",
+        f"{1e6 * machined:.1f} and {1e6 * cast:.1f} µs",
+        AGREES if cast > 1.05 * machined else DIFFERS,
+        "The draft: where a finish is as high as the penetration, a ball is softer than Hertz [Greenwood & Tripp 1967; "
+        "Johnson 1985, sec. 13.5]. Here 100 µm are more than its 10 µm, and our pulses are of smooth bodies",
+    )
+
+
+def measured_profile(scenes: Scenes) -> Verdict:
+    """Find levels of a stored track and of its statistics."""
+    stored, made = scenes["a"].level_db(), scenes["b"].level_db()
+    return Verdict(
+        "a stored track is the same sample for sample; its statistics sound alike",
+        f"{stored:.1f} and {made:.1f} dB; a stored track is played by its spectrum",
+        PARTLY if within(stored, made, 0.01) else DIFFERS,
+        "The draft: we do not play heights one by one",
+    )
+
+
+def pressed_ring(scenes: Scenes) -> Verdict:
+    """Find decays at three frictions."""
+    decays = [_t60_s(scenes[key]) for key in "abc"]
+    return Verdict(
+        "decay shortens as grip grows, by micro-slip",
+        "T60 " + ", ".join(f"{1e3 * x:.0f}" for x in decays) + " ms at 0, 0.3, 0.9",
+        AGREES if decays[0] > 1.05 * decays[1] > 1.1 * decays[2] else DIFFERS,
+        "Neither. Micro-slip takes nothing without friction, and T³/(μN) a cycle at a tangential force T below μN "
+        "[Mindlin & Deresiewicz 1953]: less with more grip. So there is a shortest decay. We damp by the normal "
+        "spring's loss alone",
+    )
+
+
+def _t60_s(scene: Observed) -> float:
+    """Find the decay of the strongest line after the tap, by Schroeder's integral from -5 to -25 dB."""
+    start = int((scene.strongest.start_s + 0.01) * SR)
+    energy = np.cumsum(scene.pressure_pa[start : start + SR][::-1] ** 2)[::-1]
+    level = 10 * np.log10(np.maximum(energy / energy[0], 1e-30))
+    at = [int(np.searchsorted(-level, x)) for x in (5, 25)]
+    return 3 * (at[1] - at[0]) / SR
+
+
+def squeak(scenes: Scenes) -> Verdict:
+    """Find levels of what creeps."""
+    levels = [scenes[key].level_db() for key in "abc"]
+    return Verdict(
+        "friction sticks and slips through the patch's shear compliance: a squeak",
+        ", ".join(f"{x:.0f}" for x in levels) + " dB at 1, 3, 10 mm/s: a faint hiss, no stick-slip",
+        LACKING,
+        "The text leaves friction-induced vibration out of its scope. We have no model of it",
+    )
+
+
+def surface_radiates(scenes: Scenes) -> Verdict:
+    """Hear both bodies alone."""
+    scene = scenes["a"]
+    peaks = [float(np.sqrt((scene.alone_pa(name) ** 2).mean())) for name in ("Scraper", "Ground Machined")]
+    return Verdict(
+        "both solids of a contact radiate",
+        f"scraper alone {peaks[0]:.3g} Pa rms, ground alone {peaks[1]:.3g} Pa rms",
+        AGREES if min(peaks) > 0 else DIFFERS,
+    )
+
+
+SWEPT = {
+    "surface/ContactPitch": contact_pitch,
+    "surface/FinishLadder": finish_ladder,
+    "surface/ShockRate": shock_rate,
+    "surface/SlidingPair": sliding_pair,
+    "surface/FrictionLadder": friction_ladder,
+    "surface/FaceVsPoint": face_vs_point,
+    "surface/RollingVsSliding": rolling_vs_sliding,
+    "surface/BounceOnset": bounce_onset,
+    "surface/Landing": landing,
+    "surface/MeasuredProfile": measured_profile,
+    "surface/PressedRing": pressed_ring,
+    "surface/Squeak": squeak,
+    "surface/SurfaceRadiates": surface_radiates,
+}

@@ -1,0 +1,21 @@
+"""The draft's own ladders of impacts come out as it predicts, but for one that its own source contradicts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.gltf_ladders import judge
+from benchmarks.ladders.impacts import IMPACTS
+from benchmarks.ladders.verdicts import AGREES, PARTLY
+
+
+@pytest.mark.shared
+@pytest.mark.slow
+def test_impacts_come_out_as_the_draft_predicts(shared_path: Path) -> None:
+    found = judge(shared_path / "gltf-audio", [name.split("/")[-1] for name in IMPACTS])
+    assert set(found) == set(IMPACTS)
+    for name, one in found.items():
+        assert one.verdict == (PARTLY if name.endswith("RestitutionLadder") else AGREES), (name, one)
+        assert one.verdict == AGREES or one.right, name
