@@ -94,8 +94,8 @@ def relief_and_scale(scenes: Scenes) -> Verdict:
     ratio = np.array(low) / low[1]
     return Verdict(
         "size detunes the model by 2, 1, 1/2; the finish stays",
-        f"lowest modes {low[0]:.0f}, {low[1]:.0f}, {low[2]:.0f} Hz: {ratio[0]:.3f}, 1, {ratio[2]:.3f}; lines of the sound "
-        f"at {heard[0]:.0f}, {heard[1]:.0f}, {heard[2]:.0f} Hz, pulled by the ground; finishes "
+        f"lowest modes {low[0]:.0f}, {low[1]:.0f}, {low[2]:.0f} Hz: {ratio[0]:.3f}, 1, {ratio[2]:.3f}; lines of "
+        f"the sound at {heard[0]:.0f}, {heard[1]:.0f}, {heard[2]:.0f} Hz, pulled by the ground; finishes "
         f"{'equal' if same else 'differ'}",
         AGREES if same and within(ratio[0], 2, 1e-3) and within(ratio[2], 0.5, 1e-3) else PARTLY,
         "The text takes a node's first scale for the model's own size; the scenes take 1 for it, and so do we. "
