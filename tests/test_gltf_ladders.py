@@ -1,4 +1,4 @@
-"""The draft's own ladders of impacts come out as it predicts, but for one that its own source contradicts."""
+"""The draft's own ladders of impacts come out as it predicts, but for three, of which the page says why."""
 
 from __future__ import annotations
 
@@ -17,5 +17,6 @@ def test_impacts_come_out_as_the_draft_predicts(shared_path: Path) -> None:
     found = judge(shared_path / "gltf-audio", [name.split("/")[-1] for name in IMPACTS])
     assert set(found) == set(IMPACTS)
     for name, one in found.items():
-        assert one.verdict == (PARTLY if name.endswith("RestitutionLadder") else AGREES), (name, one)
+        in_part = name.endswith(("RestitutionLadder", "ContactDuration", "ReliefAndScale"))
+        assert one.verdict == (PARTLY if in_part else AGREES), (name, one)
         assert one.verdict == AGREES or one.right, name

@@ -35,7 +35,8 @@ def contact_duration(scenes: Scenes) -> Verdict:
         "heavier is longer: mass^(2/5) by Hertz, mass^(1/3) by the draft's law of faces",
         f"{1e6 * light:.1f}, {1e6 * middle:.1f}, {1e6 * heavy:.1f} µs: mass^{power:.2f} from 0.5 to 5 kg; 5 g at our "
         "floor of 20 µs",
-        AGREES if light < middle < heavy and 0.3 < power < 0.43 else PARTLY,
+        AGREES if within(light, middle / 10**0.4, 0.1) and within(power, 0.4, 0.08) else PARTLY,
+        "Our pulses are 20 µs at least, so the lightest rung does not follow the law; the other lies between both laws",
     )
 
 
@@ -95,9 +96,10 @@ def relief_and_scale(scenes: Scenes) -> Verdict:
     return Verdict(
         "size detunes the model by 2, 1, 1/2; the finish stays",
         f"lowest modes {low[0]:.0f}, {low[1]:.0f}, {low[2]:.0f} Hz: {ratio[0]:.3f}, 1, {ratio[2]:.3f}; lines of "
-        f"the sound at {heard[0]:.0f}, {heard[1]:.0f}, {heard[2]:.0f} Hz, pulled by the ground; finishes "
+        f"the sound at {heard[0]:.0f}, {heard[1]:.0f}, {heard[2]:.0f} Hz; finishes "
         f"{'equal' if same else 'differ'}",
-        AGREES if same and within(ratio[0], 2, 1e-3) and within(ratio[2], 0.5, 1e-3) else PARTLY,
+        AGREES if same and within(heard[0] / heard[1], 2, 0.01) and within(heard[2] / heard[1], 0.5, 0.01) else PARTLY,
+        "The models scale as predicted, the sound's lines do not quite: that the ground pulls them is not tested. "
         "The text takes a node's first scale for the model's own size; the scenes take 1 for it, and so do we. "
         "The map's waves are 300 mm long and pass at 0.3 Hz: nobody hears them",
     )
