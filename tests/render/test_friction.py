@@ -24,6 +24,7 @@ class Table:
         self.bodies["mass_kg"], self.bodies["inertia_kg_m2"] = (0, 0.5), np.eye(3) * 1e-3
         self.bodies["modulus_pa"], self.bodies["restitution"] = 1e10, 0.5
         self.bodies["roughness_m"], self.bodies["hurst"], self.bodies["surface_seed"] = 2e-6, 0.75, (11, 12)
+        self.bodies["octave_rms_m"] = -1.0
         self.bodies["size_m"], self.bodies["volume_m3"], self.bodies["curvature_per_m"] = 0.1, 1e-3, 20.0
         self.bodies["modes"], self.bodies["columns"], self.bodies["faces"] = COLUMNS, COLUMNS, 1
         self.bodies["shape_at"] = 0, 9 * COLUMNS
