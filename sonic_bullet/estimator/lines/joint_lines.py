@@ -35,6 +35,7 @@ LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
 SILENT = 1e-9  # rms, of full scale 1
+FLOOR = 1e-9  # rms, of full scale 1: no noise
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
@@ -116,7 +117,12 @@ def _identified(
 
 
 def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
-    """Poles polished, a full crowd twice, without those that stand out of the noise too little to be a line."""
+    """Poles polished, a full crowd twice, without those that stand out of the noise too little to be a line.
+
+    Recordings without a noise of their own are held against what their lines leave.
+    """
+    if (noise <= FLOOR).all():
+        return _over_what_is_left(signals, noise, pole, sr, low, high)
     colour = _colour(signals, noise, sr)
     for turn in range(3):
         before = len(pole)
@@ -125,6 +131,22 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
         pole = pole[energy / colour(pole.imag / (2 * np.pi)) > SIGNIFICANT]
         if (len(pole) == before and (turn or before < MOST_LINES)) or not len(pole):
             break
+    return pole
+
+
+def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: float, high: float) -> Array:
+    """Poles polished, the least significant half of those too weak left out each time, until none is.
+
+    A line's weight is what the likelihood loses without it, |A|²/var A [Wald 1943], in the noise that all lines leave.
+    """
+    while len(pole):
+        pole = _polished(signals, noise, apart(pole), sr, low, high)
+        lines = lines_of(signals, noise, pole, sr, True)
+        weight = (np.abs(lines.amplitude / lines.amplitude_sd) ** 2).sum(axis=0)
+        weak = int((weight < SIGNIFICANT).sum())
+        if not weak:
+            break
+        pole = pole[np.sort(np.argsort(weight)[(weak + 1) // 2 :])]
     return pole
 
 
@@ -174,7 +196,7 @@ def noise_rms(signals: Array, sr: int) -> Array:
     power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
     # exponential law: its lower quartile is ln(4/3) of the mean
     density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)
-    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), 1e-9))
+    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), FLOOR))
 
 
 def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:

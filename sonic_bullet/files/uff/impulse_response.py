@@ -3,8 +3,10 @@
     H(f) of acceleration, velocity, displacement  ->  V = H/(iω), H, iωH          [Ewins 2000, ch. 2.2, mobility]
     h(t) = ∫ V e^{iωt} df  ->  irfft(V·W)·sr, response in m/s (or Pa) to 1 N·s
 
-W falls to zero over the top tenth of the measured band and below the band: a sharp edge rings. Steps of Δf give a
-period 1/Δf; a mode that decays beyond it wraps around as A e^{pt}/(1 − e^{p/Δf}), with the same pole p.
+W falls to zero over the top fifth of the measured band and below the band, along the integral of a Kaiser window: a
+sharp edge rings, and this one is over after √(π² + β²)/(π·width).                        [Kaiser & Schafer 1980]
+Steps of Δf give a period 1/Δf; a mode that decays beyond it wraps around as A e^{pt}/(1 − e^{p/Δf}), with the same
+pole p.
 
 h jumps at the impulse, and no band represents a jump exactly: half of it is in the first sample, the rest rings around
 it. Those samples are predicted from later ones, x_n = Σ a_k x_{n+k}.        [linear prediction: Makhoul 1975, eq. 2]
@@ -22,12 +24,14 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 LOWEST_HZ = 20.0
-TOP, BAND = 0.85, 0.8  # of the highest frequency measured: where W begins to fall, where the band ends
+BAND = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
+BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
 OFF_GRID = 0.01  # of a step
 OFF_RATE = 5e-5  # relative: six figures of a step, and their last
-ABOUT_JUMP = 24  # samples at twice the highest frequency: a few periods of the top tenth
+ABOUT_JUMP = 40  # samples at twice the highest frequency: W rings √(π² + β²)/(π·0.2)/2 periods of it, 34 samples
 ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
 EXACT = 1e-13  # of the largest eigenvalue: below it are rounding errors
+STEPS = 4001  # of an edge
 LENGTHS = 4096  # even numbers of samples to choose the whole rate from
 MOTION = {"acceleration": -1, "velocity": 0, "displacement": 1}
 """Powers of iω from a quantity to velocity."""
@@ -68,7 +72,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     freq = sr / count * np.arange(first, last + 1)
     low = max(LOWEST_HZ, 2 * step, response.start * 1.1)
     spectrum = np.zeros(count // 2 + 1, complex)
-    spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, TOP * freq[-1])
+    spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, BAND * freq[-1])
     sound = np.fft.irfft(spectrum, count) * sr
     jump = math.ceil(ABOUT_JUMP * sr / (2 * freq[-1]))
     return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, BAND * float(freq[-1]))
@@ -109,10 +113,12 @@ def _derived(value: Array, freq_hz: Array, power: int) -> Array:
 
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
-    """Return one between two frequencies; raised cosines to zero at half the first and at the last frequency."""
-    below = np.clip((freq_hz - low_hz / 2) / (low_hz / 2), 0, 1)
-    above = np.clip((freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9), 0, 1)
-    return np.asarray(np.sin(np.pi / 2 * below) ** 2 * np.sin(np.pi / 2 * above) ** 2)
+    """Return one between two frequencies; falls to zero at half the first and at the last frequency."""
+    below = (freq_hz - low_hz / 2) / (low_hz / 2)
+    above = (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
+    step = np.cumsum(np.kaiser(STEPS, BETA))
+    at = np.linspace(0, 1, STEPS)
+    return np.asarray(np.interp(below, at, step) * np.interp(above, at, step) / step[-1] ** 2)
 
 
 def _length(least: int, step_hz: float) -> tuple[int, int]:
