@@ -1,6 +1,6 @@
-"""The family of physical effects a model may lack, one short file each.
+"""The physical effects that a model may lack, one short file each.
 
-A third party's is passed beside these: `EFFECTS + (Mine,)`.
+An effect from elsewhere is passed with these: `EFFECTS + (Mine,)`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ FORMER_NAMES = {"Blow": Impact, "Heard": ObjectEvidence}
 if not TYPE_CHECKING:  # or a type checker would take any name for one of this module
 
     def __getattr__(name: str) -> type:
-        """The class that had another name in earlier versions, with a DeprecationWarning."""
+        """Return the class that had another name in earlier versions, with a DeprecationWarning."""
         if name not in FORMER_NAMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         warnings.warn(

@@ -3,10 +3,10 @@
     A_k -> A_k F̂(f_k τ)/F̂(0),   τ = τ₀ (J/J₀)^{−1/5}   (Hertz), or τ₀ whatever J (flat faces)
         [Hertz 1882; Hunter 1957; Johnson 1985, ch. 11]
 
-Read off the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the strike's
-own pattern. Phases, where they are true, only tell whether τ goes with J: a pulse's middle comes πfτ late, which is
-seen long before its roll-off differs. Where a long contact leaves two or three lines, modes that should be observed and
-are not tell it, too.
+Identified by the amplitudes: a roll-off common to all modes of a strike, with the pulse's zeros. Moments about the
+strike's own pattern. Phases, where they are true, decide only whether τ depends on J: a pulse's middle is πfτ late,
+which is observable long before its roll-off differs. Where a long contact leaves two or three lines, modes that should
+be observed and are not count, too.
 """
 
 from __future__ import annotations
@@ -35,7 +35,19 @@ SILENT, HIDDEN = 10.0, 0.02
 
 @dataclass(frozen=True)
 class ContactTime:
-    """Duration tau_s at the impulse impulse_n_s, going as impulse^exponent; pulse: one of `pulses.PULSES`."""
+    """Duration of the contact as a function of the strike's impulse.
+
+    Attributes
+    ----------
+    tau_s : float
+        Duration at the impulse `impulse_n_s`.
+    impulse_n_s : float
+        Reference impulse.
+    exponent : float
+        The duration goes as impulse^exponent.
+    pulse : str
+        One of `pulses.PULSES`.
+    """
 
     id: ClassVar[str] = "contact-time"
     stage: ClassVar[Stage] = Stage.FORCE
@@ -49,21 +61,24 @@ class ContactTime:
     pulse: str = "half-sine"
 
     def duration_s(self, impulse_n_s: float) -> float:
+        """Compute the duration at an impulse."""
         return float(self.tau_s * (impulse_n_s / self.impulse_n_s) ** self.exponent)
 
     def apply(self, x: Impact) -> Impact:
-        """The impact with the effect in it."""
+        """Set the impact's pulse and its duration."""
         return replace(x, tau_s=self.duration_s(x.impulse_n_s), pulse=self.pulse)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {"tau_s": self.tau_s, "J0_n_s": self.impulse_n_s, "exponent": self.exponent, "pulse": self.pulse}
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 2
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit pulse, duration and exponent to the lines' amplitudes; None where no roll-off is identified."""
         tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= FEWEST_LINES]
         if not tables:
             return None
@@ -107,9 +122,7 @@ class ContactTime:
 
 
 def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Per strike and line, flat: frequency, impulse, expected and observed magnitude, spread, the line's strongest
-    expected magnitude.
-    """
+    """Flatten strikes and lines: frequency, impulse, expected and observed magnitude, spread, strongest expected."""
     expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
     if len(freq) <= FEW and h.model is not None and h.signal is not None:
@@ -128,8 +141,9 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
 
 
 def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Modes (u,) that no line stands for, what is expected of them (s, u), and what may hide (s, u) in the noise, where
-    σ √(4d/sr) is an amplitude's spread, or under what is louder.
+    """Find modes (u,) without a line, what is expected of them (s, u), and the amplitude (s, u) that may be hidden.
+
+    Hidden is what lies in the noise, where an amplitude's spread is σ √(4d/sr), or under louder lines.
     """
     assert h.model is not None
     observed = np.concatenate([h.freq_hz, h.foreign_hz])
@@ -143,11 +157,10 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
 
 
 def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """Twice the negative log likelihood under Cauchy's law at the best common gain; rough (·): the shapes' own error,
-    which grows with the gain.
+    """Compute twice the negative log likelihood under Cauchy's law at the best common gain.
 
-    mode (·): of each row; how loud the sensor hears a mode is off by COMMON at all strikes alike, integrated out by
-    Laplace's method [Tierney & Kadane 1986].
+    rough (·) is the shapes' own error, which grows with the gain; mode (·) the index of each row's mode. A mode's level
+    at the sensor is off by COMMON at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
     """
     loud = (observed > 0) & (expected > 0)
     starts = np.quantile(observed[loud] / expected[loud], STARTS) if loud.any() else np.ones(1)
@@ -155,7 +168,7 @@ def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array
 
 
 def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
-    """The same at the gain that one to begin with leads to."""
+    """Compute `_cost` at the gain that is reached from a first one."""
     own = np.zeros(int(mode.max()) + 1)
     for _ in range(TURNS):
         width = sd**2 + (gain * rough) ** 2
@@ -171,9 +184,7 @@ def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array
 
 
 def _late(h: ObjectEvidence, effect: ContactTime) -> float:
-    """Twice the negative log likelihood under Cauchy's law of the phases (s, k) at the best common delay; 0 where
-    they are not true.
-    """
+    """Compute twice the negative log likelihood (Cauchy) of the phases (s, k) at the best delay; 0 without phases."""
     if not h.signed or h.dry:
         return 0.0
     tau = np.array([effect.duration_s(float(j)) if np.isfinite(j) else np.nan for j in h.impulse_n_s])[:, None]
@@ -192,6 +203,7 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
 
 
 def _golden(f: Any, low: float, high: float) -> float:
+    """Find the minimum of a function between two bounds."""
     from scipy.optimize import minimize_scalar
 
     return float(minimize_scalar(f, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * low}).x)

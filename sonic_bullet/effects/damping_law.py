@@ -6,8 +6,8 @@
     relaxation     d = ½ ω [η + Δ ωτ/(1 + (ωτ)²)]
         [Zener 1948, ch. 5; Nowick & Berry 1972, eq. 3.5-2]
 
-Read off the decays of all modes, of every object: smooth in frequency, the same for all strikes and sizes. The law with
-the least Bayes information criterion is proposed, where it beats Rayleigh's own.
+Identified by the decays of all modes of every object: smooth in frequency, the same for all strikes and sizes. The law
+with the least Bayes information criterion is proposed, where it is better than Rayleigh's.
 """
 
 from __future__ import annotations
@@ -31,9 +31,20 @@ FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a
 
 @dataclass(frozen=True)
 class DampingLaw:
-    """law: one of LAWS.
+    """Loss of a material as a function of frequency.
 
-    eta: loss factor (at 1 kHz for a power). exponent: of d against ω. strength Δ and tau_s: of the relaxation.
+    Attributes
+    ----------
+    law : str
+        One of LAWS.
+    eta : float
+        Loss factor η (at 1 kHz for a power).
+    exponent : float
+        p, of the decay as a power of ω.
+    strength : float
+        Δ of the relaxation.
+    tau_s : float
+        τ of the relaxation.
     """
 
     id: ClassVar[str] = "damping-law"
@@ -49,20 +60,21 @@ class DampingLaw:
     tau_s: float = 0.0
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         one_of("law", self.law, LAWS)
         finite("exponent", self.exponent)
         for name, value in (("eta", self.eta), ("strength", self.strength), ("tau_s", self.tau_s)):
             finite(name, value, least=0.0)
 
     def decay_per_s(self, omega_per_s: Array) -> Array:
-        """d (k,) at undamped ω (k,)."""
+        """Compute the decays (k,) at undamped ω (k,) in rad/s."""
         w = np.asarray(omega_per_s, float)
         if self.law == "power":
             return np.asarray(0.5 * self.eta * OMEGA_1 * (w / OMEGA_1) ** self.exponent)
         return np.asarray(0.5 * w * (self.eta + self.strength * w * self.tau_s / (1 + (w * self.tau_s) ** 2)))
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
+        """Set the decays of a body's modes by the law."""
         if self.eta == 0 and self.strength == 0:  # no law at all: the material's own stays
             return x
         omega = np.sqrt(x.omega0_squared_per_s2)
@@ -71,16 +83,18 @@ class DampingLaw:
         return ascending(x, freq, decay)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         if self.law == "relaxation":
             return {"law": self.law, "eta": self.eta, "strength": self.strength, "tau_s": self.tau_s}
         return {"law": self.law, "eta": self.eta} | ({"exponent": self.exponent} if self.law == "power" else {})
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return LAWS[self.law]
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit each law to the decays of all lines; None where no law is better than Rayleigh's."""
         omega = np.concatenate([h.omega for h in evidence.observed])
         decay = np.concatenate([h.decay_per_s for h in evidence.observed])
         spread = np.concatenate([h.decay_sd_per_s for h in evidence.observed])
@@ -113,15 +127,17 @@ class DampingLaw:
 
 
 def _rayleigh(p: Array, w: Array) -> Array:
+    """Compute Rayleigh's decays at ω (k,) for p = (ln α, ln β)."""
     return np.asarray(0.5 * (np.exp(p[0]) + np.exp(p[1]) * w**2))
 
 
 def _start(omega: Array, decay: Array) -> Array:
+    """Estimate (ln α, ln β) to start the fit of Rayleigh's law from."""
     return np.array([np.log(2 * decay.min()), np.log(2 * np.median(decay / omega**2))])
 
 
 def _fits(omega: Array, cost: Any) -> list[tuple[float, tuple[str, float, float, float, float]]]:
-    """Each law at its best: (BIC, fields)."""
+    """Fit each law: (BIC, fields)."""
     middle = np.log(np.median(omega))
 
     def power(p: Array, w: Array) -> Array:
@@ -144,7 +160,7 @@ def _fits(omega: Array, cost: Any) -> list[tuple[float, tuple[str, float, float,
 
 
 def _least(omega: Array, cost: Any, law: Any, starts: list[Array], count: int) -> tuple[float, Array]:
-    """(BIC, parameters) of a law under Cauchy's loss."""
+    """Fit a law under Cauchy's loss from several starts: (BIC, parameters)."""
     from scipy.optimize import least_squares
 
     found = [

@@ -1,9 +1,9 @@
-"""`foreign-mode`: the striker, the stand or a neighbour rings along.
+"""`foreign-mode`: the striker, the stand or a neighbour vibrates too.
 
     y(t) = J Σ_k a_k e^{−d_k t} cos(2πf_k t + φ_k)
         the same f, d wherever the object is struck, a in units of the file per N·s
 
-Read off lines that belong to no mode and whose amplitude goes with the impulse, not with a mode shape.
+Identified by lines that belong to no mode and whose amplitude goes with the impulse, not with a mode shape.
 """
 
 from __future__ import annotations
@@ -36,7 +36,17 @@ APART = 0.004  # from a mode of the body
 
 @dataclass(frozen=True)
 class ForeignMode(RingsAlong):
-    """freq_hz, decay_per_s, amplitude per N·s, phase_rad of each line that is not the body's."""
+    """Lines of another resonator that the same impact excites, one number a line.
+
+    Attributes
+    ----------
+    freq_hz, decay_per_s : (k,)
+        Frequencies and decays.
+    amplitude_per_n_s : (k,)
+        Amplitudes in units of the file per N·s.
+    phase_rad : (k,)
+        Phases at the onset.
+    """
 
     id: ClassVar[str] = "foreign-mode"
     stage: ClassVar[Stage] = Stage.SOUND
@@ -50,27 +60,29 @@ class ForeignMode(RingsAlong):
     phase_rad: tuple[float, ...]
 
     def apply(self, x: Sound) -> Sound:
-        """The sound with the effect in it."""
+        """Add the lines to the sound."""
         a = x.impulse_n_s * np.array(self.amplitude_per_n_s) * np.exp(1j * np.array(self.phase_rad))
         none = np.zeros(len(a))
         ring = Ring(np.array(self.freq_hz), np.array(self.decay_per_s), a, none, none, none)
         return replace(x, sample=x.sample + sounded(ring, Impact(1.0, np.zeros(1), np.ones(1)), len(x.sample), x.sr))
 
     def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Frequencies and decays of what rings."""
+        """Return the frequencies in Hz and decays in 1/s of the lines."""
         return self.freq_hz, self.decay_per_s
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {
             "modes": [list(row) for row in zip(self.freq_hz, self.decay_per_s, self.amplitude_per_n_s, strict=True)]
         }
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 3 * len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Take the strongest lines that are no modes and follow the impulse; None where there are none."""
         rows = [row for h in evidence.observed for row in _steady(h)]
         rows.sort(key=lambda r: -r[2])
         if not rows:
@@ -80,7 +92,7 @@ class ForeignMode(RingsAlong):
 
 
 def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
-    """Lines (f, d, a, φ) that follow the impulse alone."""
+    """Find the lines (f, d, a, φ) that follow the impulse alone."""
     if len(h.foreign_hz) == 0 or len(h.impulse_n_s) < 2 or h.signal is None:
         return []
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
@@ -111,7 +123,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
 
 
 def _alone(freq_hz: Array, size: Array) -> Array:
-    """Which lines (k,) stand for those about them: the loudest first, none within reach of one that does."""
+    """Select the lines (k,) that represent their neighbours: the loudest first, none within reach of a selected one."""
     found = np.zeros(len(freq_hz), bool)
     for k in np.argsort(-size, kind="stable"):
         found[k] = not (found & (np.abs(freq_hz - freq_hz[k]) < max(APART * freq_hz[k], 1 / FRAME_S))).any()
@@ -119,7 +131,7 @@ def _alone(freq_hz: Array, size: Array) -> Array:
 
 
 def _against_level(size: Array, sd: Array, level: Array) -> Array:
-    """Slope (k,) of ln |A|/J against ln J; 0 where the strikes are alike."""
+    """Compute the slope (k,) of ln |A|/J against ln J; 0 where the strikes have one strength."""
     x = np.log(level) - np.log(level).mean()
     if np.ptp(x) < 0.3:
         return np.zeros(size.shape[1])

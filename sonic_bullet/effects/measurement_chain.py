@@ -1,12 +1,12 @@
-"""`measurement-chain`: one filter, limit or tone common to everything recorded.
+"""`measurement-chain`: one filter, limit or tone common to all recordings.
 
     high-pass, low-pass: Butterworth of order 1 to 4, |H|² = 1/(1 + (f/f_c)^{±2n})
         [Oppenheim & Schafer 2010, app. B]
-    limit: samples beyond ± L stand at it
+    limit: samples beyond ± L are set to it
     hum: Σ_i a_i cos(2π i f₀ t + φ_i) that is there before, during and after, however hard the strike
 
-Read off the amplitudes (one factor a frequency for all strikes), the samples at the peak, and the last third of every
-recording.
+Identified by the amplitudes (one factor a frequency for all strikes), the samples at the peak, and the last third of
+every recording.
 """
 
 from __future__ import annotations
@@ -30,8 +30,20 @@ SAME = 2e-3  # of a limit: how far peaks that it has made are apart
 
 @dataclass(frozen=True)
 class MeasurementChain:
-    """high_pass_hz, low_pass_hz with their orders, 0 for none; limit in units of the file, 0 for none; hum_hz and its
-    harmonics' amplitudes.
+    """Filters, limit and hum of the recording equipment.
+
+    Attributes
+    ----------
+    high_pass_hz, low_pass_hz : float
+        Corner frequencies, 0 for none.
+    high_order, low_order : int
+        Orders of the filters.
+    limit : float
+        In units of the file, 0 for none.
+    hum_hz : float
+        Fundamental of the hum, 0 for none.
+    hum_amplitude, hum_phase_rad : (i,)
+        Amplitudes in units of the file and phases at the onset of its harmonics.
     """
 
     id: ClassVar[str] = "measurement-chain"
@@ -50,7 +62,7 @@ class MeasurementChain:
     hum_phase_rad: tuple[float, ...] = ()
 
     def apply(self, x: Sound) -> Sound:
-        """The sound with the effect in it."""
+        """Filter and limit the sound, and add the hum."""
         from scipy.signal import butter, sosfilt
 
         y = x.sample
@@ -68,7 +80,7 @@ class MeasurementChain:
         return replace(x, sample=np.clip(y, -self.limit, self.limit) if self.limit else y)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         found: dict[str, Any] = {}
         if self.high_pass_hz:
             found |= {"high_pass_hz": self.high_pass_hz, "high_order": self.high_order}
@@ -81,6 +93,7 @@ class MeasurementChain:
         return found
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return (
             2 * bool(self.high_pass_hz)
             + 2 * bool(self.low_pass_hz)
@@ -90,6 +103,7 @@ class MeasurementChain:
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Look for a limit, hum and, where there is no limit, a filter; None where none is found."""
         observed = [h for h in evidence.observed if h.signal is not None and h.predicted is not None]
         if not observed:
             return None
@@ -117,11 +131,21 @@ def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool, sr: in
 
 
 def limit_of(signals: list[Array], known: float = 0.0) -> float:
-    """The level at which several samples in a row stand in one recording or more, and that the peak of another is: no
-    two strikes are as loud to SAME. 0 where there is none.
+    """Find the level at which one recording or more is clipped, and which is another's peak.
 
-    signals: by object, recordings (s, n). known: as the whole evidence has it; then one recording that reaches it will
-    do.
+    Two strikes never have the same peak to SAME otherwise.
+
+    Parameters
+    ----------
+    signals : list of (s, n)
+        Recordings by object.
+    known : float
+        Limit found in the whole evidence; then one recording that reaches it is enough.
+
+    Returns
+    -------
+    float
+        The limit in units of the file, 0 where there is none.
     """
     peak = np.concatenate([np.abs(signal).max(axis=1) for signal in signals])
     if known:
@@ -135,15 +159,15 @@ def limit_of(signals: list[Array], known: float = 0.0) -> float:
 
 
 def _stands(row: Array) -> bool:
-    """Whether a recording (n,) is at its peak for long, or often."""
+    """Decide whether a recording (n,) is at its peak for long, or often."""
     stuck = np.abs(row) > 0.998 * np.abs(row).max()
     return bool(np.convolve(stuck, np.ones(STUCK), "valid").max(initial=0) >= STUCK or stuck.sum() > OFTEN)
 
 
 def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
-    """A tone at the mains and its multiples, of one amplitude in all recordings of the object that has most.
+    """Find a tone at the mains and its multiples, of one amplitude in all recordings of the object that has most.
 
-    known_hz: as all evidence had it.
+    known_hz is the frequency found in the whole evidence.
     """
     h = max(observed, key=lambda one: len(one.impulse_n_s))
     assert h.signal is not None
@@ -156,7 +180,7 @@ def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
 
 
 def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[str, Any]:
-    """One high-pass or low-pass that all strikes share."""
+    """Fit one high-pass or low-pass that all strikes share."""
     rows = [_ratio(h) for h in observed if len(h.freq_hz) >= fewest]
     if not rows:
         return {}
@@ -184,9 +208,7 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
 
 
 def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
-    """Per line: frequency, ln of observed over expected amplitude over the strikes, and its spread, which grows where
-    the strikes disagree.
-    """
+    """Compute per line frequency, ln of observed over expected amplitude, and its spread with the strikes' scatter."""
     expected, seen = np.abs(h.expected), np.abs(h.amplitude)
     width = np.hypot(h.amplitude_sd, ROUGH * expected.max(axis=0, keepdims=True)) + 1e-300
     gain = (expected * seen / width**2).sum(axis=0) / np.maximum((expected**2 / width**2).sum(axis=0), 1e-300)
@@ -198,7 +220,7 @@ def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
 
 
 def _misfit(y: Array, sd: Array) -> float:
-    """Cauchy's loss about the best constant."""
+    """Compute Cauchy's loss about the best constant."""
     weight, middle = sd**-2.0, 0.0
     trust = np.ones(len(y))
     for _ in range(8):

@@ -1,11 +1,10 @@
-"""`mode-splitting`: what is symmetric has modes in pairs of one frequency; an imperfection sets them apart and turns
-them to itself.
+"""`mode-splitting`: an imperfection splits the degenerate modes of a symmetric body and fixes their axes.
 
     pair (a, b) at f  ->  cos ψ a + sin ψ b at f(1 − ε/2),  −sin ψ a + cos ψ b at f(1 + ε/2)
         [Perrin & Charnley 1973; Rayleigh 1894, § 221]
 
-Read off two lines 0.1 to 1 % apart where the mesh has a pair: their amplitudes over the strikes give ψ, their distance
-ε.
+Identified by two lines 0.1 to 1 % from each other where the mesh has a pair: their amplitudes over the strikes give ψ,
+their distance ε.
 """
 
 from __future__ import annotations
@@ -40,8 +39,16 @@ PLAINLY, ALSO, STRIKES = (
 
 @dataclass(frozen=True)
 class ModeSplitting(SplitsPairs):
-    """freq_hz (p,) of the pairs, split (p,) relative, turn_rad (p,) from the pair's first mode in the mesh as it is
-    solved.
+    """Split pairs of modes, one number a pair.
+
+    Attributes
+    ----------
+    freq_hz : (p,)
+        Middle frequency of each pair.
+    split : (p,)
+        ε, relative.
+    turn_rad : (p,)
+        ψ, from the pair's first mode in the mesh as it is solved.
     """
 
     id: ClassVar[str] = "mode-splitting"
@@ -55,13 +62,14 @@ class ModeSplitting(SplitsPairs):
     turn_rad: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         finite("freq_hz", *self.freq_hz, least=1e-3)
         finite("split", *self.split, least=0.0, most=2.0)
         finite("turn_rad", *self.turn_rad)
         same_length(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
+        """Split the pairs of a body's modes and turn their axes."""
         freq, shape = x.freq_hz.copy(), x.shape.copy()
         for f, split, turn in zip(self.freq_hz, self.split, self.turn_rad, strict=True):
             if split == 0:
@@ -76,8 +84,17 @@ class ModeSplitting(SplitsPairs):
         return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
 
     def observed_correction(self, freq_hz: Array) -> Array:
-        """How far off (m,), relative, modes at freq_hz (m,) are from the middles of the pairs that were observed; 0
-        for all others.
+        """Compute by how much, relative, modes differ from the middles of the observed pairs.
+
+        Parameters
+        ----------
+        freq_hz : (m,)
+            Frequencies of the mesh's modes, ascending.
+
+        Returns
+        -------
+        (m,)
+            0 for modes that belong to no observed pair.
         """
         off = np.zeros(len(freq_hz))
         for f in self.freq_hz:
@@ -87,7 +104,7 @@ class ModeSplitting(SplitsPairs):
         return off
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {
             "pairs": [
                 {"freq_hz": f, "split": s, "turn_rad": t}
@@ -96,10 +113,12 @@ class ModeSplitting(SplitsPairs):
         }
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 2 * len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Find the pairs of modes that two lines represent; None where there are none."""
         rows: list[tuple[float, ...]] = []
         for h in (h for h in evidence.observed if h.plain is not None):
             if isinstance(evidence.known, cls):
@@ -113,9 +132,9 @@ class ModeSplitting(SplitsPairs):
 
 
 def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
-    """(f, ε, ψ, f over the mesh's) of every pair of modes, their frequencies times ``scale``, that two lines stand for.
+    """Find (f, ε, ψ, f over the mesh's) of every pair of modes, frequencies times ``scale``, that two lines represent.
 
-    A line stands for one mode; the surest pairs choose first. What splits a body splits many: beside some that are
+    A line represents one mode; the most certain pairs choose first. An imperfection splits many pairs: where some are
     plain, others may be less so.
     """
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
@@ -164,8 +183,9 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
 
 
 def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
-    """(f, ε, ψ) of the pairs that are known, by fewer strikes: two lines that only the one left out showed loudly are
-    no single mode because of that.
+    """Estimate (f, ε, ψ) of known pairs from fewer strikes.
+
+    Two lines that only the excluded strike excited strongly are still no single mode.
     """
     assert h.plain is not None
     every, _, amplitude, strike, sensor = _lines(h)
@@ -185,9 +205,7 @@ def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
 
 
 def _lines(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array]:
-    """All lines' frequencies and decays (k,) and amplitudes (s, k); what a strike gives to every mode (s, m), and how
-    the sensor sees them (m,).
-    """
+    """Return f, d (k,) and amplitudes (s, k) of all lines, and the modes' excitation (s, m) and gain at the sensor."""
     assert h.plain is not None
     every = np.concatenate([h.freq_hz, h.foreign_hz])
     decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
@@ -204,7 +222,7 @@ def _lines(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple[float, float]:
-    """ψ by the two lines' patterns (s, 2), and how alike they then are."""
+    """Estimate ψ from the two lines' patterns (s, 2), and the likeness that it gives."""
     observed = (
         np.real(amplitude * np.exp(-1j * np.angle((amplitude**2).sum(axis=0)) / 2)) if signed else np.abs(amplitude)
     )

@@ -1,6 +1,6 @@
-"""Effects in presets, and in the run time: what belongs to a material or an object sounds in every scene.
+"""Effects in presets and in the run time: a material's or an object's effects act in every scene.
 
-{"id": …, fields} <-> Effect;   Material.effects -> MATERIAL before the modes are solved, MODES after, BANK as they ring
+{"id": …, fields} <-> Effect;   Material.effects -> MATERIAL before the modes are solved, MODES after, BANK in the bank
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FILE_NAMES = {"damping_growth": "choke"}
 
 
 def stored(effect: Effect) -> dict[str, Any]:
-    """What a preset file holds of an effect: all but what it does not say (NaN)."""
+    """Return an effect as a preset file holds it: its fields without undefined numbers (NaN)."""
     values = {FILE_NAMES.get(name, name): value for name, value in msgspec.to_builtins(effect).items()}
     return {"id": effect.id} | {
         name: value for name, value in values.items() if not (isinstance(value, float) and np.isnan(value))
@@ -42,7 +42,13 @@ def stored(effect: Effect) -> dict[str, Any]:
 
 
 def effect_of(data: dict[str, Any]) -> Effect:
-    """The effect that `stored` made these of. Raises RecordError naming what is wrong."""
+    """Build an effect from what `stored` returned.
+
+    Raises
+    ------
+    RecordError
+        There is no such effect, or a field is wrong; names it.
+    """
     name = data.get("id")
     kind = next((k for k in KEPT if k.id == name), None)
     if kind is None:
@@ -64,7 +70,7 @@ PLAYED = (Stage.MATERIAL, Stage.MODES, Stage.BANK)
 
 
 def check_effects(material: Material) -> None:
-    """Raise MaterialError where a material has an effect that no scene plays, or what is none."""
+    """Raise MaterialError where a material has an effect that no scene plays, or something else in its place."""
     for number, effect in enumerate(material.effects):
         where = f"material '{material.name}': effects[{number}]"
         remedy = "give effects of sonic_bullet.effects"
@@ -81,18 +87,17 @@ def check_effects(material: Material) -> None:
 
 
 def with_material(material: Material) -> Material:
-    """The material with its effects on stiffness and density in it."""
+    """Apply a material's effects on stiffness and density to it."""
     for effect in of_stage(material, Stage.MATERIAL):
         material = replace(effect.apply(material), effects=material.effects)
     return material
 
 
 def with_modes(model: ModalModel, material: Material) -> ModalModel:
-    """A body's model with its material's effects on modes in it, and on how they ring: bend and damping growth per peak
-    velocity at the surface.
+    """Apply a material's effects on modes to a body's model, and those on how the modes depend on their level.
 
-    Where a level was measured as an impulse, the velocity is what that impulse brings about at a typical place (rms
-    over the surface).
+    Bend and damping growth are per peak velocity at the surface. Where a level was measured as an impulse, the velocity
+    is what that impulse causes at a typical place (rms over the surface).
     """
     if not model.mode_count:
         return model
@@ -119,5 +124,5 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
 
 
 def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:
-    """A material's effects of a stage."""
+    """Return a material's effects of a stage."""
     return [e for e in material.effects if e.stage is stage]

@@ -1,12 +1,12 @@
-"""`radiation`: a mode loses energy to the air as it radiates, and is heard as it does.
+"""`radiation`: a mode loses energy to the air as it radiates, and its level follows the radiation.
 
     Δd = s ½ ρ₀ c σ A,  A = ∮(φ·n)² dS,  σ = (ka)²/(1 + (ka)²) with a net flow of volume, (ka)⁴/(4 + (ka)⁴) without
         [k = ω/c; Kinsler et al. 2000, ch. 7;
     Fahy & Gardonio 2007, ch. 3: the pulsating and the oscillating sphere]
-    level tilts as √σ where the sensor hears the far field
+    level tilts as √σ where the sensor is in the far field
 
-Read off the decays beside Rayleigh's: what is left grows with ka, then flattens, and goes with each mode's own area A.
-How steeply it grows, decays say too.
+Identified by the decays above Rayleigh's: the difference grows with ka, then flattens, and goes with each mode's own
+area A. The decays give the order of ka, too.
 """
 
 from __future__ import annotations
@@ -33,10 +33,18 @@ ORDERS: tuple[int, ...] = (2, 4)
 
 @dataclass(frozen=True)
 class Radiation(Alternatives):
-    """Radius a of the equivalent source in m; strength s against the law's own 1; tilt: exponent of σ in the level at
-    the sensor, 0 or ½.
+    """Loss of modes by radiation, of one equivalent source.
 
-    order: of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
+    Attributes
+    ----------
+    radius_m : float
+        Radius a of the source.
+    strength : float
+        s, 1 by the law.
+    tilt : float
+        Exponent of σ in the level at the sensor, 0 or ½.
+    order : int
+        Of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
     """
 
     id: ClassVar[str] = "radiation"
@@ -51,12 +59,12 @@ class Radiation(Alternatives):
     order: int = 2
 
     def efficiency(self, freq_hz: Array) -> Array:
-        """σ (k,)."""
+        """Compute σ (k,) at frequencies (k,) in Hz."""
         low = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / SOUND) ** self.order
         return np.asarray(low / (self.order**2 / 4 + low))
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
+        """Add the loss to the decays of a body's modes, and the tilt to their levels at the sensor."""
         sigma = self.efficiency(x.freq_hz)
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(x.decay_per_s + self.strength * 0.5 * IMPEDANCE * sigma * areas(x), 0.99 * omega)
@@ -67,18 +75,20 @@ class Radiation(Alternatives):
         return ascending(x, freq, decay, shape)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {"radius_m": self.radius_m, "strength": self.strength, "tilt": self.tilt, "order": self.order}
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 2
 
     def others(self) -> tuple[Radiation, ...]:
-        """The same energy, observed otherwise: another effect's roll-off may have taken up the tilt, or left it."""
+        """Return the same loss with the other tilt, as another effect's roll-off may hide or imitate it."""
         return (replace(self, tilt=0.5 - self.tilt),)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit radius, order and strength to the decays and the tilt to the levels; None where none is identified."""
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
         with_decay = int((~np.isposinf(observed.decay_sd_per_s)).sum())  # in a room some lines tell no decay
         if (
@@ -124,7 +134,7 @@ class Radiation(Alternatives):
 
 
 def areas(x: ModalModel) -> Array:
-    """A = ∮(φ·n)² dS (m,) in 1/kg·m²."""
+    """Compute A = ∮(φ·n)² dS (m,) in m²/kg of a model's modes."""
     corner = x.vertex_m[x.face]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2
     size = np.linalg.norm(normal, axis=1)
@@ -140,21 +150,18 @@ def areas(x: ModalModel) -> Array:
 
 
 def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
+    """Fit decays by columns, and return the coefficients and what is left."""
     value, left = solved(decay, sd, columns)
     return value, float(left.sum())
 
 
 def _off(observed: ObjectEvidence, made: Radiation, tilt: float) -> Array:
-    """ln of every line's level (k,) over the expected one, as the strikes agree on, less the tilt and what is
-    common.
-    """
+    """Compute ln of every line's level (k,) over the expected one, median of the strikes, less tilt and common gain."""
     ratio = np.log(np.maximum(np.abs(observed.amplitude), 1e-300) / np.maximum(np.abs(observed.expected), 1e-300))
     left = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(observed.freq_hz))
     return np.asarray(left - np.median(left))
 
 
 def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float:
-    """Twice the negative log likelihood of the levels' misfit under Cauchy's law: lines that stand for other modes are
-    far off.
-    """
+    """Compute twice the negative log likelihood (Cauchy) of the levels' misfit: lines of other modes lie far off."""
     return float(2 * np.log1p((_off(observed, made, tilt) / SCATTER) ** 2).sum())

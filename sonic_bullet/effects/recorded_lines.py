@@ -1,12 +1,11 @@
-"""`recorded-lines`: the modes of an object whose shape nobody measured: lines as they were recorded, at the level of
-the body that plays them.
+"""`recorded-lines`: the modes of an object of unknown shape: recorded lines, at the level of the body that uses them.
 
     φ_k(x) = s_k g_k(x) n(x),   p_k ∝ s_k² √σ_k ρ₀c √(S/4π),   σ = (ka)²/(1 + (ka)²)       [Chadwick, Zheng, James 2012]
     s_k² √σ_k ∝ A_k,   Σ_k p_k²/4d_k of the lines = Σ_j p_j²/4d_j of the body's own modes
 
-What a place does is not known: each line is struck alike everywhere, but for g_k, a smooth field of unit mean whose
-spread in dB is that of the takes. Decays are total, as recorded. The level of a recording without calibration says
-nothing in pascals: sound energy per impulse is that of the body's own modes in its material.
+The effect of the place is unknown: each line is excited alike everywhere, but for g_k, a smooth field of unit mean
+whose spread in dB is that of the recorded strikes. Decays are total, as recorded. The level of a recording without
+calibration gives no pascals: sound energy per impulse is that of the body's own modes in its material.
 """
 
 from __future__ import annotations
@@ -29,8 +28,16 @@ MOST_LINES = 512
 
 @dataclass(frozen=True)
 class RecordedLines:
-    """freq_hz, decay_per_s, amplitude and spread_db: one number a line, ascending. amplitude: of a strike, relative to
-    one another; spread_db: standard deviation from strike to strike.
+    """Recorded lines in place of modes, one number a line, ascending.
+
+    Attributes
+    ----------
+    freq_hz, decay_per_s : (k,)
+        Frequencies and decays.
+    amplitude : (k,)
+        Of a strike, relative to one another.
+    spread_db : (k,)
+        Standard deviation from strike to strike.
     """
 
     id: ClassVar[str] = "recorded-lines"
@@ -47,6 +54,7 @@ class RecordedLines:
     spread_db: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         fields = self._columns()
         same_length(**fields)
         for name, values in fields.items():
@@ -57,7 +65,7 @@ class RecordedLines:
             raise RecordError("lines are not ascending, or one has no frequency or decay", "give ascending lines")
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The body with these lines in place of its modes; the body as it is where it has no surface or no mode."""
+        """Replace a body's modes by the lines; a body without a surface or a mode stays as it is."""
         if not len(x.face) or not x.mode_count:
             return x
         freq, decay, size, spread = (
@@ -84,10 +92,11 @@ class RecordedLines:
         )
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {name: list(values) for name, values in self._columns().items()}
 
     def _columns(self) -> dict[str, tuple[float, ...]]:
+        """Return the four fields by name."""
         return {
             "freq_hz": self.freq_hz,
             "decay_per_s": self.decay_per_s,
@@ -96,16 +105,17 @@ class RecordedLines:
         }
 
     def freedom(self) -> int:
+        """Count its numbers: frequency, decay and amplitude of each line."""
         return 3 * len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        """None: a fit states it where there is no shape."""
+        """Return None: a fit sets this effect where there is no shape."""
         return None
 
 
 def _vertex_normals(x: ModalModel) -> tuple[Array, Array]:
-    """Unit normals (v, 3) and the share of the surface in m² (v,) of each vertex."""
+    """Compute unit normals (v, 3) and the part of the surface in m² (v,) of each vertex."""
     corner = x.vertex_m[x.face]
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
     normal, share = np.zeros((len(x.vertex_m), 3)), np.zeros(len(x.vertex_m))
@@ -117,8 +127,9 @@ def _vertex_normals(x: ModalModel) -> tuple[Array, Array]:
 
 
 def _loudness(freq_hz: Array, normal_motion: Array, area_m2: Array, radius_m: float) -> Array:
-    """Pressure (m,) that an impulse leaves of each mode, up to one factor: rms normal motion (v, m) where it is struck,
-    times √(σ ∮(φ·n)²dS) on the way to the air.
+    """Compute the pressure (m,) of each mode per impulse, up to one factor.
+
+    It is the rms normal motion (v, m) where the body is struck times √(σ ∮(φ·n)²dS) of the radiation.
     """
     square = (normal_motion**2 * area_m2[:, None]).sum(axis=0)
     ka = 2 * np.pi * freq_hz / SOUND_SPEED_M_S * radius_m
@@ -126,7 +137,7 @@ def _loudness(freq_hz: Array, normal_motion: Array, area_m2: Array, radius_m: fl
 
 
 def _uneven(vertex_m: Array, spread_db: Array) -> Array:
-    """Smooth fields (v, m) of spread_db over the surface, seeded by the body's own vertices."""
+    """Make smooth fields (v, m) of spread_db over the surface, seeded by the number of vertices."""
     place = vertex_m - vertex_m.mean(axis=0)
     place = place / np.maximum(np.sqrt((place**2).mean(axis=0)), 1e-12)
     rng = np.random.default_rng(len(vertex_m))

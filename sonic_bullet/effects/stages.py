@@ -1,10 +1,10 @@
-"""Where effects act: the stages in which sound is made, and the values of those that have none elsewhere.
+"""Stages at which effects act, and the values of the stages that have no record elsewhere.
 
 MATERIAL  Material   -> Material      stiffness, density: the host solves the modes again
 MODES     ModalModel -> ModalModel    frequencies, decays, shapes
-FORCE     Impact     -> Impact        when, how long, how often a strike presses
-BANK      Ring       -> Ring          how a ringing mode depends on its own level
-SOUND     Sound      -> Sound         what happens on the way to the file
+FORCE     Impact     -> Impact        times, durations and number of a strike's hits
+BANK      Ring       -> Ring          how a vibrating mode depends on its own level
+SOUND     Sound      -> Sound         processing on the way to the file
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sonic_bullet.records import Array
 
 
 class Stage(Enum):
-    """Where an effect acts, in the order in which sound is made."""
+    """Stage at which an effect acts, in the order in which sound is made."""
 
     MATERIAL = "material"
     MODES = "modes"
@@ -27,8 +27,20 @@ class Stage(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Impact:
-    """A strike of impulse_n_s: h hits after delay_s (h,), each with share (h,) of it, each a pulse of the duration
-    tau_s, 0 for none. pulse: see `pulses`.
+    """One strike: its hits, each a force pulse.
+
+    Attributes
+    ----------
+    impulse_n_s : float
+        Impulse of the whole strike.
+    delay_s : (h,)
+        Time of each hit.
+    share : (h,)
+        Fraction of the impulse in each hit.
+    tau_s : float
+        Duration of the pulse of a hit, 0 for none.
+    pulse : str
+        Form of the pulse, one of `pulses.PULSES`, or "impulse".
     """
 
     impulse_n_s: float
@@ -38,7 +50,18 @@ class Impact:
     pulse: str = "impulse"
 
     def spectrum(self, freq_hz: Array) -> Array:
-        """Complex share (f,) of the impulse that a mode at freq_hz takes from one hit, the hit beginning at 0."""
+        """Compute the fraction of the impulse that modes take from one hit which begins at 0.
+
+        Parameters
+        ----------
+        freq_hz : (f,)
+            Frequencies of the modes.
+
+        Returns
+        -------
+        (f,) complex
+            F̂(f)/F̂(0) of the pulse, the first equation of effects/common/pulses.py.
+        """
         from sonic_bullet.effects.common.pulses import spectrum
 
         return spectrum(self.pulse, self.tau_s, freq_hz)
@@ -46,11 +69,24 @@ class Impact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """m modes as one strike starts them: freq_hz, decay_per_s (m,), amplitude (m,) complex at the sensor; level (m,):
-    peak velocity at the surface in m/s.
+    """Modes as one strike excites them.
 
-    bend, damping_growth (m,): relative change of frequency bend·level², of decay
-    (damping_growth·level)^damping_growth_power, 1 or 2; 0 in a linear body.
+    Attributes
+    ----------
+    freq_hz, decay_per_s : (m,)
+        Frequencies and decays.
+    amplitude : (m,) complex
+        At the sensor.
+    level : (m,)
+        Peak velocity at the surface in m/s.
+    bend : (m,)
+        Relative change of frequency is bend·level²; 0 in a linear body.
+    damping_growth : (m,)
+        Relative change of decay is (damping_growth·level)^damping_growth_power; 0 in a linear body.
+    impulse_n_s : float
+        Impulse of the strike.
+    damping_growth_power : float
+        1 or 2.
     """
 
     freq_hz: Array
@@ -65,9 +101,18 @@ class Ring:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sound:
-    """A strike's sound (n,) in units of the file, from the onset on, and what made it.
+    """Sound of a strike from the onset on.
 
-    impulse_n_s: 1 where unknown. direct (n,): the first sound, untouched.
+    Attributes
+    ----------
+    sample : (n,)
+        In units of the file.
+    sr : int
+        Sampling rate in Hz.
+    impulse_n_s : float
+        Impulse of the strike; 1 where unknown.
+    strike : int
+        Index among the fitted strikes, where an effect was fitted to each of them; else -1.
     """
 
     sample: Array

@@ -1,15 +1,15 @@
-"""`added-mass`: a sensor, a blob of wax, water: a small mass that rides on one point.
+"""`added-mass`: a sensor, a blob of wax, water: a small mass attached at one point.
 
     (Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3)      to first order Δλ/λ = −m |φ(p)|²
         [Rayleigh 1894, § 88-90; modal synthesis]
 
-R: what the modes above the band yield at the point, along its normal and across: residual attachment modes far above
-them [Rubin 1975]. Without it a point mass is held too stiffly, and its higher modes come out several per cent high.
-Read off frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's,
-lines are paired with the loaded body's modes anew; the pairs that agree best stand, where they agree better than the
-bare body's. E/ρ was fitted to lines that the mass had lowered, so the common scale of all frequencies is looked for
-along with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R). So was ν: what is twisted and what is
-bent had been lowered differently. A free body moves against the mass as a whole (free_body.py): m' in m's place.
+R is the compliance of the modes above the band at the point, along its normal and across: residual attachment modes far
+above them [Rubin 1975]. Without it the point is too stiff, and its higher modes come out several per cent high.
+Identified by frequencies and patterns together: for points all over the surface and masses up to a sixth of the body's,
+lines are paired with the loaded body's modes anew; the pairs that agree best are taken, where they agree better than
+the bare body's. E/ρ was fitted to lines that the mass had lowered, so the common scale of all frequencies is fitted
+with it, on the bare body as well: λ(Λ e^{2s}, R e^{−2s}) = e^{2s} λ(Λ, R). So is ν: torsion and bending had been
+lowered differently. A free body moves against the mass as a whole (free_body.py): m' in m's place.
 """
 
 from __future__ import annotations
@@ -43,11 +43,20 @@ BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired we
 
 @dataclass(frozen=True)
 class AddedMass(ChangesBaseline):
-    """mass_kg attached at position_m (3,) of the surface, in the mesh's frame. yield_m_n: along the normal and across
-    it, of what the model's modes leave out.
+    """A point mass on the surface, and what was fitted of the bare body with it.
 
-    stretch: ln of what all frequencies of the bare body are to the baseline's; poisson_ratio: its ν, None for the
-    baseline's. The host takes them over.
+    Attributes
+    ----------
+    position_m : (3,)
+        In the mesh's frame.
+    mass_kg : float
+        The mass.
+    yield_m_n : (2,)
+        Compliance along the normal and across it of the modes above the model's, m/N.
+    stretch : float
+        ln of all frequencies of the bare body over the baseline's, which the host takes over.
+    poisson_ratio : float
+        ν of the bare body, which the host takes over; None for the baseline's.
     """
 
     id: ClassVar[str] = "added-mass"
@@ -63,7 +72,7 @@ class AddedMass(ChangesBaseline):
     poisson_ratio: float | None = None
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
+        """Compute the modes of the body with the mass."""
         if not x.mode_count or self.mass_kg == 0:
             return x
         at = nearest(x, self.position_m)
@@ -76,19 +85,21 @@ class AddedMass(ChangesBaseline):
         )
 
     def baseline_change(self) -> BaselineChange:
-        """E/ρ and ν of the bare body, found along with the mass."""
+        """Return E/ρ and ν of the bare body, found with the mass."""
         return BaselineChange(stretch=self.stretch, poisson_ratio=self.poisson_ratio)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         place = {"mass_kg": self.mass_kg, "position_m": list(self.position_m), "yield_m_n": list(self.yield_m_n)}
         return {**place, "stretch": self.stretch, "poisson_ratio": self.poisson_ratio}
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 8
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Search the surface for the mass that explains the lines best; None where the bare body does as well."""
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
         if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
             return None
@@ -141,7 +152,7 @@ class AddedMass(ChangesBaseline):
 
     @classmethod
     def _at(cls, x: ModalModel, found: Scored, poisson_identified: bool) -> Self:
-        """poisson_identified: whether ν is."""
+        """Build the effect from what a search found; poisson_identified: whether ν was."""
         _, vertex, mass_kg, along, shift, ratio = found
         place = x.vertex_m[vertex]
         up, side = (float(y * np.exp(-2 * shift)) for y in along)
@@ -155,11 +166,10 @@ class AddedMass(ChangesBaseline):
 
 
 def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Array, Array, float]) -> bool:
-    """Whether the bare body's modes are where the lines are, or most of what sounds (s, k) is: a mass leaves few in
-    place, and something else splits or bends the others.
+    """Decide whether the bare body's modes, or most of the lines' strength (s, k), are where the lines are.
 
-    Of degenerate modes a mass leaves one, which stands still under it: only modes without a degenerate partner are
-    asked.
+    A mass leaves few modes in place, and something else splits or bends the others. Of degenerate modes a mass leaves
+    one, which has a node at it, so only modes without a degenerate partner count.
     """
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)

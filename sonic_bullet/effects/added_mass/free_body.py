@@ -1,4 +1,4 @@
-"""How a free body gives way as a whole: what a mass that rides on it drags along, and the body moves against it.
+"""Rigid motion of a free body with a point mass: the body moves against the mass.
 
     G(v, p) = 1/M + [r_v×]ᵀ J⁻¹ [r_p×]      ∂²u(v)/∂t² = G(v, p) f(p),   r about the centre of mass
         [Newton, Euler]
@@ -26,7 +26,17 @@ OPEN = 0.1  # of the volume: a surface that encloses another is no body's
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeBody:
-    """mass_kg, centre_m (3,), and the inverse (3, 3) of the inertia about it."""
+    """Mass properties of a free body.
+
+    Attributes
+    ----------
+    mass_kg : float
+        The mass.
+    centre_m : (3,)
+        Centre of mass.
+    turns : (3, 3)
+        Inverse of the inertia about it, 1/(kg m²).
+    """
 
     mass_kg: float
     centre_m: Array
@@ -34,7 +44,7 @@ class FreeBody:
 
     @classmethod
     def of(cls, x: ModalModel) -> FreeBody | None:
-        """A model's; None where it is held, or its surface encloses nothing."""
+        """Compute the properties of a model's body; None where it is held, or its surface encloses nothing."""
         if not len(x.face) or not x.mode_count or x.mass_kg <= 0 or x.volume_m3 <= 0:
             return None
         if abs(volume_m3(x.vertex_m, x.face) / x.volume_m3 - 1) > OPEN:
@@ -46,13 +56,26 @@ class FreeBody:
         return cls(x.mass_kg, centre, np.linalg.inv(tensor))
 
     def gives(self, at_m: Array, place_m: Array) -> Array:
-        """G (v, 3, 3) of points at_m (v, 3) where place_m (3,) is pushed."""
+        """Compute the acceleration of points per force at another, rigid motion alone.
+
+        Parameters
+        ----------
+        at_m : (v, 3)
+            The points.
+        place_m : (3,)
+            Where the force acts.
+
+        Returns
+        -------
+        (v, 3, 3)
+            G in 1/kg, the module's first equation.
+        """
         arm, lever = (_cross(np.asarray(p, float) - self.centre_m) for p in (at_m, place_m))
         return np.asarray(np.eye(3) / self.mass_kg + np.swapaxes(arm, -1, -2) @ self.turns @ lever)
 
 
 def _cross(r: Array) -> Array:
-    """[r×] (…, 3, 3)."""
+    """Build the matrices [r×] (…, 3, 3)."""
     x, y, z = r[..., 0], r[..., 1], r[..., 2]
     none = np.zeros_like(x)
     return np.stack([np.stack([none, -z, y], -1), np.stack([z, none, -x], -1), np.stack([-y, x, none], -1)], -2)

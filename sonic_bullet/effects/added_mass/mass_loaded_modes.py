@@ -1,5 +1,4 @@
-"""A model with a mass on one of its points: what the point yields, what the body gives way as a whole, and the modes
-that come of it.
+"""Modes of a model with a mass at one of its points, with the point's compliance and the body's rigid motion.
 
 (Λ − λ (1 + Φᵀ m' Φ)) q = 0,  Φ = (φ(p), √(λ_r R)) (3, n + 3),  m' = (1/m + G(p, p))⁻¹ (3, 3)
     [added_mass/__init__.py, free_body.py]
@@ -18,8 +17,23 @@ FAR = 16.0  # of the highest mode's λ: where what is left of the modes is put
 
 
 def attached(phi: Array, normal: Array, yield_m_n: tuple[float, float], x: ModalModel) -> Array:
-    """Φ (3, m + 3) of a point where the modes are phi (3, m) and the rest yields so much along its normal (3,) and
-    across.
+    """Extend a point's mode shapes by residual attachment modes.
+
+    Parameters
+    ----------
+    phi : (3, m)
+        Shapes at the point.
+    normal : (3,)
+        Unit normal there.
+    yield_m_n : (2,)
+        Compliance along the normal and across it of the modes above the model's, m/N.
+    x : ModalModel
+        The model.
+
+    Returns
+    -------
+    (3, m + 3)
+        Φ, in 1/√kg.
     """
     axis = np.linalg.qr(np.column_stack([normal, np.eye(3)]))[0]
     root = np.sqrt(np.array([yield_m_n[0], yield_m_n[1], yield_m_n[1]]) * FAR * x.omega0_squared_per_s2.max())
@@ -29,9 +43,25 @@ def attached(phi: Array, normal: Array, yield_m_n: tuple[float, float], x: Modal
 def loaded(
     x: ModalModel, phi: Array, mass_kg: float, place_m: Array | None = None, body: FreeBody | None = None
 ) -> ModalModel:
-    """The model with a mass where its modes, and three far above them, are phi (3, m + 3).
+    """Compute the modes of a model with a mass.
 
-    body: what gives way as a whole, at place_m (3,).
+    Parameters
+    ----------
+    x : ModalModel
+        The bare body.
+    phi : (3, m + 3)
+        Φ of `attached`, at the mass's place.
+    mass_kg : float
+        The mass.
+    place_m : (3,)
+        Its place, for a free body.
+    body : FreeBody
+        Rigid motion of the body; None where it is held.
+
+    Returns
+    -------
+    ModalModel
+        As many modes, ascending.
     """
     own = x.mode_count
     felt: Array = mass_kg * np.eye(3)

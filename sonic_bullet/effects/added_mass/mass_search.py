@@ -1,4 +1,4 @@
-"""Search for the mass that makes of a body's modes the lines that were observed: its price, and the best near a start.
+"""Search for the mass that explains the observed lines: its cost, and the best near a start.
 
 price(vertex, m, R, s, ν) = Σ pairs (pairs.py) + ((ν − ν_guess)/σ_ν)²/18       as much as a line so many widths off
 places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on the pairs' ln f, Cauchy's weights
@@ -33,14 +33,15 @@ PEAKS = 2  # of those shifts, tried further
 
 
 def strict(width: float) -> float:
-    """κ of `pairs`: angles between patterns are held as much more closely as frequencies; in the end a mode may sound
-    at a strike as 8 % of its strongest does, not more.
+    """Compute κ of `pairs`, the weight of the angles between patterns, for a width of ln f.
+
+    It grows as the square of the frequencies' weight: in the end a mode's amplitude may be off by 8 % of its strongest.
     """
     return (WIDTHS[0] / width) ** 2
 
 
 def _at_points(x: ModalModel, observed: ObjectEvidence) -> ModalModel:
-    """The model at its strikes and sensor alone: what a trial needs."""
+    """Restrict a model to its strikes and sensor, as a trial needs no more."""
     rows = np.append(observed.strike_vertex, observed.sensor_vertex)
     return replace(
         x, shape=x.shape[rows], vertex_m=x.vertex_m[rows], face=np.zeros((0, 3), np.int32), curvature_per_m=np.zeros(0)
@@ -53,8 +54,26 @@ Scored = tuple[float, int, float, tuple[float, float], float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassFit:
-    """Prices of masses on one object: its lines and sizes, its bare model, that at strikes and sensor alone, and its
-    normals.
+    """Costs of masses on one object.
+
+    Attributes
+    ----------
+    observed : ObjectEvidence
+        The object.
+    line : (k,)
+        Frequencies of its lines in Hz.
+    size : (s, k)
+        Magnitudes of their amplitudes.
+    bare : ModalModel
+        The model without mass.
+    small : ModalModel
+        The same at strikes and sensor alone.
+    normal : (v, 3)
+        Unit normals of `bare`.
+    free : FreeBody
+        Rigid motion; None where the body is held.
+    kept : dict
+        Cache of `at` by ν.
     """
 
     observed: ObjectEvidence
@@ -68,6 +87,7 @@ class MassFit:
 
     @classmethod
     def of(cls, observed: ObjectEvidence) -> MassFit:
+        """Prepare the fit of an object."""
         assert observed.plain is not None
         line, size, _, _ = every_line(observed)
         return cls(
@@ -81,8 +101,9 @@ class MassFit:
         )
 
     def rest(self, vertex: int) -> tuple[float, float]:
-        """What modes above the band may yield at a vertex, along its normal and across, in m/N: Σ φ²/λ where as many go
-        on moving as much with every hertz.
+        """Compute the compliance of the modes above the band at a vertex, along its normal and across, in m/N.
+
+        It is Σ φ²/λ, if as many modes with as much motion follow above the band in every hertz.
         """
         motion = (self.bare.shape[vertex].astype(float) ** 2).sum(axis=0)
         up = (self.normal[vertex] @ self.bare.shape[vertex].astype(float)) ** 2
@@ -91,17 +112,18 @@ class MassFit:
 
     @property
     def fitted(self) -> float:
-        """The baseline's ν."""
+        """Return the baseline's ν."""
         return self.observed.poisson.fitted if self.observed.poisson is not None else 0.0
 
     def unlikely(self, ratio: float) -> float:
-        """Price of a ν, by how far it is from what was known of it."""
+        """Compute the cost of a ν by its distance from the previous estimate."""
         poisson_range = self.observed.poisson
         return 0.0 if poisson_range is None else ((ratio - poisson_range.guess) / poisson_range.sd) ** 2 / 18
 
     def at(self, ratio: float) -> tuple[ModalModel, Array | None]:
-        """The bare model at strikes and sensor at a ν, and its modes as sums (m, m) of the baseline's, None where they
-        are those.
+        """Return the bare model at strikes and sensor at a ν, and its modes as sums (m, m) of the baseline's.
+
+        None stands for the baseline's own modes.
         """
         poisson_range = self.observed.poisson
         if poisson_range is None or ratio == poisson_range.fitted:
@@ -118,7 +140,19 @@ class MassFit:
         return self.kept[ratio]
 
     def loaded(self, vertex: int, mass: float, along: tuple[float, float], ratio: float) -> tuple[Array, Array]:
-        """Frequencies (m,) with the mass on, and patterns (s, m)."""
+        """Compute frequencies (m,) and patterns (s, m) with a mass.
+
+        Parameters
+        ----------
+        vertex : int
+            Where the mass is.
+        mass : float
+            In kg.
+        along : (2,)
+            Compliance along the normal and across, m/N.
+        ratio : float
+            ν of the body.
+        """
         small, sums = self.at(ratio)
         phi = self.bare.shape[vertex].astype(float)
         phi = attached(phi if sums is None else phi @ sums, self.normal[vertex], along, small)
@@ -129,8 +163,9 @@ class MassFit:
         return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), observed.sensor_direction))
 
     def shifts(self, freq_hz: Array, pattern: Array) -> list[float]:
-        """None, and the common shifts of modes that most lines of their patterns (s, m) agree on, as two spectra on a
-        logarithmic axis.
+        """Find common shifts of ln f at which most lines and modes of like patterns (s, m) agree, and none.
+
+        By correlation of the two spectra on a logarithmic axis.
         """
         alike = 1.0
         if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(pattern).all():
@@ -145,14 +180,14 @@ class MassFit:
         return [0.0, *(float(edge[i] + BINS / 2) for i in best)]
 
     def sifted(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> list[Scored]:
-        """At each of its shifts."""
+        """Compute the costs of a mass at each of the shifts that its lines suggest."""
         made = self.loaded(vertex, mass, along, self.fitted)
         return [self._scored(made, vertex, mass, along, shift, self.fitted, width) for shift in self.shifts(*made)]
 
     def scored(
         self, vertex: int, mass: float, along: tuple[float, float], shift: float, ratio: float, width: float
     ) -> Scored:
-        """The price of the best pairs first; near a shift."""
+        """Compute the cost of a mass, near a common shift of ln f."""
         return self._scored(self.loaded(vertex, mass, along, ratio), vertex, mass, along, shift, ratio, width)
 
     def _scored(
@@ -165,13 +200,14 @@ class MassFit:
         ratio: float,
         width: float,
     ) -> Scored:
+        """Compute the cost of modes at hand, near a common shift."""
         price, _, _, found = agreed(
             self.line, self.size, *made, shift=shift, turns=1, width=width, strict=strict(width)
         )
         return price + self.unlikely(ratio), vertex, mass, along, found, ratio
 
     def refined(self, best: Scored, widths: tuple[float, ...] = WIDTHS) -> Scored:
-        """The best of nearby vertices, masses and yields, in turns."""
+        """Search nearby vertices, masses and compliances in turns, at each width of ln f."""
         for width in widths:
             best = self.scored(*best[1:], width)
             reach = 0.12 * float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
@@ -187,6 +223,7 @@ class MassFit:
         return best
 
     def _around(self, best: Scored, reach: float, width: float) -> list[Scored]:
+        """Compute the costs of neighbouring vertices, masses, compliances and ν."""
         _, vertex, mass, (up, side), shift, ratio = best
         at = self.bare.vertex_m
         body = np.unique(self.bare.face)
@@ -202,7 +239,7 @@ class MassFit:
         return found + [self.scored(vertex, mass, (up, side), shift, r, width) for r in other]
 
     def _solid(self, ratio: float) -> float:
-        """A ν that there may be, by what was known of it, in steps that keep few."""
+        """Limit a ν to the range of its previous estimate, in steps, so that few models are cached."""
         poisson_range = self.observed.poisson
         if poisson_range is None:
             return ratio
@@ -215,7 +252,7 @@ class MassFit:
         )
 
     def polished(self, best: Scored, width: float) -> Scored:
-        """The same with its numbers at its place fitted to its pairs, which are assigned again with every step."""
+        """Fit mass, compliances, shift and ν at one vertex to its pairs, which are assigned anew with every step."""
         for _ in range(POLISH):
             step = self._step(best, width)
             better = best
@@ -229,7 +266,7 @@ class MassFit:
         return best
 
     def _stepped(self, best: Scored, step: Array) -> tuple[int, float, tuple[float, float], float, float]:
-        """By ln m, ln R along and across, ν and s."""
+        """Apply a step of ln m, ln R along and across, ν and s."""
         _, vertex, mass, along, shift, ratio = best
         up, side = (max(y, LEAST * r) * np.exp(d) for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True))
         return (
@@ -241,7 +278,7 @@ class MassFit:
         )
 
     def _step(self, best: Scored, width: float) -> Array:
-        """Gauss and Newton's (5,), as little as MOST at once; where lines say nothing of a number it stays."""
+        """Compute the step (5,) of Gauss and Newton, at most MOST; a number without influence on the lines stays."""
         _, _, _, _, shift, ratio = best
         made = self.loaded(best[1], best[2], best[3], ratio)
         _, row, column, shift = agreed(

@@ -3,9 +3,9 @@
     ȧ = −d a (1 + (c a)^p)      ->      (a₀/a(t))^p = (1 + (c a₀)^p) e^{pdt} − (c a₀)^p
         [Adhikari 2013, ch. 1; equivalent damping: Nayfeh & Mook 1979, § 3.3]
 
-p = 1: drag that goes with velocity²; p = 2: with velocity³. Read off the envelopes of single modes, or degenerate
-modes: early decay faster than late, the more so the harder the strike; d is the mode's, c of all, and degenerate modes
-have the axes that the envelopes tell (axes.py).
+p = 1: drag that goes with velocity²; p = 2: with velocity³. Identified by the envelopes of single modes, or degenerate
+modes: early decay faster than late, the more so the harder the strike; d is the mode's, c common to all, and degenerate
+modes have the axes that the envelopes give (axes.py).
 """
 
 from __future__ import annotations
@@ -52,11 +52,24 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 @dataclass(frozen=True)
 class AmplitudeDamping(RotatesPairs, ChangesBaseline):
-    """damping_growth: 1/level at which the decay has doubled; power: of the level, with which it rises, 1 or 2.
-    measure: as in amplitude-pitch. alpha_per_s, beta_s: the material's, as the decays at low level tell them.
+    """Decay that grows with the level, and what was fitted with it.
 
-    louder: modes at the onset over what the linear model plays, as its lines miss some of a fall that is no
-    exponential. freq_hz, turn_rad: of degenerate modes, and how far their axes are turned from the mesh's.
+    Attributes
+    ----------
+    damping_growth : float
+        c, 1/level at which the decay has doubled.
+    measure : str
+        Measure of the level, one of `amplitude_pitch.MEASURES`.
+    alpha_per_s, beta_s : float
+        The material's α and β by the decays at low level; NaN for the baseline's.
+    louder : float
+        Modes at the onset over the linear model's, as its lines underestimate an envelope that is no exponential.
+    freq_hz : (p,)
+        Frequencies of degenerate modes.
+    turn_rad : (p,)
+        Angles by which their axes are turned from the mesh's.
+    power : float
+        p, 1 or 2.
     """
 
     id: ClassVar[str] = "amplitude-damping"
@@ -75,6 +88,7 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
     power: float = 1.0
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         one_of("power", self.power, POWERS)  # of drag: others have no closed form
         one_of("measure", self.measure, MEASURES)
         finite("choke", self.damping_growth, least=0.0)
@@ -84,7 +98,7 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
         same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 
     def apply(self, x: Ring) -> Ring:
-        """The ringing with the effect in it."""
+        """Add the damping growth to the modes in the bank."""
         return replace(
             x,
             damping_growth=x.damping_growth + self.damping_growth * _per_velocity(x, self.measure),
@@ -92,31 +106,33 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
         )
 
     def turned(self, x: ModalModel) -> ModalModel:
-        """The modes as they were, degenerate modes about their own axes."""
+        """Turn degenerate modes to their own axes."""
         return turned(x, self.freq_hz, self.turn_rad)
 
     def angles(self) -> int:
-        """How many of its numbers are axes of degenerate pairs."""
+        """Count its numbers that are axes of degenerate pairs."""
         return len(self.turn_rad)
 
     def baseline_change(self) -> BaselineChange:
-        """The material's α and β, as the decays at low level state them, and by how much lines miss the onset."""
+        """Return the material's α and β by the decays at low level, and the gain at the onset."""
         if not np.isfinite(self.alpha_per_s):
             return BaselineChange(onset_gain=self.louder)
         return BaselineChange(self.alpha_per_s, self.beta_s, onset_gain=self.louder)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         degenerate = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
         return {"choke": self.damping_growth, "measure": self.measure, "power": self.power} | (
             {"twins": degenerate} if degenerate else {}
         )
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 2 + len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit a common damping growth to the envelopes of each object; None where no object's lines agree on one."""
         best: tuple[float, Self] | None = None
         known = evidence.known if isinstance(evidence.known, cls) else None
         for h in evidence.observed:
@@ -151,7 +167,7 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """c, what it is worth in ln variance, and what every line says under it."""
+    """A damping growth, its gain in ln variance, and every line's fit under it."""
 
     damping_growth: float
     gain: float
@@ -159,8 +175,9 @@ class _Fit:
 
 
 def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
-    """The damping growth that all lines agree on; None where it is not one that they are sure of. known: what all
-    evidence said, if this is a part of it.
+    """Fit the damping growth that all lines agree on; None where it is not certain.
+
+    known is the one found in the whole evidence, if this is a part of it.
     """
     if len(lines) < 2:
         return None
@@ -186,7 +203,7 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
 
 
 def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
-    """The line under the one angle that its degenerate modes are known to have."""
+    """Restrict a line to the known angle of its degenerate modes."""
     turn = next(
         (t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < PAIR), 0.0
     )
@@ -194,7 +211,7 @@ def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
 
 
 def _along(lines: list[DecayFrames], growths: Array) -> list[tuple[DecayFit, ...]]:
-    """What every line says of each damping growth, every decay found from the one before."""
+    """Fit every line at each damping growth, each decay starting from the one before."""
     rows: list[tuple[DecayFit, ...]] = []
     for damping_growth in growths.tolist():
         rows.append(
@@ -207,14 +224,17 @@ def _along(lines: list[DecayFrames], growths: Array) -> list[tuple[DecayFit, ...
 
 
 def _cost(row: tuple[DecayFit, ...]) -> float:
+    """Sum what the best angles of all lines leave."""
     return float(sum(one.least for one in row))
 
 
 def _supported_by_lines(
     lines: list[DecayFrames], damping_growth: float, plain: tuple[DecayFit, ...], row: tuple[DecayFit, ...]
 ) -> bool:
-    """Whether the lines that a damping growth would bend are bent so: each counts by what a damping growth would be of
-    its misfit, so one loud mode and a softer one will do.
+    """Decide whether the lines that the damping growth would bend are bent as it predicts.
+
+    Each line counts by the part of its misfit that the damping growth would make, so one loud mode and a softer one are
+    enough.
     """
     before = np.exp([one.spread[0] for one in plain])
     after = np.exp([one.least for one in row])
@@ -231,7 +251,7 @@ def _supported_by_lines(
 
 
 def _louder(h: ObjectEvidence, lines: list[DecayFrames], found: _Fit) -> float:
-    """The modes' levels at the onset over the linear model's: the middle one of all lines and strikes."""
+    """Compute the modes' levels at the onset over the linear model's: the median of all lines and strikes."""
     level = [
         onset(line, found.damping_growth, float(one.decay_per_s[one.best]), one.best)
         for line, one in zip(lines, found.fits, strict=True)
@@ -242,7 +262,7 @@ def _louder(h: ObjectEvidence, lines: list[DecayFrames], found: _Fit) -> float:
 
 
 def _axes(lines: list[DecayFrames], found: _Fit) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Frequencies and angles of the degenerate modes whose axes are observable."""
+    """Return frequencies and angles of the degenerate modes whose axes are observable."""
     observed = [
         (line.freq_hz, float(ANGLES[one.best])) for line, one in zip(lines, found.fits, strict=True) if one.turned
     ]
@@ -250,7 +270,7 @@ def _axes(lines: list[DecayFrames], found: _Fit) -> tuple[tuple[float, ...], tup
 
 
 def _rayleigh(h: ObjectEvidence, lines: list[DecayFrames], row: tuple[DecayFit, ...]) -> tuple[float, float]:
-    """α, β >= 0 of the lines' decays at low level, by relative least squares with Huber's weights."""
+    """Fit α, β >= 0 to the lines' decays at low level, by relative least squares with Huber's weights."""
     from scipy.optimize import nnls
 
     omega2 = np.array([h.omega[line.number] ** 2 for line in lines])

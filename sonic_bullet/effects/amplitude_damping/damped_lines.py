@@ -1,14 +1,12 @@
-"""Lines whose decay goes with the level of the modes they stand for: d and what is left, for a given damping growth c;
-and the axes of degenerate modes.
+"""Lines whose decay depends on the level of their modes: fits of the decay, and of degenerate modes' axes.
 
     ln |z_s(t)| = const_s + ln |Σ_m A_sm e/(1 + x_sm (1 − e^p))^{1/p}|,   e = e^{−dt},  x_sm = (c a_sm)^p
         [effects.amplitude_damping]
-    d by Gauss and Newton; const_s of each strike alone, so no gain is needed; how far these differ from strike to
-        strike tells angles alone
+    d by Gauss and Newton at a given damping growth c; const_s of each strike alone, so no gain is needed; the
+        differences of these between strikes decide angles alone
 
-Two degenerate modes are one line, and each is damped by its own level: how loud each is depends on where the pair's
-axes lie, which in a linear body nobody hears, and which a mesh leaves to chance (axes.py). ψ is tried all round, line
-by line.
+Two degenerate modes are one line, and each is damped by its own level: both levels depend on where the pair's axes lie,
+which a linear body does not show, and which a mesh leaves to chance (axes.py). ψ is tried all round, line by line.
 """
 
 from __future__ import annotations
@@ -34,10 +32,26 @@ FAINT = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecayFrames:
-    """A line's frames: time_s (t,), logarithm (s, t) and weight (s, t) of |z|; amplitude and level (p, s, j) of its j
-    modes under p angles of their axes.
+    """Frames of a line's envelope, and its modes under p angles of their axes.
 
-    freq_hz: the modes' middle in the model; decay_per_s: as observed. number: which of the observed. power: p.
+    Attributes
+    ----------
+    number : int
+        Index among the observed lines.
+    freq_hz : float
+        Middle frequency of its modes in the model.
+    decay_per_s : float
+        As observed.
+    time_s : (t,)
+        Times of the frames.
+    log : (s, t)
+        ln |z|.
+    weight : (s, t)
+        1/variance of it, 0 for frames that are not clear.
+    amplitude, level : (p, s, j)
+        Of its j modes under each angle.
+    power : float
+        p of the damping growth.
     """
 
     number: int
@@ -53,8 +67,16 @@ class DecayFrames:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecayFit:
-    """Of a line under a damping_growth: ln of the variance (p,) it leaves within strikes, ln of that between them, and
-    its decay (p,) under every angle.
+    """Fit of a line under a damping growth, for each of p angles.
+
+    Attributes
+    ----------
+    spread : (p,)
+        ln of the variance left within strikes.
+    between : (p,)
+        ln of the variance left between strikes.
+    decay_per_s : (p,)
+        Fitted decays.
     """
 
     spread: Array
@@ -63,23 +85,33 @@ class DecayFit:
 
     @property
     def best(self) -> int:
-        """The angle that all strikes tell, those as well in which nobody hears the line."""
+        """Return the index of the angle that fits all strikes, also those in which the line is not observed."""
         return int((self.spread + self.between).argmin())
 
     @property
     def least(self) -> float:
-        """What the best angle leaves within strikes."""
+        """Return what the best angle leaves within strikes."""
         return float(self.spread[self.best])
 
     @property
     def turned(self) -> bool:
-        """Whether the mesh's own axes are surely not the best."""
+        """Decide whether the mesh's own axes are certainly not the best."""
         whole = self.spread + self.between
         return bool(self.best and whole[0] - whole[self.best] > TURNS)
 
 
 def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFrames]:
-    """The lines that say something, their levels by a measure."""
+    """Select the lines with enough clear frames.
+
+    Parameters
+    ----------
+    e : Envelopes
+        Envelopes of the object's lines.
+    h : ObjectEvidence
+        The object.
+    measure : str
+        Measure of the levels, one of `amplitude_pitch.MEASURES`.
+    """
     found = []
     for q, k in enumerate(e.line.tolist()):
         good = e.good[:, q] & (e.good[:, q].sum(axis=1) >= FEWEST_FRAMES)[:, None]
@@ -107,7 +139,17 @@ def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFram
 
 
 def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None = None) -> DecayFit:
-    """What a line says of a damping growth. start (p,): decays to begin with."""
+    """Fit a line's decay at a damping growth, under every angle.
+
+    Parameters
+    ----------
+    line : DecayFrames
+        The line.
+    damping_growth : float
+        c in 1/level.
+    start : (p,)
+        Decays to start from in 1/s; the observed one where None.
+    """
     if damping_growth == 0:  # no angle counts
         line = under(line)
     many = len(line.amplitude)
@@ -125,8 +167,9 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
 
 
 def _between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
-    """ln of the variance (p,) of the levels that the model gives strikes over those observed; one in which the line is
-    not observed may not be modelled louder.
+    """Compute ln of the variance (p,) of the strikes' modelled over observed levels.
+
+    In a strike where the line is not observed the model may not be louder.
     """
     observed = line.weight.sum(axis=1) > 0
     early = line.time_s < line.time_s[0] + EARLY / line.decay_per_s
@@ -139,9 +182,7 @@ def _between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
 
 
 def would(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: int) -> float:
-    """The variance that no damping growth would leave of a line that is just what a damping growth makes it: what that
-    is of its misfit.
-    """
+    """Compute the variance that a fit without damping growth would leave of a line that follows one exactly."""
     one = under(line, angle)
     model = _model(one, damping_growth, np.array([decay_per_s]))[0][0]
     plain = fitted_decay(replace(one, log=model), 0.0)
@@ -149,7 +190,7 @@ def would(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: i
 
 
 def onset(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: int) -> Array:
-    """|z| (s,) at the onset, as the whole envelope tells it; NaN for strikes that say nothing."""
+    """Compute |z| (s,) at the onset by the whole envelope; NaN for strikes without clear frames."""
     one = under(line, angle)
     model = _model(one, damping_growth, np.array([decay_per_s]))[0][0]
     total = line.weight.sum(axis=1)
@@ -160,13 +201,13 @@ def onset(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: i
 
 
 def under(line: DecayFrames, angle: int = 0) -> DecayFrames:
-    """The line under one angle alone."""
+    """Restrict a line to one angle."""
     one = slice(angle, angle + 1)
     return replace(line, amplitude=line.amplitude[one], level=line.level[one])
 
 
 def _model(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Array, Array]:
-    """ln |z| (p, s, t) but for a constant, and its slope over the decay."""
+    """Compute ln |z| (p, s, t) up to a constant, and its slope over the decay."""
     fall = np.exp(-line.power * decay[:, None] * line.time_s)[:, None, None, :]  # (p, 1, 1, t)
     x = (damping_growth * line.level[..., None]) ** line.power  # (p, s, j, 1)
     less = 1 + x * (1 - fall)
@@ -179,7 +220,7 @@ def _model(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Arra
 
 
 def _left(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Array, Array]:
-    """Model − observed (p, s, t) and its slope over the decay, without each strike's mean."""
+    """Compute model − observed (p, s, t) and its slope over the decay, without each strike's mean."""
     model, slope = _model(line, damping_growth, decay)
     share = line.weight / np.maximum(line.weight.sum(axis=1, keepdims=True), 1e-300)
     left = model - line.log

@@ -1,12 +1,11 @@
-"""`amplitude-pitch`: a body that moves far is stiffer, or softer: the frequency follows the square of its level down as
-it decays.
+"""`amplitude-pitch`: at large amplitude a body is stiffer, or softer: the frequency follows the square of the level.
 
     ω(t) = ω (1 + b a²(t))
         [Nayfeh & Mook 1979, eq. 2.3.35: the Duffing oscillator]
 
-Read off the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the mode's, b
-of all; by modes without a degenerate partner, where there are enough that are sure of it, else by all, pairs about
-their own axes (degenerate_pitch.py).
+Identified by the phase of single modes: θ(t) = θ₀ + δ t + b a₀² ω (1 − e^{−2dt})/2d, θ₀ each strike's own, δ the
+mode's, b common to all; by modes without a degenerate partner, where enough of them are certain, else by all, pairs
+about their own axes (degenerate_pitch.py).
 """
 
 from __future__ import annotations
@@ -35,10 +34,20 @@ ENOUGH = 3  # modes without a degenerate partner, to be asked alone
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """b, its spread, the share of the phases' misfit that goes with it in modes it would move, and how many modes'
-    misfit that is.
+    """Fit of b to the phases of several modes.
 
-    single: whether it is identified by modes without a degenerate partner alone.
+    Attributes
+    ----------
+    bend : float
+        b per level².
+    sd : float
+        Its spread.
+    share : float
+        Fraction of the phases' misfit that b explains, in modes that it would move.
+    modes : float
+        Explained misfit in numbers of modes.
+    single : bool
+        Whether modes without a degenerate partner alone identify it.
     """
 
     bend: float
@@ -50,8 +59,18 @@ class Slope:
 
 @dataclass(frozen=True)
 class AmplitudePitch(RotatesPairs):
-    """bend: relative rise of frequency per level². measure: of the level, one of MEASURES, in N·s, m/s or m. freq_hz,
-    turn_rad: of degenerate modes, and how far their axes are turned from the mesh's.
+    """Rise of the frequency with the level.
+
+    Attributes
+    ----------
+    bend : float
+        b, relative rise of frequency per level².
+    measure : str
+        Measure of the level, one of MEASURES, in N·s, m/s or m.
+    freq_hz : (p,)
+        Frequencies of degenerate modes.
+    turn_rad : (p,)
+        Angles by which their axes are turned from the mesh's.
     """
 
     id: ClassVar[str] = "amplitude-pitch"
@@ -66,6 +85,7 @@ class AmplitudePitch(RotatesPairs):
     turn_rad: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         one_of("measure", self.measure, MEASURES)
         finite("bend", self.bend)
         finite("freq_hz", *self.freq_hz, least=1e-3)
@@ -73,27 +93,29 @@ class AmplitudePitch(RotatesPairs):
         same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
 
     def apply(self, x: Ring) -> Ring:
-        """The ringing with the effect in it."""
+        """Add the bend to the modes in the bank."""
         return replace(x, bend=x.bend + self.bend * _per_velocity(x, self.measure) ** 2)
 
     def turned(self, x: ModalModel) -> ModalModel:
-        """The modes as they were, degenerate modes about their own axes."""
+        """Turn degenerate modes to their own axes."""
         return turned(x, self.freq_hz, self.turn_rad)
 
     def angles(self) -> int:
-        """How many of its numbers are axes of degenerate pairs."""
+        """Count its numbers that are axes of degenerate pairs."""
         return len(self.turn_rad)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         pairs = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
         return {"bend": self.bend, "measure": self.measure} | ({"twins": pairs} if pairs else {})
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 1 + len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit a common bend to the phases of each object's modes; None where no object's modes agree on one."""
         best: tuple[float, Self] | None = None
         known = evidence.known if isinstance(evidence.known, cls) else None
         for h in evidence.observed:
@@ -108,8 +130,9 @@ class AmplitudePitch(RotatesPairs):
     def _with_axes(
         cls, e: Envelopes, h: ObjectEvidence, measure: str, b: Slope, known: AmplitudePitch | None, held: bool
     ) -> Self:
-        """The same with the axes of degenerate modes, known's if held; where hardly a mode is without its degenerate
-        partner, their bend with it.
+        """Build the effect with the axes of degenerate modes, those of `known` if held.
+
+        Where nearly all modes have a degenerate partner, the bend is fitted with the axes.
         """
         if h.model is None or measure == "impulse":
             return cls(b.bend, measure)
@@ -123,7 +146,7 @@ class AmplitudePitch(RotatesPairs):
 
 
 def _per_velocity(x: Ring, measure: str) -> Array:
-    """The measure over the ring's own level (peak velocity)."""
+    """Compute the measure over the ring's own level (peak velocity)."""
     if measure == "displacement":
         return np.asarray(1 / (2 * np.pi * x.freq_hz))
     if measure == "impulse":
@@ -132,8 +155,9 @@ def _per_velocity(x: Ring, measure: str) -> Array:
 
 
 def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> dict[str, Slope]:
-    """Of every measure that lines are sure of: modes without a degenerate partner where those are ENOUGH and sure of
-    any, else all. known: what all evidence said.
+    """Fit b by every measure that is certain: by modes without a degenerate partner, where enough are, else by all.
+
+    known is the effect found in the whole evidence.
     """
     # the frequencies of degenerate modes drift each by its own level
     single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)
@@ -157,15 +181,16 @@ def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> di
 
 
 def _significant(b: Slope, known: AmplitudePitch | None) -> bool:
-    """Whether lines are sure of b; by fewer strikes, that it is no less than nothing of what all said (known)."""
+    """Decide whether b is certain; with fewer strikes, whether it is above its spread with the known sign."""
     if known is None:
         return abs(b.bend) > STANDARD_ERRORS * b.sd and b.share > BETTER
     return b.bend * np.sign(known.bend) > b.sd and b.share > 0
 
 
 def _agreed(table: Array, single: bool) -> Slope:
-    """b by the modes' own (n, 3), each as heavy as what a bend would be in its phase over what there is; its spread by
-    their scatter [White 1980].
+    """Combine the modes' own slopes (n, 3), each weighted by its phase under a bend over its misfit.
+
+    The spread is that of their scatter [White 1980].
     """
     if not len(table):
         return Slope(0.0, np.inf, 0.0, 0.0, single)
@@ -191,8 +216,9 @@ def _agreed(table: Array, single: bool) -> Slope:
 
 
 def _moments(e: Envelopes, h: ObjectEvidence, level: Array, q: int) -> tuple[float, float, float] | None:
-    """Σ x², Σ xy, Σ y² of a mode: y its strikes' phases without their means and the common slope, x what b = 1 would
-    make of them; None where too little is clear.
+    """Compute Σ x², Σ xy, Σ y² of a mode; None where too little is clear.
+
+    y are its strikes' phases without their means and the common slope, x those of b = 1.
     """
     decay, omega = falls(e, q, float(h.decay_per_s[e.line[q]])), 2 * np.pi * float(h.freq_hz[e.line[q]])
     rows, sides, weights, ramps = [], [], [], []
@@ -215,6 +241,7 @@ def _moments(e: Envelopes, h: ObjectEvidence, level: Array, q: int) -> tuple[flo
 
 
 def _median(value: Array, weight: Array) -> float:
+    """Compute a weighted median."""
     order = np.argsort(value)
     total = np.cumsum(weight[order])
     return float(value[order][np.searchsorted(total, total[-1] / 2)])

@@ -1,12 +1,12 @@
-"""Degenerate modes whose frequencies go with their own levels: where the pair's axes lie, for a given bend b.
+"""Degenerate modes whose frequencies depend on their own levels: where the pair's axes lie, for a given bend b.
 
     z_s(t) = Σ_m A_sm e^{−dt + iθ_sm(t)},   θ = b a_sm² ω (1 − e^{−2dt})/2d,   a_sm and A_sm of axes turned by ψ
         [effects.amplitude_pitch]
     u_s(t) = z_s(t + L)/z_s(t) modelled and observed agree in phase but for δL, whatever the strike's own phase and the
         line's own frequency: ψ -> max
 
-Two degenerate modes are one line until they are loud: then one of them may have drifted away, while the other has
-hardly been struck. A mesh leaves their axes to chance (axes.py).
+Two degenerate modes are one line until they are loud: then the frequency of one may drift from that of the other, which
+was hardly excited. A mesh leaves their axes to chance (axes.py).
 """
 
 from __future__ import annotations
@@ -26,8 +26,25 @@ TURNS = 0.1  # of a line's ln variance, that its degenerate modes' axes must be 
 
 
 def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, factor: Array) -> float:
-    """The bend, some factors (n,) about one that was identified as if every line were one mode's, that lines agree on
-    best, degenerate modes about their own axes.
+    """Refine a bend with degenerate modes about their own axes.
+
+    Parameters
+    ----------
+    e : Envelopes
+        Envelopes of the object's lines.
+    h : ObjectEvidence
+        The object.
+    measure : str
+        Measure of the level.
+    bend : float
+        b identified as if every line were one mode's.
+    factor : (n,)
+        Factors to try.
+
+    Returns
+    -------
+    float
+        The factor times bend that the lines agree on best.
     """
     lines = [q for q in range(len(e.line)) if e.good[:, q].any()]
     cost = np.zeros(len(factor))
@@ -39,7 +56,7 @@ def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, f
 
 
 def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Frequencies and angles of the degenerate modes whose axes are observable."""
+    """Return frequencies and angles of the degenerate modes whose axes are observable."""
     assert h.model is not None
     found = []
     for q, k in enumerate(e.line.tolist()):
@@ -54,9 +71,20 @@ def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple
 
 
 def spread(e: Envelopes, h: ObjectEvidence, q: int, bend: float, amplitude: Array, level: Array) -> Array:
-    """Ln of the variances (p,) that levels, beside one factor, and gains of phase leave of a line.
+    """Compute ln of the variances (p,) of a line's levels, up to one factor, and of its gains of phase.
 
-    amplitude, level (p, s, j): of its modes under p angles of their axes.
+    Parameters
+    ----------
+    e : Envelopes
+        Envelopes of the object's lines.
+    h : ObjectEvidence
+        The object.
+    q : int
+        Index of the line among the envelopes.
+    bend : float
+        b per level².
+    amplitude, level : (p, s, j)
+        Of its modes under p angles of their axes.
     """
     k = int(e.line[q])
     decay, omega, t = max(float(h.decay_per_s[k]), 1e-2), 2 * np.pi * float(h.freq_hz[k]), e.time_s[q]
@@ -77,6 +105,6 @@ def spread(e: Envelopes, h: ObjectEvidence, q: int, bend: float, amplitude: Arra
 
 
 def _step(z: Array, lag: int) -> Array:
-    """The phase (…, t − lag) that a line gains in so many frames, as e^{iθ}."""
+    """Compute the phase (…, t − lag) that a line gains in ``lag`` frames, as e^{iθ}."""
     u = z[..., lag:] * np.conj(z[..., :-lag])
     return np.asarray(u / np.maximum(np.abs(u), 1e-300))

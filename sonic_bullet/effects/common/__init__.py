@@ -1,3 +1,5 @@
-"""What several effects share: axes of degenerate pairs, envelopes, patterns, points on surfaces, pulses, ringing, hum,
-reverberant tails, dashpots.
+"""Methods that several effects use.
+
+Axes of degenerate pairs, envelopes, patterns, points on surfaces, pulses, sums of modes, hum, reverberant tails,
+dashpots.
 """

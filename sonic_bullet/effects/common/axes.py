@@ -1,9 +1,8 @@
-"""Axes of degenerate modes: two modes of one frequency swing about whatever axes an imperfection gives them, and a mesh
-gives them any.
+"""Axes of degenerate modes: an imperfection decides about which axes two modes of one frequency lie, and a mesh is one.
 
     (a, b) -> (cos ψ a + sin ψ b, −sin ψ a + cos ψ b)          [Rayleigh 1894, § 221]
 
-Their sum is the same under every ψ as long as both are linear. Not so where each goes with its own level: then ψ is
+Their sum is the same under every ψ as long as both are linear. Not so where each depends on its own level: then ψ is
 observable.
 """
 
@@ -26,7 +25,7 @@ ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the degenerate mod
 
 
 def pair_at(freq: Array, f: float) -> tuple[int, int]:
-    """The two modes of a pair about f; (-1, -1) where there is none."""
+    """Find the two modes of a pair about a frequency; (-1, -1) where there is none."""
     near = np.flatnonzero(np.abs(freq / f - 1) < 2 * PAIR)
     if len(near) < 2:
         return -1, -1
@@ -36,14 +35,14 @@ def pair_at(freq: Array, f: float) -> tuple[int, int]:
 
 
 def about_axes(pair: Array, turn_rad: float) -> Array:
-    """Shapes (…, 2) of two degenerate modes about axes turned by ψ."""
+    """Turn the shapes (…, 2) of two degenerate modes to axes at an angle ψ."""
     c, s = math.cos(turn_rad), math.sin(turn_rad)
     a, b = pair[..., 0], pair[..., 1]
     return np.stack([c * a + s * b, -s * a + c * b], axis=-1)
 
 
 def degenerate(h: ObjectEvidence, k: int) -> bool:
-    """Whether a line stands for two modes that the mesh itself leaves side by side."""
+    """Decide whether a line stands for two modes that are degenerate in the mesh itself."""
     if h.model is None or h.plain is None or len(h.mode[k]) != 2:
         return False
     near = np.sort(h.plain.freq_hz[np.argsort(np.abs(h.plain.freq_hz - h.model_hz[k]))[:2]])
@@ -51,14 +50,29 @@ def degenerate(h: ObjectEvidence, k: int) -> bool:
 
 
 def split_apart(h: ObjectEvidence, k: int) -> bool:
-    """Whether the modes of a line, as they are played, are still apart."""
+    """Decide whether the modes of a line have different frequencies in the current model."""
     freq = h.model.freq_hz[h.mode[k]] if h.model is not None else np.zeros(0)
     return bool(len(freq) > 1 and freq.max() / freq.min() - 1 > ONE)
 
 
 def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array, Array]:
-    """Amplitudes at the sensor, but for one factor, and levels (p, s, j) of the modes a line stands for, with
-    degenerate modes turned by p angles. measure: see envelope.levels.
+    """Compute amplitudes and levels of a line's modes with degenerate modes turned by p angles.
+
+    Parameters
+    ----------
+    h : ObjectEvidence
+        The object.
+    k : int
+        Index of the line.
+    measure : str
+        Measure of the level, see `envelope.levels`.
+    angle : (p,)
+        Angles in rad.
+
+    Returns
+    -------
+    amplitude, level : (p, s, j)
+        Amplitudes at the sensor up to one factor, and levels.
     """
     impulse = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
     if h.model is None:
@@ -79,7 +93,7 @@ def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array,
 
 
 def turned(x: ModalModel, freq_hz: tuple[float, ...], turn_rad: tuple[float, ...]) -> ModalModel:
-    """The model with the degenerate modes about each frequency turned to other axes."""
+    """Turn the degenerate modes of a model about each frequency to other axes."""
     if not freq_hz:
         return x
     shape = x.shape.copy()

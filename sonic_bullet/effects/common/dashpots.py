@@ -3,10 +3,10 @@
     (s² + s (2d + ΦᵀcΦ) + Λ) q = 0,   qᵀ(2s + 2d + ΦᵀcΦ) q = 2i Im s
         [Tisseur & Meerbergen 2001, § 3; Woodhouse 1998, eq. 12; Adhikari 1999 for the norm]
 
-To first order a lone mode's decay grows by ½ Σ c φ². Of modes at one frequency (a ring's, a bowl's) one dashpot makes a
-mode that takes all, and others that stand still there and take nothing; neighbours whose distance in ω is not far above
-½ΦᵀcΦ mix; a strong dashpot holds its point, and decays fall again. With this norm Σ (φ(p)·q)(φ(x)·q)(1 + id/ω) e^{st}
-is the velocity after a unit impulse: of q, the real part is kept; the imaginary is a per cent of the sound.
+To first order a single mode's decay grows by ½ Σ c φ². Of modes at one frequency (a ring's, a bowl's) one dashpot makes
+a mode that takes all of it, and others with a node there; neighbours whose distance in ω is not far above ½ΦᵀcΦ mix; a
+strong dashpot holds its point, and decays fall again. With this norm Σ (φ(p)·q)(φ(x)·q)(1 + id/ω) e^{st} is the
+velocity after a unit impulse: of q, the real part is kept; the imaginary is a per cent of the sound.
 """
 
 from __future__ import annotations
@@ -24,8 +24,14 @@ STILL = 1e-6  # of ω: what swings slower does not swing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coupled:
-    """pole s (…, m) in 1/s, by rising frequency; turn (…, m, m) complex: old modes in a new one, by columns. One that
-    no longer swings is NaN, with zeros.
+    """Modes under dashpots, by rising frequency.
+
+    Attributes
+    ----------
+    pole : (…, m) complex
+        s in 1/s; NaN for a mode that no longer oscillates.
+    turn : (…, m, m) complex
+        Old modes in a new one, by columns; zeros for a mode that no longer oscillates.
     """
 
     pole: Array
@@ -33,7 +39,17 @@ class Coupled:
 
 
 def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
-    """Modes of λ (m,) and own decays (m,) under dashpots √c φ (…, r, m), c in N·s/m."""
+    """Solve the modes under dashpots.
+
+    Parameters
+    ----------
+    lam : (m,)
+        Eigenvalues λ in 1/s².
+    decay_per_s : (m,)
+        Decays without dashpots.
+    phi : (…, r, m)
+        √c φ of the dashpots, c in N·s/m.
+    """
     m = len(lam)
     omega, at = np.sqrt(lam) * (1 + TIE * np.arange(m)), np.arange(m)
     loss = np.swapaxes(phi, -1, -2) @ phi
@@ -55,7 +71,7 @@ def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
 
 
 def damped(x: ModalModel, phi: Array) -> ModalModel:
-    """The model under dashpots √c φ (r, m): as many modes; those that no longer swing are silent."""
+    """Return a model under dashpots √c φ (r, m), with as many modes; those that no longer oscillate are silent."""
     found = coupled(x.omega0_squared_per_s2, x.decay_per_s, phi)
     alive = np.isfinite(found.pole)
     omega = np.sqrt(x.omega0_squared_per_s2)
@@ -68,15 +84,26 @@ def damped(x: ModalModel, phi: Array) -> ModalModel:
 
 
 def _kin(found: Coupled) -> Array:
-    """The old mode (m,) that each new one comes from."""
+    """Match each new mode (m,) to the old one that it comes from."""
     from scipy.optimize import linear_sum_assignment
 
     return np.asarray(linear_sum_assignment(-(np.abs(found.turn.T) ** 2))[1])
 
 
 def apart(omega: Array, most: int) -> list[Array]:
-    """Runs of neighbouring modes, at most so many in each, cut where frequencies (m,) lie farthest apart: what couples
-    does so within them, nearly.
+    """Divide modes into runs of neighbours that nearly do not couple with other runs.
+
+    Parameters
+    ----------
+    omega : (m,)
+        Angular frequencies, ascending.
+    most : int
+        Modes in a run at most.
+
+    Returns
+    -------
+    list of (r,)
+        Indices, cut where frequencies lie farthest from each other.
     """
     runs, done = [np.arange(len(omega))], []
     while runs:

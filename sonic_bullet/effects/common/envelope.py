@@ -1,4 +1,4 @@
-"""Single modes out of a recording: each line shifted to 0 Hz, low-passed and decimated.
+"""Single modes of a recording: each line shifted to 0 Hz, low-passed and decimated.
 
     z_k(t) = 2 (y e^{−iω_k t}) * w,   w a Hann window of length L, centred, sum 1:  nulls at ± 2/L and beyond
         [Harris 1978, eq. 27]
@@ -6,8 +6,8 @@
 The window is a sum of three exponentials, 1/(L + 1) Σ_a c_a e^{iaθ(n − m)}, θ = 2π/(L + 1), c = ½, 1, ½: z at any
 sample m is a difference of running sums.
 
-Only lines that stand alone are worth it: no other of a twentieth of their strength nearer than 2/L, but for their own
-first, short part, which the window has to hold.
+Only isolated lines are used: no other of a twentieth of their strength nearer than 2/L, but for their own first, short
+part, which the window has to hold.
 """
 
 from __future__ import annotations
@@ -38,10 +38,24 @@ STEP = 1024  # samples between two exact phasors
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Envelopes:
-    """z (s, q, t) complex of q lines at times time_s (q, t), each line its own; good (s, q, t) where it stands clear;
-    line (q,): which of the observed.
+    """Basebands of q lines at t times, each line its own times.
 
-    phase (s, q, t): of z, without jumps, however few the frames are. noise (s, q). window_s (q,): L.
+    Attributes
+    ----------
+    time_s : (q, t)
+        Times of the frames.
+    z : (s, q, t) complex
+        Basebands.
+    good : (s, q, t) bool
+        Frames that are well above the noise.
+    line : (q,)
+        Indices among the observed lines.
+    noise : (s, q)
+        Rms of the noise in z.
+    phase : (s, q, t)
+        Of z, without jumps, however few the frames are.
+    window_s : (q,)
+        Lengths L of the windows.
     """
 
     time_s: Array
@@ -53,13 +67,13 @@ class Envelopes:
     window_s: Array
 
     def worth(self, s: int, q: int) -> Array:
-        """What each frame (t,) of a line says: its level over the noise, squared, MOST_SAID at most."""
+        """Compute the weight of each frame (t,) of a line: its level over the noise, squared, at most MOST_SAID."""
         return np.asarray(np.minimum((np.abs(self.z[s, q]) / max(self.noise[s, q], 1e-12)) ** 2, MOST_SAID))
 
 
 @lru_cache(maxsize=2)
 def envelopes(h: ObjectEvidence) -> Envelopes | None:
-    """Of lines that stand alone and clear, spread over the frequencies; None where there are none."""
+    """Compute the envelopes of isolated lines, spread over the frequencies; None where there are none."""
     if h.signal is None or not len(h.freq_hz):
         return None
     selected, window = alone(h)
@@ -67,7 +81,19 @@ def envelopes(h: ObjectEvidence) -> Envelopes | None:
 
 
 def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[int]) -> Envelopes:
-    """The lines picked by ``alone``, out of recordings or what is played in their place: signal (s, n)."""
+    """Compute the envelopes of lines that `alone` selected.
+
+    Parameters
+    ----------
+    h : ObjectEvidence
+        The object.
+    signal : (s, n)
+        Its recordings, or a synthesis in their place.
+    selected : list of int
+        The lines.
+    window : list of int
+        Length of each line's window in samples, odd.
+    """
     n, sr = signal.shape[1], h.sr
     z = np.zeros((len(signal), len(selected), FRAMES), complex)
     good = np.zeros(z.shape, bool)
@@ -98,8 +124,18 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
 
 
 def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
-    """z of y (n,) at ω radians a sample, at samples ``at`` (t,) the window of an odd ``length`` is centred on; nothing
-    is beyond the ends.
+    """Compute z of a recording at some samples; beyond its ends it is zero.
+
+    Parameters
+    ----------
+    y : (n,)
+        The recording.
+    omega : float
+        Frequency of the line in rad a sample.
+    length : int
+        Length of the window in samples, odd.
+    at : (t,)
+        Samples on which the window is centred.
     """
     half, theta = length // 2, 2 * np.pi / (length + 1)
     first, last = np.clip(at - half, 0, len(y)), np.clip(at + half + 1, 0, len(y))
@@ -111,7 +147,7 @@ def windowed(y: Array, omega: float, length: int, at: Array) -> Array:
 
 @njit(nogil=True)
 def _running(y: Array, omega: float, theta: float) -> Array:
-    """Σ of y e^{−i(ω − aθ)n} before each sample (3, n + 1), a = −1, 0, 1."""
+    """Sum y e^{−i(ω − aθ)n} up to each sample (3, n + 1), a = −1, 0, 1."""
     out = np.zeros((3, len(y) + 1), np.complex128)
     for a in range(3):
         step, total = omega - (a - 1) * theta, 0j
@@ -126,7 +162,7 @@ def _running(y: Array, omega: float, theta: float) -> Array:
 
 
 def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
-    """Lines with no strong neighbour, and the window for each; every so many of them, from low to high."""
+    """Select lines without a strong neighbour, and a window for each; at most MOST_LINES, from low to high."""
     if h.signal is None:
         return [], []
     n, sr = h.signal.shape[1], h.sr
@@ -156,9 +192,7 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
 
 
 def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
-    """Which chain each line (k,) belongs to: lines so near each other, for their decays, that one mode of drifting
-    frequency may have left them.
-    """
+    """Assign lines (k,) to chains: lines so near each other, for their decays, that one drifting mode may be all."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -169,8 +203,12 @@ def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
 
 
 def levels(h: ObjectEvidence) -> dict[str, Array]:
-    """How hard each line (s, k) is driven, by three measures of what the pulse leaves of an impact: its impulse, and
-    peak velocity and peak displacement at the body's surface.
+    """Compute the level of each line (s, k) by three measures.
+
+    Returns
+    -------
+    dict of (s, k)
+        The impulse that the pulse leaves of the impact, peak velocity and peak displacement at the body's surface.
     """
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
@@ -188,8 +226,18 @@ def levels(h: ObjectEvidence) -> dict[str, Array]:
 
 
 def falls(e: Envelopes, q: int, fitted: float) -> float:
-    """The decay of a line's own level, in 1/s: a mode of drifting frequency is several lines to a linear fit, none with
-    its decay. fitted: by those; what comes back where too little is clear.
+    """Compute the decay of a line's own level in 1/s.
+
+    A linear fit represents a mode of drifting frequency by several lines, none with its decay.
+
+    Parameters
+    ----------
+    e : Envelopes
+        Envelopes of the object's lines.
+    q : int
+        Index of the line among them.
+    fitted : float
+        Decay by a linear fit, returned where too few frames are clear.
     """
     top = bottom = 0.0
     for s in range(len(e.z)):

@@ -1,10 +1,10 @@
 """Hum: a tone at the mains and its multiples that is there before, during and after, however hard the strike.
 
 Σ_i a_i cos(2π i f₀ t + φ_i),
-    f₀ about 50 or 60 Hz: read off the last third of every recording, where least else is left
+    f₀ about 50 or 60 Hz: identified by the last third of every recording, where the body's sound is weakest
 
-One recording tells no hum from a mode that rings for long; nor do strikes of one strength, unless several multiples
-sound, as modes are not in tune with the mains, or one so low that no mode is to be expected there.
+One recording does not distinguish hum from a mode with a slow decay; nor do strikes of one strength, unless several
+multiples are present, as modes are not in tune with the mains, or one so low that no mode is to be expected there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,17 @@ LOW, UNLIKE = 2, 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hum:
-    """f₀ in Hz, and of its first multiples the amplitudes, 0 where one is not there, and phases at the onset."""
+    """A tone and its harmonics.
+
+    Attributes
+    ----------
+    hz : float
+        f₀ in Hz.
+    amplitude : (i,)
+        Of the first multiples, 0 where one is absent.
+    phase_rad : (i,)
+        At the onset.
+    """
 
     hz: float
     amplitude: tuple[float, ...]
@@ -35,10 +45,23 @@ class Hum:
 
 
 def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum | None:
-    """What hums in recordings (s, n) over a noise (s,); None where no tone has one amplitude in all of them, and from
-    first to last.
+    """Find the hum of recordings.
 
-    known_hz: as other recordings gave it; then one will do.
+    Parameters
+    ----------
+    signals : (s, n)
+        The recordings.
+    noise : (s,)
+        Rms of their noise.
+    sr : int
+        Sampling rate in Hz.
+    known_hz : float
+        Frequency found in other recordings; then one recording is enough.
+
+    Returns
+    -------
+    Hum or None
+        None where no tone has one amplitude in all recordings, and from first to last.
     """
     from scipy.optimize import minimize_scalar
 
@@ -111,7 +134,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
 
 
 def without(signals: Array, sr: int, hum: Hum) -> Array:
-    """The recordings (s, n) less what hums in the last third of each: an amplitude and a phase of its own."""
+    """Subtract a hum from recordings (s, n), with amplitudes and phases fitted to the last third of each."""
     time = np.arange(signals.shape[1]) / sr
     turn = 2 * np.pi * hum.hz * np.outer(time, [i for i, a in enumerate(hum.amplitude, 1) if a])
     wave = np.concatenate([np.cos(turn), np.sin(turn)], axis=1)
@@ -121,6 +144,6 @@ def without(signals: Array, sr: int, hum: Hum) -> Array:
 
 
 def without_hum(signals: Array, noise: Array, sr: int) -> Array:
-    """The recordings (s, n) over a noise (s,) less their hum, if they have any."""
+    """Subtract the hum of recordings (s, n) over a noise (s,), if they have any."""
     hum = hum_of(signals, noise, sr)
     return signals if hum is None else without(signals, sr, hum)

@@ -1,10 +1,10 @@
-"""Which line is which mode of a body that an effect has changed: by nearness and by pattern over the strikes.
+"""Pairs of lines and modes of a body that an effect has changed, by frequency and by pattern over the strikes.
 
     price_kj = ((ln f_k − ln f_j − s)/w)²/18 + κ (1 − c_kj),  at most 1;  Σ worth_k (price − 1) -> min over one-to-one
         pairs     [Kuhn 1955; Crouse 2016]
 
-c: cosine of the amplitudes' magnitudes over the strikes, κ: how strictly it is taken; s: the common shift ln f, found
-in turns with the pairs; worth: a line's strength, in logarithm.
+c: cosine of the amplitudes' magnitudes over the strikes, κ: its weight; s: the common shift ln f, found in turns with
+the pairs; worth: a line's strength, in logarithm.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MOST_LINES = 48
 
 
 def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
-    """The strongest lines of an object, paired or not, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
+    """Return the strongest lines of an object, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
     freq = np.concatenate([h.freq_hz, h.foreign_hz])
     size = np.abs(np.concatenate([h.amplitude, h.foreign_amplitude], axis=1))
     decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
@@ -30,7 +30,7 @@ def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
 
 
 def patterns(h: ObjectEvidence, model: ModalModel) -> Array:
-    """|J φ(p)·e φ(q)·n| (s, m) of the strikes."""
+    """Compute |J φ(p)·e φ(q)·n| (s, m) of the strikes."""
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
     return np.asarray(
@@ -49,7 +49,36 @@ def agreed(
     width: float = WIDTH,
     strict: float = 1.0,
 ) -> tuple[float, Array, Array, float]:
-    """(score, line (p,), mode (p,), shift): the least price, 0 where nothing pairs and −Σ worth where all do."""
+    """Pair lines and modes at the least price.
+
+    Parameters
+    ----------
+    line_hz : (k,)
+        Frequencies of the lines.
+    size : (s, k)
+        Magnitudes of their amplitudes.
+    mode_hz : (m,)
+        Frequencies of the modes.
+    pattern : (s, m)
+        Magnitudes of the modes' amplitudes.
+    shift : float
+        Common shift of ln f to start from.
+    turns : int
+        Updates of the shift.
+    width : float
+        w, of ln f.
+    strict : float
+        κ.
+
+    Returns
+    -------
+    score : float
+        0 where no pair is found and −Σ worth where all lines have one.
+    line, mode : (p,)
+        Indices of the pairs.
+    shift : float
+        The common shift.
+    """
     from scipy.optimize import linear_sum_assignment
 
     # lists of frequencies, or strikes of unknown place

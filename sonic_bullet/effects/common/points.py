@@ -1,4 +1,4 @@
-"""Points of a body's surface, and least squares that few outliers spoil."""
+"""Points of a body's surface, and least squares that are robust against outliers."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from sonic_bullet.records import Array, ModalModel
 
 
 def nearest(x: ModalModel, place: tuple[float, float, float]) -> int:
-    """The surface vertex nearest to a place."""
+    """Find the surface vertex nearest to a place (3,)."""
     body: Array = np.unique(x.face)
     return int(body[np.argmin(((x.vertex_m[body] - np.array(place)) ** 2).sum(axis=1))])
 
 
 def spread_out(x: ModalModel, count: int) -> Array:
-    """About ``count`` surface vertices (p,), each the farthest from those before it [Gonzalez 1985]."""
+    """Select about ``count`` surface vertices (p,), each the farthest from those before it [Gonzalez 1985]."""
     body = np.unique(x.face)
     at = x.vertex_m[body]
     selected = [0]
@@ -26,7 +26,7 @@ def spread_out(x: ModalModel, count: int) -> Array:
 
 
 def vertex_normals(model: ModalModel) -> Array:
-    """Outward unit normals (v, 3), by the faces around a vertex weighted with their areas."""
+    """Compute outward unit normals (v, 3), means of the faces around a vertex weighted with their areas."""
     v, f = model.vertex_m, model.face
     corner = v[f]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -37,9 +37,26 @@ def vertex_normals(model: ModalModel) -> Array:
 
 
 def solved(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
-    """Coefficients (c,) >= 0 of columns (k, c), of any scale, that say y (k,) of spreads sd best, and twice Huber's
-    losses (k,) left.
+    """Fit coefficients >= 0 of columns, robustly.
 
+    Parameters
+    ----------
+    y : (k,)
+        Data.
+    sd : (k,)
+        Their spreads.
+    columns : (k, c)
+        Columns of any scale.
+
+    Returns
+    -------
+    value : (c,)
+        Coefficients.
+    left : (k,)
+        Twice Huber's losses.
+
+    References
+    ----------
     Huber's weights [Huber 1964] on least squares without negative numbers [Lawson & Hanson 1974].
     """
     from scipy.optimize import nnls

@@ -1,4 +1,4 @@
-"""What records of effects prove of themselves when they are built: presets are written by hand, too."""
+"""Checks of effects' records when they are built: presets are written by hand, too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Force pulses of finite length: what share of an impulse a mode takes.
+"""Force pulses of finite length: the fraction of an impulse that a mode takes.
 
     F̂(f)/F̂(0) = ∫ s(t/τ) e^{−2πift} dt / ∫ s dt,   s(x) on 0 ≤ x ≤ 1:
         half-sine sin πx · hertz sin^{3/2} πx · raised-cosine 1 − cos 2πx
@@ -20,7 +20,15 @@ PULSES = ("half-sine", "hertz", "raised-cosine")
 
 
 def magnitude(pulse: str, x: Array) -> Array:
-    """|F̂(f)|/F̂(0) at x = fτ, with its sign about the centre (real, as pulses are symmetric)."""
+    """Compute F̂(f)/F̂(0) about the pulse's centre (real, as pulses are symmetric).
+
+    Parameters
+    ----------
+    pulse : str
+        One of PULSES, or "impulse".
+    x : array
+        fτ.
+    """
     x = np.asarray(x, float)
     if pulse == "half-sine":
         near = np.abs(2 * np.abs(x) - 1) < 1e-6
@@ -36,14 +44,24 @@ def magnitude(pulse: str, x: Array) -> Array:
 
 @cache
 def _rule() -> tuple[Array, Array]:
-    """Gauss-Legendre points about the centre, and sin^{3/2} there, summing to one."""
+    """Return Gauss-Legendre points about the centre, and weights sin^{3/2} there, summing to one."""
     at, weight = np.polynomial.legendre.leggauss(96)
     weight = weight * np.cos(np.pi * at / 2) ** 1.5
     return at / 2, weight / weight.sum()
 
 
 def spectrum(pulse: str, tau_s: float, freq_hz: Array) -> Array:
-    """F̂(f)/F̂(0) (f,) complex of a pulse that begins at 0 and lasts tau_s."""
+    """Compute F̂(f)/F̂(0) (f,) complex of a pulse that begins at 0.
+
+    Parameters
+    ----------
+    pulse : str
+        One of PULSES, or "impulse".
+    tau_s : float
+        Its duration.
+    freq_hz : (f,)
+        Frequencies.
+    """
     f = np.asarray(freq_hz, float)
     if pulse == "impulse" or tau_s <= 0:
         return np.ones(f.shape, complex)

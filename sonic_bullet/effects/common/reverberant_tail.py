@@ -1,15 +1,14 @@
-"""What a line is of itself, and what a diffuse tail makes of it: its own decay, amplitude and frequency, read through a
-reverberation of the rate δ.
+"""Lines in a reverberation of the rate δ: a line's own decay, amplitude and frequency, separated from the diffuse tail.
 
-    z(t) = A (e^{pt} + r(t)),  p = −d + iΔω;   dr = p r dt + noise of power w² 2δ e^{−2δt}: what the tail's taps drive
-        the mode with   [Polack 1988; Kuttruff 2009, ch. 4]
+    z(t) = A (e^{pt} + r(t)),  p = −d + iΔω;   dr = p r dt + noise of power w² 2δ e^{−2δt}: the tail's excitation of the
+        mode     [Polack 1988; Kuttruff 2009, ch. 4]
     Cov(r(t), r(t')) = w² 2δ e^{−d|t − t'|} (e^{−2δm} − e^{−2dm})/(2d − 2δ),   m = min(t, t')
         [Ornstein & Uhlenbeck 1930, with fading noise]
     ln L = −ln det V − |z − A e^{pt}|² in V⁻¹,   V = |A|² w² C + noise;
         A in closed form, d and w summed over grids, Δω at its best
 
-z is the line's baseband over all strikes at once, in short frames: weighted with the model's pattern, so that what is
-near in frequency and not alike cancels.
+z is the line's baseband over all strikes at once, in short frames: weighted with the model's pattern, so that a
+neighbour of another pattern cancels.
 """
 
 from __future__ import annotations
@@ -44,10 +43,24 @@ STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Read:
-    """k lines at each δ of t: ln_likelihood, decay_per_s and its ln_sd, shift_hz, amplitude (over the model's so far)
-    with amplitude_sd, reverberant_level: all (t, k).
+    """Estimates of k lines at each of t rates δ.
 
-    plain (k,): ln likelihood of the line without a tail, at the same decays.
+    Attributes
+    ----------
+    delta : (t,)
+        Rates in 1/s.
+    ln_likelihood : (t, k)
+        Of each line.
+    plain : (k,)
+        The same without a tail, at the same decays.
+    decay_per_s, ln_sd : (t, k)
+        The line's own decay, and the spread of its logarithm.
+    shift_hz : (t, k)
+        Its frequency over that given.
+    amplitude, amplitude_sd : (t, k)
+        Over the model's so far, complex, and its spread.
+    reverberant_level : (t, k)
+        w.
     """
 
     delta: Array
@@ -64,10 +77,22 @@ class Read:
 def read(
     h: ObjectEvidence, delta: Array, freq_hz: Array, own: Array, members: Sequence[Array], *, every: int = 1
 ) -> Read:
-    """Lines at freq_hz (k,) at some δ (t,). own (s, k): what A is in units of, complex; members: the modes that each
-    is, so that others are its neighbours.
+    """Estimate lines at several rates δ.
 
-    every: of the decays how many are looked at, for a first look.
+    Parameters
+    ----------
+    h : ObjectEvidence
+        The object.
+    delta : (t,)
+        Rates in 1/s.
+    freq_hz : (k,)
+        Frequencies of the lines.
+    own : (s, k) complex
+        Unit of each line's amplitudes.
+    members : sequence of arrays
+        Indices of each line's modes; all others are its neighbours.
+    every : int
+        Use one of so many decays, for a first estimate.
     """
     assert h.signal is not None
     start, window = _frames(h)
@@ -78,19 +103,20 @@ def read(
 
 
 def modes(h: ObjectEvidence, delta: Array, lines: Array, *, every: int = 1) -> Read:
-    """Some of an object's lines (k,), by index, in units of what the model so far says of them."""
+    """Estimate some of an object's lines (k,), by index, in units of the model so far."""
     return read(h, delta, h.freq_hz[lines], expected_amplitude(h)[:, lines], [h.mode[k] for k in lines], every=every)
 
 
 def expected_amplitude(h: ObjectEvidence) -> Array:
-    """What the model so far says of the lines (s, k), complex."""
+    """Return the lines' amplitudes (s, k) by the model so far, complex."""
     return np.stack([h.push[:, m].sum(axis=1) for m in h.mode], axis=1)
 
 
 @lru_cache(maxsize=4)
 def through(h: ObjectEvidence, delta: float) -> Read:
-    """All lines of an object at one δ; remembered, as evidence is asked for it more than once. What outlasts the tail
-    is left as it was observed: late, it rings alone.
+    """Estimate all lines of an object at one δ; cached, as effects ask more than once.
+
+    A line that outlasts the tail keeps its observed values: late, it is undisturbed.
     """
     r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
     sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)
@@ -105,8 +131,9 @@ def through(h: ObjectEvidence, delta: float) -> Read:
 
 
 def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
-    """The same with frequencies, decays and amplitudes of all lines as they would be without the tail; those that are
-    no mode go with the impulse.
+    """Return an object with frequencies, decays and amplitudes of all lines as without the tail.
+
+    Lines that are no mode are assumed to follow the impulse.
     """
     if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
@@ -147,7 +174,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
 
 
 def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, Array]:
-    """Amplitudes and spreads (s, k) with what all strikes have in common read anew."""
+    """Rescale amplitudes and spreads (s, k) by the estimate of what all strikes have in common."""
     now = (np.conj(own) * amplitude).sum(axis=0) / np.maximum((np.abs(own) ** 2).sum(axis=0), 1e-300)
     # the model says nothing of them: they stay as they were observed
     silent = (np.abs(own).sum(axis=0) == 0) | (now == 0)
@@ -159,9 +186,7 @@ def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, 
 
 
 def direct(h: ObjectEvidence, delta: float) -> Array:
-    """What the strikes (s, n) would sound like without the tail: the lines' modes as they are read, the others as the
-    nearest of those.
-    """
+    """Synthesize the strikes (s, n) without the tail: lines' modes as estimated, others as the nearest of those."""
     assert h.signal is not None
     r = through(h, delta)
     near = np.abs(np.log(h.all_hz[:, None] / h.freq_hz)).argmin(axis=1)
@@ -177,7 +202,7 @@ def direct(h: ObjectEvidence, delta: float) -> Array:
 
 
 def _frames(h: ObjectEvidence) -> tuple[Array, Array]:
-    """First samples (n,) of the frames, and their window."""
+    """Return the first samples (n,) of the frames, and their window."""
     assert h.signal is not None
     window = np.hanning(round(FRAME_S * h.sr) + 2)[1:-1]
     hop = len(window) // 2
@@ -190,7 +215,7 @@ def _frames(h: ObjectEvidence) -> tuple[Array, Array]:
 def _basebands(
     h: ObjectEvidence, freq: Array, own: Array, members: Sequence[Array], start: Array, window: Array
 ) -> tuple[Array, Array]:
-    """Frames (k, n) of every line in units of its own, and the noise's variance there (k,)."""
+    """Compute the frames (k, n) of every line in units of its own, and the noise's variance there (k,)."""
     assert h.signal is not None
     at = np.arange(len(window)) / h.sr
     piece = h.signal[:, start[:, None] + np.arange(len(window))] * window
@@ -212,14 +237,15 @@ def _basebands(
 
 @lru_cache(maxsize=4)
 def _whitener(time: tuple[float, ...]) -> Array:
-    """What makes white noise in the frames uncorrelated (n, n)."""
+    """Compute the matrix (n, n) by which white noise in the frames becomes uncorrelated."""
     value, vector = np.linalg.eigh(_overlap(np.array(time)))
     return np.asarray((vector / np.sqrt(np.maximum(value, 1e-6))) @ vector.T)
 
 
 def _overlap(time: Array) -> Array:
-    """Correlation (n, n) of white noise in two frames: of Hann windows at a distance u of their length, (1 − u)(2 + cos
-    2πu)/3 + sin 2πu/2π [Harris 1978, eq. 9].
+    """Compute the correlation (n, n) of white noise in two frames of Hann windows.
+
+    At a distance u of their length, (1 − u)(2 + cos 2πu)/3 + sin 2πu/2π [Harris 1978, eq. 9].
     """
     u = np.minimum(np.abs(time[:, None] - time[None, :]) / FRAME_S, 1.0)
     return np.asarray(((1 - u) * (2 + np.cos(2 * np.pi * u)) + 1.5 / np.pi * np.sin(2 * np.pi * u)) / 3)
@@ -227,9 +253,11 @@ def _overlap(time: Array) -> Array:
 
 @lru_cache(maxsize=1500)
 def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, Array, Array]:
-    """What a decay and a rate say of frames (n,), whatever the line: their first mean, variances (n,) of a tail of unit
-    reverberant level along uncorrelated directions, for white noise of unit variance, and the frames' means and
-    directions there (n, 1 + n)."""
+    """Compute the statistics of a tail in the frames (n,) for a decay and a rate, whatever the line.
+
+    Returns the first frame's mean, the variances (n,) of a tail of unit reverberant level along directions that are
+    uncorrelated, for white noise of unit variance, and the frames' means and directions there (n, 1 + n).
+    """
     at = np.array(time)
     node, weight = (np.arange(NODES) + 0.5) / NODES * FRAME_S, np.hanning(NODES + 2)[1:-1]
     weight = weight / weight.sum()
@@ -250,7 +278,7 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
 
 
 def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, ...]:
-    """For every line: ln likelihood (k, w), A, its sd, Δf at its best and w, each (k, w), at one decay and one δ."""
+    """Compute for every line ln likelihood, A, its spread, the best Δf and w, each (k, w), at one decay and one δ."""
     mean, value, turn = _tail(time, decay, delta)
     at = np.array(time)
     half = min(max(2 * max(decay, delta) / np.pi, 2.0), 0.4 / (at[1] - at[0]))
@@ -272,7 +300,7 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
 
 
 def _summed(delta: Array, decays: Array, rows: list[list[tuple[Array, ...]]]) -> Read:
-    """Over decays and reverberant levels: means of ln d and ln w, the rest at the likeliest."""
+    """Sum over decays and reverberant levels: means of ln d and ln w, the rest at the likeliest."""
     # (t, d, k, w)
     like, amplitude, sd, shift, reverberant_level = (
         np.array([[one[i] for one in row] for row in rows]) for i in range(5)

@@ -1,4 +1,4 @@
-"""Modes that ring, sample by sample: linear ones by recursion, level-dependent ones in closed form.
+"""Sums of modes, sample by sample: linear ones by recursion, level-dependent ones in closed form.
 
     linear             x_m(t) = Re A e^{(−d + iω)t}
     growth c           ȧ = −d a (1 + c (a/a₀)^p)      ->  a(t)/a₀ = ((1 + c) e^{pdt} − c)^{−1/p}, p = 1, 2
@@ -40,8 +40,9 @@ def _linear(out, start, pole, amplitude, length):
 
 @njit(nogil=True)
 def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power, length):
-    """The same with ω(t) and d(t) that depend on the mode's level; bend and damping growth at the level the mode starts
-    with, (damping_growth·level)^power.
+    """Add modes with ω(t) and d(t) that depend on the mode's level.
+
+    Bend and damping growth are those at the level the mode starts with, (damping_growth·level)^power.
     """
     for k in range(len(omega)):
         first = int(np.ceil(start))
@@ -73,7 +74,24 @@ def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power,
 
 
 def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
-    """The ring's sound (n,) under every hit of the impact; modes above Nyquist are left out."""
+    """Synthesize the modes under every hit of an impact; modes above Nyquist are left out.
+
+    Parameters
+    ----------
+    ring : Ring
+        The modes.
+    impact : Impact
+        The hits.
+    n : int
+        Length in samples.
+    sr : int
+        Sampling rate in Hz.
+
+    Returns
+    -------
+    (n,)
+        The sound in units of the ring's amplitudes.
+    """
     out = np.zeros(n)
     use = (ring.freq_hz < 0.5 * sr) & (np.abs(ring.amplitude) > 0)
     if not use.any():
@@ -109,9 +127,7 @@ def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
 
 
 def direct_as_expected(observed: ObjectEvidence) -> Array:
-    """What single hits (s, n) would sound like, with the lines' own frequencies and decays and the model's
-    amplitudes.
-    """
+    """Synthesize single hits (s, n) of the lines' own frequencies and decays, and the model's amplitudes."""
     assert observed.signal is not None
     none = np.zeros(len(observed.freq_hz))
     once = Impact(1.0, np.zeros(1), np.ones(1))

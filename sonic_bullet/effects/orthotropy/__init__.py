@@ -3,8 +3,8 @@
     σ = C ε with C cubic (3 constants), hexagonal about x, y or z (5) or orthorhombic (9)
         [Nye 1957, ch. VIII; Migliori et al. 1993]
 
-Read off all lines, whatever isotropic modes they were paired with (tensor_search.py); None where isotropy does as well.
-Density is the guess's: modes tell C/ρ alone.
+Identified by all lines, whatever isotropic modes they were paired with (tensor_search.py); None where isotropy does as
+well. Density is the guess's: modes depend on C/ρ alone.
 """
 
 from __future__ import annotations
@@ -31,8 +31,16 @@ LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 @dataclass(frozen=True)
 class Orthotropy:
-    """constants_pa (9,): C11 C22 C33 C23 C13 C12 C44 C55 C66. symmetry: one of "cubic", "hexagonal-x" to "-z",
-    "orthorhombic". held: identified by no mode.
+    """Elastic constants with axes along the mesh's.
+
+    Attributes
+    ----------
+    constants_pa : (9,)
+        C11 C22 C33 C23 C13 C12 C44 C55 C66.
+    symmetry : str
+        "cubic", "hexagonal-x", "hexagonal-y", "hexagonal-z" or "orthorhombic".
+    held : tuple of str
+        Names of the constants that no mode identifies.
     """
 
     id: ClassVar[str] = "orthotropy"
@@ -47,18 +55,18 @@ class Orthotropy:
 
     @property
     def stiffness_pa(self) -> Array:
-        """(6, 6), Voigt."""
+        """Return the stiffness (6, 6) in Voigt's notation."""
         found = np.zeros((6, 6))
         for (i, j), c in zip(ORTHOTROPIC, self.constants_pa, strict=True):
             found[i, j] = found[j, i] = c
         return found
 
     def apply(self, x: Material) -> Material:
-        """The material with the effect in it."""
+        """Set the material's stiffness."""
         return replace(x, stiffness_pa=self.stiffness_pa)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         compliance = np.linalg.inv(self.stiffness_pa)
         youngs = 1 / np.diag(compliance)
         c = dict(zip(("c11", "c22", "c33", "c23", "c13", "c12", "c44", "c55", "c66"), self.constants_pa, strict=True))
@@ -73,16 +81,18 @@ class Orthotropy:
         return values | ({"held_near_isotropy": list(self.held)} if self.held else {})
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return SYMMETRIES[self.symmetry]
 
     @classmethod
     def of(cls, tensor: Tensor, density_kg_m3: float) -> Self:
-        """A fitted tensor's."""
+        """Build the effect from a fitted tensor and a density."""
         stiff = tensor.stiffness_m2_s2 * density_kg_m3
         return cls(tuple(float(stiff[i, j]) for i, j in ORTHOTROPIC), tensor.symmetry, tensor.held)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Search for the tensor that explains all lines best; None where isotropy does as well."""
         bodies = body_lines_of(evidence)
         if isinstance(evidence.known, cls) and bodies:
             density = bodies[0].elastic.material.density_kg_m3
@@ -106,14 +116,14 @@ class Orthotropy:
 
 
 def departure(tensor: Tensor) -> float:
-    """How far from isotropy: the largest of |ln E_i/E_j| and |ln G_ij/(√(E_i E_j)/2(1+n_ij))|."""
+    """Compute the distance from isotropy: the largest of |ln E_i/E_j| and |ln G_ij/(√(E_i E_j)/2(1+n_ij))|."""
     p = tensor.p
     goes = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + p[3:6]))
     return float(max(np.ptp(p[:3]), np.abs(p[6:] - goes).max()))
 
 
 def _fits(h: ObjectEvidence) -> bool:
-    """Whether the isotropic body's modes are where the lines are."""
+    """Decide whether the isotropic body's modes are where the lines are."""
     if not len(h.freq_hz):
         return False
     off, own = np.log(h.freq_hz / h.model_hz), ringing(h)

@@ -1,4 +1,4 @@
-"""A body's lines, whatever they stand for, beside the modes that a tensor gives it, and which is which.
+"""Pairs of a body's lines and the modes that an elastic tensor gives it.
 
 ObjectEvidence -> BodyLines;   BodyLines, p -> Seen (`Elastic.look`);   BodyLines, Seen -> pairs at the least price
     [Kuhn 1955]
@@ -25,8 +25,20 @@ REAL = 0.75
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyLines:
-    """One body's lines: ln f and spread (k,), worth (k,), amplitude (s, k) or None where patterns say nothing, row
-    (s,): which strikes of `Elastic.look`.
+    """Lines of one body, whatever they were paired with.
+
+    Attributes
+    ----------
+    log_hz, sd : (k,)
+        ln f and its spread.
+    worth : (k,)
+        Weights.
+    amplitude : (s, k) complex
+        None where patterns over the strikes are not comparable.
+    row : (s,)
+        The strikes' rows in `Elastic.look`.
+    elastic : Elastic
+        The body under any elasticity.
     """
 
     log_hz: Array
@@ -38,15 +50,16 @@ class BodyLines:
 
 
 def body_lines_of(evidence: Evidence) -> list[BodyLines]:
-    """All lines, whatever they were paired with, of the objects that can be of any elasticity."""
+    """Return all lines, whatever they were paired with, of the objects that can be of any elasticity."""
     return [
         _body_lines(h) for h in evidence.observed if h.elastic is not None and len(h.freq_hz) + len(h.foreign_hz) > 4
     ]
 
 
 def ringing(h: ObjectEvidence) -> Array:
-    """Which foreign lines (f,) may be modes by their decay and phases; others are a click's, a filter's, a room's or
-    noise.
+    """Select the foreign lines (f,) that may be modes by their decay and phases.
+
+    Others belong to a click, a filter, a room or noise.
     """
     decay = np.nan_to_num(h.foreign_decay_per_s)
     own = decay < SHORT * h.foreign_hz
@@ -59,6 +72,7 @@ def ringing(h: ObjectEvidence) -> Array:
 
 
 def _body_lines(h: ObjectEvidence) -> BodyLines:
+    """Collect the lines of one object."""
     assert h.elastic is not None
     own = ringing(h)
     freq, decay = (
@@ -85,7 +99,17 @@ def _body_lines(h: ObjectEvidence) -> BodyLines:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """A tensor's modes beside one body's lines: log_hz (m,), slope of ln λ by mode (k,) -> (9, k), alike (k, m)."""
+    """Modes of a tensor and one body's lines.
+
+    Attributes
+    ----------
+    log_hz : (m,)
+        ln f of the modes.
+    slope : callable
+        Modes (k,) -> slopes (9, k) of their ln λ over the constants.
+    alike : (k, m)
+        Likeness of lines' and modes' patterns, 0 to 1.
+    """
 
     log_hz: Array
     slope: Callable[[Array], Array]
@@ -93,7 +117,7 @@ class Seen:
 
 
 def seen_by(lines: BodyLines, p: Array) -> Seen:
-    """The modes of p and how alike their patterns are to the lines'."""
+    """Compute the modes of p (9,) and the likeness of their patterns to the lines'."""
     freq, slope, psi = lines.elastic.look(stiffness(p))
     alike = np.ones((len(lines.log_hz), len(freq)))
     if lines.amplitude is not None:
@@ -108,9 +132,25 @@ def seen_by(lines: BodyLines, p: Array) -> Seen:
 
 
 def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None) -> tuple[Array, Array, float]:
-    """Lines and modes (k',) paired at the least price, and the price over the lines' worth.
+    """Pair lines and modes at the least price.
 
-    lowest: how many of the lines, all where None.
+    Parameters
+    ----------
+    lines : BodyLines
+        The lines.
+    seen : Seen
+        The modes.
+    width : float
+        Of ln f.
+    lowest : int
+        Number of lines from the lowest, all where None.
+
+    Returns
+    -------
+    line, mode : (k',)
+        Indices of the pairs.
+    price : float
+        Over the lines' worth, 1 without pairs.
     """
     from scipy.optimize import linear_sum_assignment
 

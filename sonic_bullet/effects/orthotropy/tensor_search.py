@@ -1,4 +1,4 @@
-"""Which tensor do the lines tell? Search over elastic symmetries, starts, and pairs of lines and modes.
+"""Search for an elastic tensor over symmetries, starts, and pairs of lines and modes.
 
     p = (ln E₁₂₃, n₂₃ n₁₃ n₁₂, ln G₂₃ G₁₃ G₁₂), per density;  n_ij = ν_ij √(E_j/E_i),  S = D^{-1/2} (n) D^{-1/2}
         [Bodig & Jayne 1982, eq. 3.8]
@@ -59,10 +59,24 @@ REACH, WIDE = 2.0, 0.014
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tensor:
-    """A fitted elasticity. p (9,); bic; scatter: rms of ln f of the lines that fit; matched: their share; held: names
-    of `NAMES` that the prior holds.
+    """A fitted elasticity.
 
-    off: rms of ln f of all lines, those beyond CAP counted at it.
+    Attributes
+    ----------
+    symmetry : str
+        One of SYMMETRIES.
+    p : (9,)
+        Its numbers, as in the module's first equation.
+    bic : float
+        Bayes information criterion.
+    scatter : float
+        Rms of ln f of the lines that fit.
+    matched : float
+        Their fraction.
+    held : tuple of str
+        Those of NAMES that the prior holds.
+    off : float
+        Rms of ln f of all lines, those beyond CAP counted at it.
     """
 
     symmetry: str
@@ -75,11 +89,12 @@ class Tensor:
 
     @property
     def stiffness_m2_s2(self) -> Array:
+        """Return C/ρ (6, 6)."""
         return stiffness(self.p)
 
 
 def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
-    """(isotropic, best) by BIC; None where there are too few lines. Costs seconds."""
+    """Fit (isotropic, best) by BIC; None where there are too few lines. Takes seconds."""
     bodies = body_lines_of(evidence)
     if not bodies:
         return None
@@ -114,10 +129,11 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
 
 
 def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
-    """From an orthorhombic end, each of its numbers a step to either side and fitted again, as long as one of those
-    ends says more: wrong pairs of upper
-    lines and modes hold one another where the low ones hardly tell.
-        [iterated local search: Lourenço, Martin & Stützle 2003]"""
+    """Search on from an orthorhombic end: each number a step to either side, fitted again, while an end is better.
+
+    Wrong pairs of upper lines and modes support one another where the low ones hardly decide [iterated local search:
+    Lourenço, Martin & Stützle 2003].
+    """
     for _ in range(HOPS):
         sides = [p for p in (best.p + sign * one for one in np.diag(STEP) for sign in (-1, 1)) if sound(p)]
         end = min(
@@ -131,14 +147,15 @@ def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
 
 
 def isotropic_p(elastic: Elastic) -> Array:
-    """p (9,) of the isotropic material a body has in the baseline."""
+    """Return p (9,) of the isotropic material that a body has in the baseline."""
     m = elastic.material
     return expanded("isotropic", np.array([np.log(m.youngs_pa / m.density_kg_m3), m.poisson]))
 
 
 def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
-    """The best few, each with all its moduli scaled so that its modes agree best with the lines, as two spectra on a
-    logarithmic axis (see pairing.py).
+    """Select the best few starts, each with all its moduli scaled so that its modes agree best with the lines.
+
+    By correlation of the two spectra on a logarithmic axis.
     """
     shift = np.arange(-REACH, REACH + 1e-9, WIDE / 2)
     most = max(bodies, key=lambda t: float(t.worth.sum()))
@@ -155,7 +172,7 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
 
 
 def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Array:
-    """How much lines, each weighted by first (k,), and modes whose ln λ is shifted (n,) have in common: (n,)."""
+    """Correlate lines, each weighted by first (k,), and modes whose ln λ is shifted (n,): (n,)."""
     place = seen.log_hz + shift[:, None] / 2
     worth = np.interp(place, lines.log_hz, first, 0.0, 0.0)  # (n, m)
     weight = lines.worth[:, None] * first[:, None] * seen.alike**2
@@ -174,7 +191,7 @@ def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Arra
 
 
 def _peaks(score: Array) -> list[int]:
-    """Where a curve has its peaks, the highest first."""
+    """Return the indices of a curve's peaks, the highest first."""
     inner = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
     return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
 
@@ -182,7 +199,21 @@ def _peaks(score: Array) -> list[int]:
 def fitted(
     bodies: Sequence[BodyLines], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS
 ) -> Tensor:
-    """The best tensor of a symmetry from a start; guess: isotropic, what the prior leans to."""
+    """Fit the tensor of a symmetry from a start.
+
+    Parameters
+    ----------
+    bodies : sequence of BodyLines
+        Lines of each body.
+    symmetry : str
+        One of SYMMETRIES.
+    start : (9,)
+        p to start from.
+    guess : (9,)
+        p of the isotropic material, about which the prior lies.
+    widths : sequence of float
+        Widths w of ln f, one step of the fit each.
+    """
     q = reduced(symmetry, start)
     p = expanded(symmetry, q)
     for width in widths:
@@ -201,8 +232,9 @@ def fitted(
 
 
 def _few(lines: BodyLines, width: float) -> int | None:
-    """How many of the lowest lines to begin with where no pattern tells modes apart: low modes lie farther apart than a
-    start is wrong.
+    """Return the number of lowest lines to start with where patterns do not distinguish modes; None for all.
+
+    Low modes lie farther from each other than a start is wrong.
     """
     return (
         None
@@ -212,7 +244,7 @@ def _few(lines: BodyLines, width: float) -> int | None:
 
 
 def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
-    """∂ of(p(q))/∂q (n, q), by central differences."""
+    """Compute ∂ of(p(q))/∂q (n, q), by central differences."""
     h = 1e-5
     return np.stack(
         [(of(expanded(symmetry, q + h * e)) - of(expanded(symmetry, q - h * e))) / (2 * h) for e in np.eye(len(q))],
@@ -221,7 +253,7 @@ def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
 
 
 def _prior(guess: Array) -> Callable[[Array], Array]:
-    """Six residuals of p that should lie about zero, in spreads."""
+    """Return the function of p that gives the prior's six residuals, in spreads."""
 
     def of(p: Array) -> Array:
         e = p[:3]
@@ -234,6 +266,7 @@ def _prior(guess: Array) -> Callable[[Array], Array]:
 def _step(
     pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float
 ) -> Array:
+    """Compute one step of the least squares of the module's docstring, at most STEP."""
     prior = _prior(guess)
     own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
     turn = _jacobian(symmetry, q, constants)
@@ -255,7 +288,7 @@ def _step(
 
 
 def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) -> Tensor:
-    """BIC and what the lines leave to the prior."""
+    """Compute the BIC of a tensor, and which constants the lines leave to the prior."""
     p = expanded(symmetry, q)
     off, unlike, numbers, slopes = [], [], 0, []
     turn = _jacobian(symmetry, q, constants)
@@ -285,7 +318,7 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
 
 
 def _held(slope: Array, symmetry: str, q: Array, guess: Array, sd: float) -> tuple[str, ...]:
-    """Which of the nine the prior tells more of than the lines do: it halves their spread, or more."""
+    """Name the constants that the prior determines more than the lines do: it halves their spread, or more."""
     if symmetry == "isotropic":
         return ()
     bent = _jacobian(symmetry, q, _prior(guess))

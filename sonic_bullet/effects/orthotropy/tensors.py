@@ -22,7 +22,7 @@ POISSON = (-0.1, 0.0, 0.1)  # beside the guess'
 
 
 def stiffness(p: Array) -> Array:
-    """C/ρ (6, 6)."""
+    """Compute C/ρ (6, 6) of p (9,) in m²/s²."""
     root = np.exp(-0.5 * p[:3])
     normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
     found = np.zeros((6, 6))
@@ -32,20 +32,21 @@ def stiffness(p: Array) -> Array:
 
 
 def sound(p: Array) -> bool:
-    """Whether the tensor is positive definite."""
+    """Decide whether the tensor of p is positive definite."""
     normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
     return bool(np.linalg.eigvalsh(normal)[0] > 0.02)
 
 
 def constants(p: Array) -> Array:
-    """The nine constants (9,) of C/ρ, as `Elastic.look` orders them."""
+    """Compute the nine constants (9,) of C/ρ, as `Elastic.look` orders them."""
     c = stiffness(p)
     return np.array([c[i, j] for i, j in ORTHOTROPIC])
 
 
 def expanded(symmetry: str, q: Array) -> Array:
-    """p (9,) of a symmetry's own numbers: (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln
-    G_along), or p itself.
+    """Compute p (9,) of a symmetry's own numbers.
+
+    They are (ln E, n), (ln E, n, ln G), (ln E_along, ln E_across, n_along, n_across, ln G_along), or p itself.
     """
     if symmetry == "isotropic":
         return np.concatenate([np.full(3, q[0]), np.full(3, q[1]), np.full(3, q[0] - np.log(2 * (1 + q[1])))])
@@ -60,7 +61,7 @@ def expanded(symmetry: str, q: Array) -> Array:
 
 
 def reduced(symmetry: str, p: Array) -> Array:
-    """The symmetry's own numbers nearest to p."""
+    """Compute the symmetry's own numbers nearest to p."""
     if symmetry == "isotropic":
         return np.array([p[:3].mean(), p[3:6].mean()])
     if symmetry == "cubic":
@@ -73,7 +74,7 @@ def reduced(symmetry: str, p: Array) -> Array:
 
 
 def p_of(stiffness_m2_s2: Array) -> Array:
-    """p (9,) of C/ρ (6, 6): `stiffness` turned round."""
+    """Compute p (9,) of C/ρ (6, 6), the inverse of `stiffness`."""
     compliance = np.linalg.inv(stiffness_m2_s2)
     youngs = 1 / np.diag(compliance)[:3]
     normal = [-compliance[i, j] * np.sqrt(youngs[i] * youngs[j]) for i, j in ((1, 2), (0, 2), (0, 1))]
@@ -81,7 +82,7 @@ def p_of(stiffness_m2_s2: Array) -> Array:
 
 
 def cubes(start: Array) -> list[Array]:
-    """Cubic tensors p to begin a search with, about an isotropic one."""
+    """Return cubic tensors p to start a search from, about an isotropic one."""
     found = []
     for ratio in ZENER:
         for more in POISSON:
@@ -93,7 +94,7 @@ def cubes(start: Array) -> list[Array]:
 
 
 def bricks(start: Array, ratios: tuple[float, ...] = RATIOS) -> list[Array]:
-    """Orthorhombic ones: E along y and z over that along x, and G as goes with them or softer."""
+    """Return orthorhombic tensors p to start from: E along y and z over that along x, and G as isotropic or softer."""
     found = []
     for y in ratios:
         for z in ratios:

@@ -5,7 +5,7 @@
         [Goldsmith 1960, ch. 1; Falcon et al. 1998, eq. 1]
     g goes as the impulse (free flight), or is the arm's own, whatever J
 
-Read off the recordings: what remains of them beside the model is the model again, later and weaker.
+Identified by the recordings: their residual is the model again, later and weaker.
 """
 
 from __future__ import annotations
@@ -50,8 +50,22 @@ SOUGHT = 0.07  # of what is left, that a third hit looked for at every lag must 
 
 @dataclass(frozen=True)
 class Rebound:
-    """First gap in s at the impulse impulse_n_s, going as impulse^exponent; restitution: of each next hit and gap
-    against the last; ratio of gaps.
+    """Hits of one strike after the first.
+
+    Attributes
+    ----------
+    gap_s : float
+        First gap at the impulse `impulse_n_s`.
+    impulse_n_s : float
+        Reference impulse.
+    restitution : float
+        Each hit's impulse over that of the one before.
+    exponent : float
+        Gaps go as impulse^exponent.
+    shrink : float
+        Each gap over the one before; None for the restitution.
+    hits : int
+        Number of hits, the first included.
     """
 
     id: ClassVar[str] = "rebound"
@@ -68,7 +82,7 @@ class Rebound:
     hits: int = MOST_HITS
 
     def apply(self, x: Impact) -> Impact:
-        """The impact with the effect in it."""
+        """Repeat the impact's hits."""
         gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
         ratio = self.restitution if self.shrink is None else self.shrink
         share = self.restitution ** np.arange(self.hits)
@@ -78,7 +92,7 @@ class Rebound:
         return replace(x, delay_s=delay, share=(x.share[:, None] * share).ravel())
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         shrink = self.restitution if self.shrink is None else self.shrink
         return {
             "gap_s": self.gap_s,
@@ -90,10 +104,12 @@ class Rebound:
         }
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 3
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Look for later hits strike by strike, else in all strikes at once; None where there are none."""
         h = max((h for h in evidence.observed if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
         if h is None or len(h.freq_hz) < 3:
             return None
@@ -104,11 +120,10 @@ class Rebound:
 
     @classmethod
     def _of_all(cls, h: ObjectEvidence) -> Self | None:
-        """Read off all strikes at once: what rings for long is alike a whole number of turns later, so that one strike
-        alone tells many a delay.
+        """Look for later hits in all strikes at once; None where there are none.
 
-        Strikes of one strength are of no use: there all exponents say the same, and nothing tells a hit from what
-        beats.
+        A slow decay looks alike a whole number of periods later, so that one strike alone allows many delays. Strikes
+        of one strength are of no use: there all exponents fit alike, and hits and beats are not distinguishable.
         """
         level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
         if len(level) < 2 or level.max() < APART * level.min():
@@ -124,7 +139,7 @@ class Rebound:
 
     @classmethod
     def _one_by_one(cls, h: ObjectEvidence) -> Self | None:
-        """Read off each strike, and what they agree on."""
+        """Look for later hits in each strike, and combine what they agree on; None where they do not."""
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, hits_by_strike(h), strict=True) if len(hits)]
         need = max(2.0, MOST * len(h.impulse_n_s))
         if len(found) < 2:
@@ -164,10 +179,9 @@ class Rebound:
 
 
 def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple[float, dict[str, Any]]:
-    """What is left, up to a constant, and the restitution, gaps and their ratio that leave least of all strikes at
-    once: Σ_s |<y, m>|²/<m, m> is most, m the sound of all its hits.
+    """Fit restitution, first gap and ratio of gaps to all strikes: Σ_s |<y, m>|²/<m, m>, m all hits, is largest.
 
-    known: whether start is near what is looked for.
+    Returns what is left, up to a constant, and the fitted fields. known: whether start is near the solution.
     """
     assert h.signal is not None
     n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
@@ -224,7 +238,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
 
 
 def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]:
-    """The least about a start."""
+    """Find the minimum near a start."""
     from scipy.optimize import minimize
 
     simplex = start + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
@@ -238,8 +252,9 @@ def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]
 
 
 def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
-    """Σ_j share_j e^{−(fade + 2πif) delay_j} (f,), in half the usual digits: phases, turns taken off, are good to
-    4e-7, and all of a search's time goes here.
+    """Compute Σ_j share_j e^{−(fade + 2πif) delay_j} (f,) in single precision.
+
+    Phases, whole periods taken off, are accurate to 4e-7, and a search spends all its time here.
     """
     phase = np.multiply.outer(impact.delay_s, freq_hz)
     phase = (2 * np.pi * (phase - np.rint(phase))).astype(np.float32)
@@ -248,8 +263,9 @@ def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
 
 
 def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[int]]:
-    """(share in all, value, which of each strike's or -1) of the value that the largest shares of the strikes
-    agree on.
+    """Find the value that the largest shares of the strikes agree on.
+
+    Returns (sum of shares, value, which of each strike's or -1).
     """
     best: tuple[float, float, list[int]] = (0.0, 0.0, [-1] * len(value))
     for centre in np.concatenate([*value, np.zeros(0)]):
@@ -262,4 +278,5 @@ def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[
 
 
 def _spread(y: Array) -> float:
+    """Compute the mean distance from the median."""
     return float(np.abs(y - np.median(y)).mean())

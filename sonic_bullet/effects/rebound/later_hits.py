@@ -1,7 +1,7 @@
-"""When did a strike hit again? By what the sound of one hit says of a recording, later.
+"""Times of later hits of a strike, by correlation of a recording with the sound of one hit.
 
 strike by strike: matching pursuit over delays                          [Mallat & Zhang 1993]
-all strikes at once, by the exponent with which gaps go with strength:   what a second hit says beside the first
+all strikes at once, by the exponent with which gaps go with strength: gain of a second hit over the first
     [Pati, Rezaiifar & Krishnaprasad 1993]
 """
 
@@ -25,11 +25,24 @@ EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
 def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, float]]:
-    """(said, gap in s at level 1, exponent) of the second hit that says most of what one hit leaves of the strikes, on
-    average, by exponent.
+    """Find by exponent the second hit that explains most of what one hit leaves of the strikes, on average.
 
-    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best share of x leaves: what x_τ says beside x
-        [orthogonal matching pursuit: Pati, Rezaiifar & Krishnaprasad 1993]
+    Parameters
+    ----------
+    h : ObjectEvidence
+        The object.
+    level : (s,)
+        The strikes' strengths, relative.
+
+    Returns
+    -------
+    list of (explained, gap_s, exponent)
+        Explained fraction of energy, and the gap at level 1.
+
+    References
+    ----------
+    <r, x_τ>²/(|x_τ|² − <x, x_τ>²/|x|²)/|r|², r what the best multiple of x leaves: orthogonal matching pursuit [Pati,
+    Rezaiifar & Krishnaprasad 1993].
     """
     assert h.signal is not None
     sound = direct_as_expected(h)
@@ -62,12 +75,25 @@ def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, floa
 
 
 def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade: float) -> float:
-    """Restitution, which is the gaps' ratio too, of three hits that say most of all strikes: Σ_s |<y, m>|²/<m, m>, by
-    correlations at every lag.
+    """Find the restitution, which is the gaps' ratio too, of three hits that explain most of all strikes.
 
-    A ratio that is off by half a turn of the loudest modes leads nowhere, so all are looked at. gap_s, total (s,):
-    first gaps, energies; both, own (s, f): spectra of the recordings against one hit's sound, and of that; fade in 1/s:
-    both are faded.
+    Σ_s |<y, m>|²/<m, m> by correlations at every lag: a search from a ratio that is off by half a period of the loudest
+    modes does not converge, so all are tried.
+
+    Parameters
+    ----------
+    gap_s : (s,)
+        First gaps.
+    both : (s, f) complex
+        Spectra of the recordings against one hit's sound.
+    own : (s, f)
+        Power spectra of one hit's sound.
+    total : (s,)
+        Energies of the recordings.
+    sr : int
+        Sampling rate in Hz.
+    fade : float
+        Rate in 1/s of the exponential by which both are weighted.
     """
     size = 2 * (both.shape[1] - 1)
     cross, auto = (np.fft.irfft(x, FINER * size, axis=1) * (FINER * size / 2) for x in (both, own))
@@ -87,15 +113,17 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
 
 
 def _lagged(x: Array, lag: Array) -> Array:
-    """A correlation at some lags; none beyond the recording, where the transform holds negative ones."""
+    """Return a correlation at some lags; 0 beyond the recording, where the transform holds negative ones."""
     return np.where(lag < len(x) // 2, x[np.minimum(lag, len(x) - 1)], 0.0)
 
 
 def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
-    """Per strike: delays in s and shares of the hits after the first, by their time.
+    """Find per strike the delays in s and shares of the hits after the first, by their time.
 
-    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, as the lines and the model have it, is sought later in
-    what is left; after every find all shares are solved together.
+    References
+    ----------
+    Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, by the lines and the model, is sought later in what is
+    left; after every find all shares are solved together.
     """
     assert h.signal is not None
     sound = direct_as_expected(h)
@@ -125,7 +153,7 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
 
 
 def _delayed(x: Array, lag_s: float, sr: int) -> Array:
-    """x (n,) later by lag_s, between samples too: a turn of the spectrum's phase."""
+    """Delay x (n,) by lag_s, between samples too, by the phase of its spectrum."""
     n = len(x)
     size = 2 * n
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(size, 1 / sr) * lag_s)
@@ -133,14 +161,14 @@ def _delayed(x: Array, lag_s: float, sr: int) -> Array:
 
 
 def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:
-    """Shares (h,) by least squares, and what they make (n,)."""
+    """Fit shares (h,) by least squares, and return them with their sum of hits (n,)."""
     columns = np.stack([_delayed(x, lag, sr) for lag in lags], axis=1)
     share = np.linalg.lstsq(columns, y, rcond=None)[0]
     return share, columns @ share
 
 
 def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, float]:
-    """The delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
+    """Find the delay at which x explains most of what is left, to a sixteenth of a sample, and its strength."""
     size = 2 * len(x)
     both = np.conj(np.fft.rfft(x, size)) * np.fft.rfft(rest, size)
     cross = np.fft.irfft(both, size)[:reach]
@@ -164,6 +192,6 @@ def _sought(x: Array, rest: Array, sr: int, reach: int) -> tuple[float | None, f
 
 @lru_cache(maxsize=1)
 def _between(size: int) -> tuple[Array, Array]:
-    """Fractions of a sample (33,), and what turns a spectrum's products by each (33, b)."""
+    """Return fractions of a sample (33,), and the phase factors (33, b) that shift a spectrum by each."""
     between = np.linspace(-1, 1, 33)
     return between, np.exp(2j * np.pi * np.outer(between, np.arange(size // 2 + 1)) / size)

@@ -1,13 +1,13 @@
-"""`room`: reflections and reverberation: the same late decay in every band, whatever rings.
+"""`room`: reflections and reverberation: the same late decay in every band, whatever the object.
 
     y = x + h * x,   h(t) Gaussian with variance w² 2δ e^{−2δt},
         rt60 = ln(10³)/δ, reverberant level w = energy of h over the direct sound's 1, rooted
         [Schroeder 1965; statistics of the tail: Polack 1988; Kuttruff 2009, ch. 4]
 
 δ is the one rate that makes all lines likeliest as modes that ring on in such a tail (reverberant_tail.py), each with a
-decay and a share of its own; lines that of themselves die sooner than the room must agree on it: what no body does and
-every room. h, if several strikes tell it, by least squares with that variance as its prior [Wiener 1949]. With a room,
-lines are identified as they would be without it (`dereverberated`).
+decay and a level of its own; lines that of themselves decay faster than the room must agree on it, as in every room and
+in no body. h, where several strikes identify it, by least squares with that variance as its prior [Wiener 1949]. With a
+room, lines are identified as they would be without it (`dereverberated`).
 """
 
 from __future__ import annotations
@@ -40,10 +40,20 @@ TURNS, AGAIN, FULLY = 150, 40, 400
 
 @dataclass(frozen=True)
 class Room(Dereverberates):
-    """rt60_s, reverberant_level.
+    """Reverberation of the room.
 
-    response (t,): the tail's taps at rate sr, the first at the direct sound itself; empty: noise of that law from
-    ``seed``.
+    Attributes
+    ----------
+    rt60_s : float
+        Time in which the tail falls by 60 dB.
+    reverberant_level : float
+        w of the module's first equation.
+    seed : int
+        Of the noise, where there is no response.
+    response : (t,)
+        The tail's taps, the first at the direct sound; empty: noise of that law.
+    sr : int
+        Sampling rate of the response in Hz.
     """
 
     id: ClassVar[str] = "room"
@@ -59,7 +69,7 @@ class Room(Dereverberates):
     sr: int = 0
 
     def taps(self, sr: int, n: int) -> Array:
-        """The tail (n,) at a rate."""
+        """Compute the tail (n,) at a sampling rate."""
         if len(self.response) and self.sr == sr:
             return np.asarray(np.concatenate([self.response[:n], np.zeros(max(n - len(self.response), 0))]))
         if len(self.response):
@@ -82,7 +92,7 @@ class Room(Dereverberates):
         )
 
     def apply(self, x: Sound) -> Sound:
-        """The sound with the effect in it."""
+        """Add the tail to the sound."""
         if self.reverberant_level == 0 or not len(x.sample):
             return x
         from scipy.signal import fftconvolve
@@ -91,12 +101,24 @@ class Room(Dereverberates):
         return replace(x, sample=x.sample + tail)
 
     def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
-        """The evidence with its lines as they would be outside the room."""
+        """Return the evidence with its lines as they would be without the room."""
         return reverberant_tail.dereverberated(observed, RT60 / self.rt60_s)
 
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """The same room, its response by what strikes (s, n) were recorded as, and what they would sound like without
-        it; sought from the one it has. fully: to the end.
+        """Identify the room's response from recordings, starting from the one it has.
+
+        Parameters
+        ----------
+        signal : (s, n)
+            Recordings of strikes.
+        sound : (s, n)
+            The same without the room, synthesized.
+        noise : (s,)
+            Rms of the recordings' noise.
+        sr : int
+            Sampling rate in Hz.
+        fully : bool
+            Iterate to convergence.
         """
         start = self.response if self.sr == sr and len(self.response) == signal.shape[1] else None
         turns = FULLY if fully else TURNS if start is None else AGAIN
@@ -107,14 +129,16 @@ class Room(Dereverberates):
         )
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {"rt60_s": self.rt60_s, "wet": self.reverberant_level}
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 2
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Identify the reverberation of the object with most lines; None where their late decays are not one."""
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz))
         if (
             observed.signal is None
@@ -150,8 +174,14 @@ class Room(Dereverberates):
 
 
 def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] | None:
-    """δ, w; None where the lines' late decays are not one. known: δ as the whole evidence has it, to be identified
-    again near by.
+    """Estimate δ in 1/s and w; None where the lines' late decays are not one.
+
+    Parameters
+    ----------
+    h : ObjectEvidence
+        The object.
+    known : float
+        δ found in the whole evidence, near which it is estimated again.
     """
     lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:LINES])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
@@ -169,12 +199,12 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
 
 
 def _agreed(r: reverberant_tail.Read) -> Array:
-    """Ln likelihood (t,) of a rate, no line speaking louder than CAP."""
+    """Compute ln likelihood (t,) of each rate, no line's influence larger than CAP."""
     return np.asarray(np.maximum(r.ln_likelihood - r.ln_likelihood.max(axis=0), -CAP).sum(axis=1))
 
 
 def _one(r: reverberant_tail.Read, best: int) -> bool:
-    """Whether lines that die sooner than the room end with it, all of them alike."""
+    """Decide whether lines that decay faster than the room end with it, all of them alike."""
     gain, delta = r.ln_likelihood[best] - r.plain, r.delta[best]
     mine = (r.decay_per_s[best] > FASTER * delta) & (gain > TELLS)
     off = np.abs(np.log(r.delta[r.ln_likelihood.argmax(axis=0)] / delta))[mine]
@@ -192,8 +222,26 @@ def identified(
     start: Array | None = None,
     turns: int = TURNS,
 ) -> Array:
-    """The tail (n,) that makes the direct sounds (s, n) the recorded ones, by conjugate gradients on the normal
-    equations under its prior, from none or from start (n,).
+    """Estimate the tail (n,) by conjugate gradients on the normal equations under its prior.
+
+    Parameters
+    ----------
+    signal : (s, n)
+        Recordings of strikes.
+    sound : (s, n)
+        The same without the room, synthesized.
+    noise : (s,)
+        Rms of the recordings' noise.
+    sr : int
+        Sampling rate in Hz.
+    delta : float
+        δ in 1/s.
+    reverberant_level : float
+        w.
+    start : (n,)
+        Tail to start from, none where None.
+    turns : int
+        Iterations at most.
     """
     from scipy.fft import irfft, next_fast_len, rfft
 

@@ -1,10 +1,10 @@
-"""What is observed twice at one ratio of frequencies: an echo of something that moves.
+"""Lines that recur at one ratio of frequencies: an echo of something that moves.
 
     x(t) + r x((1 + ε)t − T):  every line (f, d) again at ((1 + ε)f, (1 + ε)d), and as loud against the first in every
         strike    [Doppler; Pierce 1989, ch. 9]
 
-No room does that: what is linear and stands still brings no frequency of its own. No body does, where its modes'
-patterns differ: struck at one place alone all lines are alike, and pairs split by one share would pass for echoes.
+No room does that: a linear system at rest adds no frequency. No body does, where its modes' patterns differ: struck at
+one place alone all lines are alike, and pairs split by one ratio would be taken for echoes.
 """
 
 from __future__ import annotations
@@ -23,8 +23,19 @@ CHANCE = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
 
 
 def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
-    """The ratio 1 + ε > 1 at which many lines (k,), SHARE of all or more, are observed again, by amplitudes (s, k) of
-    two strikes or more; None where they are not.
+    """Find the ratio 1 + ε > 1 at which many lines recur.
+
+    Parameters
+    ----------
+    freq_hz, decay_per_s : (k,)
+        The lines.
+    amplitude : (s, k)
+        Their amplitudes in two strikes or more.
+
+    Returns
+    -------
+    float or None
+        None where fewer than SHARE of all lines recur.
     """
     from scipy.stats import poisson
 

@@ -1,12 +1,12 @@
-"""`support-damping`: a fixture takes energy where it touches.
+"""`support-damping`: a fixture takes energy where it is in contact with the body.
 
     q̈ + (2d + Σ_j c_j Φ_jᵀΦ_j) q̇ + Λq = 0      c in N·s/m; Φ_j: φ(p_j)·n, or φ(p_j) in every direction
         [Zheng & James 2011; Woodhouse 1998, eq. 12]
 
-to first order Δd_k = ½ Σ_j c_j |φ_k(p_j)|²; modes at one frequency turn to the dashpot, and strong ones couple:
-`dashpots`. Read off decays and patterns together: what dashpots all over the surface would make of the modes is held
-against the lines, beside a smooth law of the material; one after another the best stand, while each explains enough of
-what is left.
+to first order Δd_k = ½ Σ_j c_j |φ_k(p_j)|²; degenerate modes turn to the dashpot, and strong dashpots couple modes:
+`dashpots`. Identified by decays and patterns together: the modes under dashpots all over the surface are compared with
+the lines, beside a smooth law of the material; one after another the best are taken, while each explains enough of what
+is left.
 """
 
 from __future__ import annotations
@@ -29,8 +29,16 @@ LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though
 
 @dataclass(frozen=True)
 class SupportDamping:
-    """Dashpots of strength (j,) in N·s/m at position_m (j, 3) on the surface, in the mesh's frame; along (j,):
-    "normal" to it, or "every" direction; () all normal.
+    """Dashpots on the surface, one entry a dashpot.
+
+    Attributes
+    ----------
+    position_m : (j, 3)
+        In the mesh's frame.
+    strength_n_s_m : (j,)
+        c in N·s/m.
+    along : (j,)
+        "normal" to the surface, or "every" direction; () all normal.
     """
 
     id: ClassVar[str] = "support-damping"
@@ -44,7 +52,7 @@ class SupportDamping:
     along: tuple[str, ...] = ()
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
+        """Compute the modes of the body under the dashpots."""
         if not any(self.strength_n_s_m) or not x.mode_count:
             return x
         normal = vertex_normals(x)
@@ -58,14 +66,16 @@ class SupportDamping:
         return damped(x, np.concatenate(rows))
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, in SI units, for reports and JSON."""
         return {"position_m": [list(p) for p in self.position_m], "c_n_s_m": list(self.strength_n_s_m)}
 
     def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
         return 3 * len(self.strength_n_s_m)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Search for dashpots on the object with most lines; None where there are none."""
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
         if (
             observed.model is None
@@ -81,6 +91,7 @@ class SupportDamping:
 
     @classmethod
     def _of(cls, trial: DashpotFit, found: tuple[Dashpot, ...]) -> Self:
+        """Build the effect from the dashpots that a search found."""
         place = [trial.model.vertex_m[d.vertex] for d in found]
         return cls(
             tuple((float(a), float(b), float(c)) for a, b, c in place),
@@ -89,6 +100,7 @@ class SupportDamping:
         )
 
     def _on(self, x: ModalModel) -> tuple[Dashpot, ...]:
+        """Return its dashpots at the vertices of a model."""
         along = self.along or ("normal",) * len(self.position_m)
         return tuple(
             Dashpot(nearest(x, p), c, direction)
@@ -97,6 +109,6 @@ class SupportDamping:
 
 
 def _most(trial: DashpotFit, found: tuple[Dashpot, ...]) -> float:
-    """The largest share that dashpots add to a mode's decay, to first order: ½ Σ_j c_j |Φ_j|²/d."""
+    """Compute the largest part of a mode's decay that dashpots add, to first order: ½ Σ_j c_j |Φ_j|²/d."""
     added = (trial.rows([found])[0] ** 2).sum(axis=0) / 2
     return float((added / np.maximum(trial.model.decay_per_s, 1e-9)).max(initial=0.0))

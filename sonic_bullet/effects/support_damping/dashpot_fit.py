@@ -1,4 +1,4 @@
-"""Dashpots on trial: how far the lines are from the modes that they would make.
+"""Misfit of the lines and the modes under dashpots.
 
     price_kj = (Δln f/w)²/18 + (Δln d/e)²/18 + 1 − c_kj, at most 1;   Σ worth_k (price − 1) -> min over one-to-one pairs
         [Kuhn 1955; Crouse 2016]
@@ -7,13 +7,13 @@
         by Huber's loss: a discrete spectrum of relaxations, as of a passive solid [Nowick & Berry 1972, ch. 3]
     left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + ρ(l_k/LEVEL)],
         each bounded, ρ Cauchy's;
-        lines that no mode explains count as outliers, and so do modes that would be observable and that no line shows
+        lines that no mode explains count as outliers, and so do modes that would be observable and have no line
 
 c_kj: cosine of a line's amplitudes over the strikes with what one exponential at the mode's pole would take of all
 modes, Σ_i a_i 2d_j/((d_i + d_j) − i(ω_i − ω_j)), or with the mode's own. C_k: with what exponentials at the lines'
-poles take of all modes together (variable projection's linear half [Golub & Pereyra 1973]): modes that sound as one
-line are one, those that a dashpot has split are not. l_k: ln of a line's level over that, less what is common to
-all: of degenerate modes that a dashpot has turned, which one the sensor hears, all strikes show alike, so C_k does not.
+poles take of all modes together (variable projection's linear half [Golub & Pereyra 1973]): modes that appear as one
+line are one, those that a dashpot has split are not. l_k: ln of a line's level over that, less what is common to all:
+which one of degenerate modes turned by a dashpot the sensor sees is the same in all strikes, so C_k cannot show it.
 """
 
 from __future__ import annotations
@@ -63,13 +63,34 @@ Dashpots = tuple[Dashpot, ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DashpotFit:
-    """An object's lines (k,) and modes (m,). size (s, k) complex, worth (k,); into (s, m): J φ(p)·e of the strikes;
-    out (m,): φ(q)·n of the sensor.
+    """Lines and modes of an object whose dashpots are fitted.
 
-    observed_hz, rings_per_s (l,): of every line, those too that are not held against modes; through (m,): what pulse
-    and path leave of a mode, relative. normal (v, 3) of all vertices, body: those of the surface. runs, wide:
-    neighbours that may couple, RUN and WIDE; least (c,): the law that most lines lie above; untied (k, k): of the
-    lines' exponentials.
+    Attributes
+    ----------
+    freq_hz, decay_per_s, sd, worth : (k,)
+        The lines, spreads of their decays, weights.
+    size : (s, k) complex
+        Amplitudes.
+    observed_hz, rings_per_s : (l,)
+        Frequencies and decays of all lines, also those that are not fitted.
+    through : (m,)
+        Gain of pulse and path at each mode, relative.
+    signed : bool
+        Whether phases are true.
+    model : ModalModel
+        The body without dashpots.
+    normal : (v, 3)
+        Normals of all vertices.
+    body : (b,)
+        The surface's vertices.
+    into, out : (s, m), (m,)
+        J φ(p)·e of the strikes, φ(q)·n of the sensor.
+    runs, wide : tuple of (r,)
+        Neighbours that may couple, RUN and WIDE at most.
+    least : (c,)
+        The law that most lines lie above.
+    untied : (k, k)
+        Of the lines' exponentials, see `_untied`.
     """
 
     freq_hz: Array
@@ -92,10 +113,12 @@ class DashpotFit:
     untied: Array = field(init=False)
 
     def __post_init__(self) -> None:
+        """Compute `untied`."""
         object.__setattr__(self, "untied", _untied(self.freq_hz, self.decay_per_s))
 
     @classmethod
     def of(cls, h: ObjectEvidence) -> DashpotFit:
+        """Prepare the fit of an object."""
         x = h.model
         assert x is not None
         lone = np.zeros(len(h.foreign_hz))
@@ -139,29 +162,24 @@ class DashpotFit:
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
-        """Of the lines' decays, patterns and levels, in squared spreads, beside the law that suits them best.
-
-        runs: modes that couple; every one with every other where None.
-        """
+        """Compute the misfit of decays, patterns and levels with the best law; runs: of modes that couple, None: all."""
         x = self.model
         if not dashpots:
             return self.misfit(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
         return self.misfit(*self._poles([dashpots], runs or (np.arange(x.mode_count),))[0], 2)
 
     def plain(self) -> tuple[Array, Array]:
-        """Lines (p,) and the modes (p,) they stand for without any dashpot."""
+        """Pair lines (p,) and modes (p,) without any dashpot."""
         x, omega = self.model, 2 * np.pi * self.model.freq_hz
         return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
     def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
-        """Poles (m,) and turns (m, m) of many, one after another, modes coupling within runs only.
-
-        AT_ONCE are held: of thousands, turns fill the memory.
-        """
+        """Yield poles (m,) and turns (m, m) of many trials; modes couple within runs only; AT_ONCE are in memory."""
         for first in range(0, len(trials), AT_ONCE):
             yield from self._poles(trials[first : first + AT_ONCE], runs)
 
     def _poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
+        """Compute poles and turns of some trials."""
         phi, m = self.rows(trials), self.model.mode_count
         lam, own = self.model.omega0_squared_per_s2, self.model.decay_per_s
         pole, turn = np.empty((len(trials), m), complex), np.zeros((len(trials), m, m), complex)
@@ -171,7 +189,7 @@ class DashpotFit:
         return list(zip(pole, turn, strict=True))
 
     def rows(self, trials: list[Dashpots]) -> Array:
-        """√c φ (t, 3j, m) of trials of as many dashpots each; rows that say nothing are zero."""
+        """Compute √c φ (t, 3j, m) of trials of j dashpots each; unused rows are zero."""
         vertex = np.array([[d.vertex for d in t] for t in trials])
         root = np.sqrt(np.array([[d.c for d in t] for t in trials]))
         moved = self.model.shape[vertex].astype(float)
@@ -185,21 +203,19 @@ class DashpotFit:
         )
 
     def price(self, pole: Array, turn: Array) -> float:
-        """Of the pairs of lines and modes beside the least law: a first look."""
+        """Compute the least price of pairs of lines and modes, with the least law: a first estimate."""
         pole, turn = _alive(pole, turn)
         decay = -pole.real - self._own(turn) + smooth_columns(pole.imag) @ self.least
         push = (self.into @ turn) * (self.out @ turn)
         return self._pairs(pole.imag, decay, self._alike(pole.imag, decay, push))[2]
 
     def _own(self, turn: Array) -> Array:
-        """The material's part (m,) of the decays."""
+        """Compute the material's part (m,) of the decays."""
         share = np.abs(turn) ** 2
         return np.asarray((share * self.model.decay_per_s[:, None]).sum(axis=0) / share.sum(axis=0))
 
     def misfit(self, pole: Array, turn: Array, turns: int) -> float:
-        """The same of poles (m,) and turns (m, m) that are at hand; turns: of pairing and the law, and how many laws
-        to begin with.
-        """
+        """Compute the misfit of poles (m,) and turns (m, m); turns: of pairing and law, and number of first laws."""
         pole, turn = _alive(pole, turn)
         own = self._own(turn)
         column = np.column_stack([smooth_columns(pole.imag), own])
@@ -208,7 +224,7 @@ class DashpotFit:
         return min(self._by_law(start, pole.imag, -pole.real - own, column, push, turns) for start in starts)
 
     def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
-        """What is left where lines and modes are first paired by a law (m,), then by the law that the pairs ask for."""
+        """Compute the misfit where lines and modes are paired by a law (m,), then by the law fitted to the pairs."""
         nothing = LOST * float(self.worth.sum())
         for _ in range(turns):
             alike = self._alike(omega, extra + law, push)
@@ -236,13 +252,11 @@ class DashpotFit:
         )
 
     def _through(self, freq_hz: Array) -> Array:
-        """What pulse and path leave (k,), relative."""
+        """Compute the gain (k,) of pulse and path, relative."""
         return np.interp(freq_hz, self.model.freq_hz, self.through)
 
     def _unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
-        """What modes (m,) cost that would be observable and are not observed: of a line's strength there, and no line
-        near that rings as long. mode (p,): those that lines stand for.
-        """
+        """Compute the cost of modes (m,) without a line that would be observable; mode (p,): those with a line."""
         freq = omega / (2 * np.pi)
         level = np.abs(push).max(axis=0) * self._through(freq)
         paired = np.bincount(mode, minlength=len(omega)) > 0
@@ -260,10 +274,9 @@ class DashpotFit:
         return float(MUTE * worth[~hidden].sum())
 
     def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
-        """Amplitudes (s, k) that exponentials at the lines' poles take of all modes together: Σ_l <e_k, e_l> A_l = Σ_i
-        <e_k, e_i> a_i.
+        """Compute amplitudes (s, k) at the lines' poles that fit all modes: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
 
-        Lines (p,) are at modes at (p,) in 1/s; what the mesh has wrong there is taken out, of their neighbours too.
+        Lines (p,) are at modes at (p,) in 1/s; the mesh's error there is taken out, of their neighbours too.
         """
         mine = np.sort(at)
         near = np.clip(np.searchsorted(mine, omega), 1, max(len(mine) - 1, 1))
@@ -278,9 +291,7 @@ class DashpotFit:
         return np.asarray((self.untied @ ((-size[:, None] / (z.conj()[:, None] + y)) @ push.T)).T * size)
 
     def _alike(self, omega: Array, decay: Array, push: Array) -> Array:
-        """Cosines (k, m) of the lines' amplitudes over the strikes and what one exponential at each mode's pole takes
-        of all, or the mode's own.
-        """
+        """Compute c_kj (k, m) of the module's docstring."""
         share = 2 * decay[None, :] / (decay[:, None] + decay[None, :] - 1j * (omega[:, None] - omega[None, :]))
         observed = self._seen(self.size)
         return np.maximum(
@@ -288,10 +299,11 @@ class DashpotFit:
         )
 
     def _seen(self, amplitude: Array) -> Array:
+        """Return amplitudes, or their magnitudes where phases are not true."""
         return amplitude if self.signed else np.abs(amplitude)
 
     def _pairs(self, omega: Array, decay: Array, alike: Array) -> tuple[Array, Array, float]:
-        """Lines and modes at the least price, and the price."""
+        """Pair lines and modes at the least price, and return the price."""
         from scipy.optimize import linear_sum_assignment
 
         off = np.log(2 * np.pi * self.freq_hz)[:, None] - np.log(omega)[None, :]
@@ -304,24 +316,24 @@ class DashpotFit:
 
 
 def _poles_of(freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
-    """z (k,) in 1/s and the size (k,) by which e^{zt} has norm one."""
+    """Compute z (k,) in 1/s and the factor (k,) by which e^{zt} has norm one."""
     return -decay_per_s + 2j * np.pi * freq_hz, np.sqrt(2 * decay_per_s)
 
 
 def _untied(freq_hz: Array, decay_per_s: Array) -> Array:
-    """(k, k): what undoes what exponentials of norm one have in common, a little damped where two are all but one."""
+    """Compute the regularized inverse (k, k) of the Gram matrix of exponentials of norm one."""
     z, size = _poles_of(freq_hz, decay_per_s)
     return np.asarray(np.linalg.inv(-size[:, None] * size / (z.conj()[:, None] + z) + 1e-3 * np.eye(len(z))))
 
 
 def _alive(pole: Array, turn: Array) -> tuple[Array, Array]:
-    """Without modes that no longer swing."""
+    """Remove modes that no longer oscillate."""
     alive = np.isfinite(pole)
     return pole[alive], turn[:, alive]
 
 
 def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
-    """Of columns (s, k) and (s, k), or of every two (k, m); 1 where there is nothing to tell."""
+    """Compute cosines of columns (s, k) and (s, k), or of every two (k, m); 1 where they are not comparable."""
     if len(a) < 2 or not (np.isfinite(a).all() and np.isfinite(b).all() and b.any()):
         return np.ones((a.shape[1], b.shape[1]) if every else a.shape[1])
     one, two = a / np.maximum(np.linalg.norm(a, axis=0), 1e-300), b / np.maximum(np.linalg.norm(b, axis=0), 1e-300)
@@ -329,9 +341,7 @@ def _cosine(a: Array, b: Array, *, every: bool = False) -> Array:
 
 
 def _level(observed: Array, modelled: Array) -> Array:
-    """ln of the level (k,) of columns (s, k) over that of others, less their median; 0 where there is nothing to
-    tell.
-    """
+    """Compute ln of the level (k,) of columns (s, k) over others', less the median; 0 where not comparable."""
     if not (np.isfinite(observed).all() and np.isfinite(modelled).all() and modelled.any()):
         return np.zeros(observed.shape[1])
     ratio = np.log(np.maximum(np.linalg.norm(observed, axis=0), 1e-300)) - np.log(

@@ -1,4 +1,4 @@
-"""A smooth law of damping that lines with dashpots lie above.
+"""A smooth law of damping below the decays of lines with dashpots.
 
 d(ω) = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)]: a discrete spectrum of relaxations, as of a passive solid
     [Nowick & Berry 1972, ch. 3]
@@ -18,13 +18,16 @@ TAU_S = (1e-5, 3e-5, 1e-4)
 
 
 def smooth_columns(omega: Array) -> Array:
-    """Columns (k, 3 + τ) of a smooth law of ω (k,)."""
+    """Compute the columns (k, 3 + τ) of a smooth law of ω (k,) in rad/s."""
     peak = [(omega * tau) ** 2 / (1 + (omega * tau) ** 2) for tau in TAU_S]
     return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2, *peak], axis=1)
 
 
 def least_law(omega: Array, decay: Array) -> Array:
-    """The smooth law (c,) that most lines (k,) lie above: a dashpot only adds. An expectile [Newey & Powell 1987]."""
+    """Fit the smooth law (c,) that most lines (k,) lie above: an expectile [Newey & Powell 1987].
+
+    A dashpot only adds to a decay.
+    """
     column, above = smooth_columns(omega), np.ones(len(omega), bool)
     value = np.zeros(column.shape[1])
     for _ in range(10):

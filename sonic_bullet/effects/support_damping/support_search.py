@@ -1,4 +1,4 @@
-"""Where dashpots may be: all over the surface in a first look, then about the best, one after another.
+"""Search for places of dashpots: all over the surface first, then about the best, one after another.
 
 data · ln left + j (3 ln data + BETTER) -> min over the number j of dashpots; each step: grid, the best few of it,
     refined       [Schwarz 1978]
@@ -30,8 +30,9 @@ BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one t
 
 
 def sought(t: DashpotFit) -> Dashpots:
-    """The dashpots that are accepted, one after another; the least Bayes information criterion says how many, with
-    BETTER for each on top.
+    """Find the dashpots that are accepted, one after another.
+
+    The least Bayes information criterion decides how many, with BETTER for each on top.
     """
     data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
     apiece = 3 * np.log(data) + BETTER
@@ -65,6 +66,7 @@ def sought(t: DashpotFit) -> Dashpots:
 
 
 def _grid(t: DashpotFit, vertices: Array) -> list[Dashpot]:
+    """Return dashpots of all strengths and directions at some vertices."""
     return [
         Dashpot(int(v), c, direction)
         for v in vertices
@@ -74,9 +76,7 @@ def _grid(t: DashpotFit, vertices: Array) -> list[Dashpot]:
 
 
 def _elsewhere(t: DashpotFit, found: Dashpots, spots: Array) -> Dashpots:
-    """The same number of dashpots, or a better set that some of them being far from where they are lead to: on round
-    bodies a search may end on the wrong side.
-    """
+    """Move each dashpot far away and search from there, as on round bodies a search may end on the wrong side."""
     best = (t.left(found), found)
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
@@ -87,14 +87,16 @@ def _elsewhere(t: DashpotFit, found: Dashpots, spots: Array) -> Dashpots:
 
 
 def _cost(pair: tuple[float, Dashpots]) -> float:
+    """Return the cost of a pair (cost, dashpots)."""
     return pair[0]
 
 
 def _with_one_more(
     t: DashpotFit, starts: list[Dashpots], grid: list[Dashpot], spots: Array
 ) -> tuple[Dashpots, list[Dashpots]]:
-    """The best set that a search finds from some sets of as many and one of the grid; and the sets to go on from: one
-    dashpot alone may stand best where neither of two is.
+    """Find the best set with one dashpot more, and the sets to go on from.
+
+    Other single dashpots are kept: the best one alone may be no member of the best two.
     """
     few: list[Dashpots] = []
     for chosen in starts:
@@ -116,18 +118,18 @@ def _with_one_more(
 
 
 def _left(t: DashpotFit, trials: list[Dashpots]) -> list[float]:
-    """What each leaves, modes coupling within runs only."""
+    """Compute what each trial leaves, modes coupling within runs only."""
     return _of_each(lambda part: [t.misfit(*modes, 1) for modes in t.poles(part, t.runs)], trials)
 
 
 def _of_each(price: Callable[[list[Dashpots]], list[float]], trials: list[Dashpots]) -> list[float]:
-    """The prices of many, one half beside the other."""
+    """Compute the prices of many trials, in two processes where there are many."""
     parts = [trials[: len(trials) // 2], trials[len(trials) // 2 :]] if len(trials) >= MANY else [trials]
     return [one for part in parallel_map(price, parts) for one in part]
 
 
 def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpots]:
-    """The few at the least price, the last dashpot of each at its own vertex."""
+    """Select the few trials at the least price, the last dashpot of each at a vertex of its own."""
     found: dict[int, Dashpots] = {}
     for i in np.argsort(price, kind="stable"):
         found.setdefault(trials[i][-1].vertex, trials[i])
@@ -135,8 +137,9 @@ def _best(price: list[float], trials: list[Dashpots], count: int) -> list[Dashpo
 
 
 def _spread(t: DashpotFit, count: int) -> Array:
-    """Surface vertices (p,) where a dashpot would do different things: each the farthest, in n·φ of all modes, from
-    those before it [Gonzalez 1985].
+    """Select surface vertices (p,) where dashpots have different effects.
+
+    Each is the farthest, in n·φ of all modes, from those before it [Gonzalez 1985].
     """
     body = t.body
     motion = np.einsum("vxm,vx->vm", t.model.shape[body].astype(float), t.normal[body])
@@ -152,7 +155,7 @@ def _spread(t: DashpotFit, count: int) -> Array:
 
 
 def _strengths(t: DashpotFit) -> Array:
-    """STEPS times the strength in N·s/m that doubles the typical decay."""
+    """Return STEPS times the strength in N·s/m that doubles the typical decay."""
     square = float((t.model.shape[t.body].astype(float) ** 2).sum(axis=1).mean()) / 3
     return np.array(STEPS) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
 
@@ -160,10 +163,25 @@ def _strengths(t: DashpotFit) -> Array:
 def refined(
     t: DashpotFit, start: Dashpots, reaches: tuple[float, ...], spots: Array | None = None, *, whole: bool = False
 ) -> tuple[float, Dashpots]:
-    """What is left, and the best of strengths, directions and places, one dashpot after another, in turns that reach so
-    far, in sizes of the body.
+    """Refine strengths, directions and places, one dashpot after another.
 
-    spots (p,): vertices spread over the surface, for turns that reach far.
+    Parameters
+    ----------
+    t : DashpotFit
+        The object.
+    start : tuple of Dashpot
+        Dashpots to start from.
+    reaches : sequence of float
+        Reach of each turn, in sizes of the body.
+    spots : (p,)
+        Vertices spread over the surface, for turns that reach far.
+    whole : bool
+        Whether all neighbours couple (`DashpotFit.wide`), not those within short runs alone.
+
+    Returns
+    -------
+    float, tuple of Dashpot
+        What is left, and the dashpots.
     """
     spots = t.body[:0] if spots is None else spots
     size = float(np.linalg.norm(np.ptp(t.model.vertex_m[t.body], axis=0)))
@@ -177,9 +195,7 @@ def refined(
 
 
 def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
-    """Others instead of one: elsewhere, as strong or taking as much, or near it, and stronger, weaker or along the
-    other direction.
-    """
+    """Return variants of a dashpot: elsewhere with the same strength or loss, stronger, weaker, other direction."""
     if not np.isfinite(reach_m):
         some = spots[: 2 * POINTS].tolist()
         return (
@@ -196,18 +212,18 @@ def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Das
 
 
 def _within(t: DashpotFit, d: Dashpot, reach_m: float, some: Array) -> Array:
-    """Of some vertices those within reach of a dashpot."""
+    """Select the vertices within reach of a dashpot."""
     return np.asarray(some[((t.model.vertex_m[some] - t.model.vertex_m[d.vertex]) ** 2).sum(axis=1) < reach_m**2])
 
 
 def _moved(t: DashpotFit, d: Dashpot, vertex: int) -> Dashpot:
-    """One elsewhere, of the strength that takes as much of all modes together, to first order."""
+    """Move a dashpot, with the strength that takes as much of all modes together, to first order."""
     power = [float(((t.normal[v] @ t.model.shape[v].astype(float)) ** 2).sum()) for v in (d.vertex, vertex)]
     return Dashpot(vertex, d.c * float(np.clip(power[0] / max(power[1], 1e-300), 0.1, 10)), d.along)
 
 
 def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
-    """The same with the strengths at which least is left, within TUNED in their logarithms."""
+    """Refine the strengths one after another, within TUNED in their logarithms."""
     from scipy.optimize import minimize_scalar
 
     for i in range(len(found)):

@@ -1,11 +1,10 @@
-"""Weak dashpots, all at once: to first order decays are linear in their strengths, so the best ones, twos and threes of
-a grid can be told by counting through.
+"""Weak dashpots, all at once: to first order decays are linear in their strengths, so best subsets are enumerated.
 
     d_k = law(ω_k) + ½ Σ_j c_j |φ_k(p_j)|²,  law = a + bω + cω²;   Σ_k ((d_k − …)/sd_k)² -> min over subsets
         (best subsets, law projected out [Frisch & Waugh 1933])
 
-One after another is not enough: what two or three do together, no one of them does best alone. Strong dashpots couple
-modes: support_search.py.
+One after another is not enough: the best two or three together need not contain the best one alone. Strong dashpots
+couple modes: support_search.py.
 """
 
 from __future__ import annotations
@@ -22,8 +21,16 @@ SAME = 1e-6  # of what a set explains
 
 
 def subsets(t: DashpotFit, vertices: Array, few: int) -> list[Dashpots]:
-    """The best ``few`` single dashpots, as many pairs and threes, at the vertices (p,) of a grid, along their normal or
-    every direction.
+    """Find the best single dashpots, pairs and triples on a grid.
+
+    Parameters
+    ----------
+    t : DashpotFit
+        The object.
+    vertices : (p,)
+        The grid; along the normal or every direction.
+    few : int
+        Sets of each size.
     """
     line, mode = t.plain()
     if len(line) < 4:
@@ -55,8 +62,9 @@ def subsets(t: DashpotFit, vertices: Array, few: int) -> list[Dashpots]:
 
 
 def _best(gram: Array, projection: Array, sets: Array) -> tuple[Array, Array, Array]:
-    """Of subsets (n, r) of columns those with strengths above zero, the best first, their strengths, and what each
-    takes off Σ y².
+    """Solve subsets (n, r) of columns: return those with strengths above zero, strengths, and gains in Σ y².
+
+    The best come first.
     """
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))[sets]
     matrix = gram[sets[:, :, None], sets[:, None, :]] / (size[:, :, None] * size[:, None, :])
