@@ -47,9 +47,10 @@ API = (
     ("sonic_bullet.files.cases", "Read a case.", ("read_case", "Case", "CaseObject", "CaseRecording", "Line")),
     ("sonic_bullet.presets", "Read and write presets.", ("read_preset", "write_preset", "material_of")),
     ("sonic_bullet.diagnosis.diagnose", "Diagnose a case.", ("diagnose", "described")),
-    ("sonic_bullet.effects", "The effects of the package; what they share is in the next two sections.", ("EFFECTS",)),
+    ("sonic_bullet.effects", "The effects; what they share is in the next three sections.", ("EFFECTS",)),
     ("sonic_bullet.effects.stages", "What an effect acts on.", "classes"),
-    ("sonic_bullet.effects.protocol", "What an effect is and what it reads.", "classes"),
+    ("sonic_bullet.effects.evidence", "What an effect reads.", "classes"),
+    ("sonic_bullet.effects.protocol", "What an effect is.", "classes"),
 )
 
 

@@ -162,7 +162,7 @@ class DashpotFit:
         )
 
     def left(self, dashpots: Dashpots, runs: tuple[Array, ...] | None = None) -> float:
-        """Compute the misfit of decays, patterns and levels with the best law; runs: of modes that couple, None: all."""
+        """Compute the misfit of decays, patterns and levels with the best law; runs: modes that couple, None: all."""
         x = self.model
         if not dashpots:
             return self.misfit(-x.decay_per_s + 2j * np.pi * x.freq_hz, np.eye(x.mode_count, dtype=complex), 2)
