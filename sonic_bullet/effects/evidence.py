@@ -20,12 +20,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elastic:
-    """A body under any orthotropic elasticity, its axes the mesh's. material: isotropic, as the baseline has it, with
-    the guessed density. phased: whether the signs of lines' amplitudes can be held against J ψ.
+    """A body under any orthotropic elasticity, its axes the mesh's.
 
-    look: C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,). Of modes (k,), ∂ ln λ/∂(C_i/ρ) (9, k) of the constants C11 C22
-    C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m) up to a factor, NaN for strikes of unknown place. solve: the same tensor
-    -> undamped ModalModel, strikes and sensor as last vertices.
+    Attributes
+    ----------
+    material : Material
+        Isotropic, as the baseline has it, with the guessed density.
+    phased : bool
+        Whether the signs of lines' amplitudes are comparable with those of J ψ.
+    look : callable
+        C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,); a function from modes (k,) to ∂ ln λ/∂(C_i/ρ) (9, k) of the
+        constants C11 C22 C33 C23 C13 C12 C44 C55 C66; and J ψ (s, m) up to a factor, NaN for strikes of unknown place.
+    solve : callable
+        C/ρ (6, 6) -> undamped ModalModel, strikes and sensor as last vertices.
     """
 
     material: Material
@@ -36,10 +43,16 @@ class Elastic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poisson:
-    """A body at any ratio ν of Poisson's, its E/ρ the baseline's. fitted: the baseline's ν; guess, sd: what was known
-    of it before.
+    """A body at any Poisson's ratio ν, its E/ρ the baseline's.
 
-    at: ν -> undamped freq_hz (m,), and the modes there as sums (m, m) of the baseline's own, a column a mode.
+    Attributes
+    ----------
+    fitted : float
+        The baseline's ν.
+    guess, sd : float
+        The estimate before the fit, and its spread.
+    at : callable
+        ν -> undamped freq_hz (m,), and the modes there as sums (m, m) of the baseline's, a column a mode.
     """
 
     fitted: float
@@ -50,16 +63,60 @@ class Poisson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectEvidence:
-    """One object's strikes: k lines that are modes, beside what the model so far expects, and what it leaves. source:
-    what they were recorded from, the host's own.
+    """Strikes of one object: k lines that are modes, what the model so far expects of them, and what it leaves.
 
-    freq_hz, decay_per_s and their spreads (k,); amplitude (s, k) complex at the onset and its spread. mode: the modes
-    of `model` each line stands for. model_hz (k,): the mesh's own, without corrections; expected_decay_per_s (k,),
-    expected (s, k): of the model with the effects found so far. pattern (s, k): J ψ, real. foreign_*: lines that are no
-    mode, amplitudes (s, f). model: the body with its strikes and sensor as last vertices, strike_vertex (s,),
-    strike_direction (s, 3), sensor_vertex, sensor_direction (3,). signal, predicted (s, n) from the onset on, None for
-    lists of features. noise (s,): rms. signed: phases are true. poisson: of `plain`, where nothing has moved its modes
-    yet.
+    Attributes
+    ----------
+    impulse_n_s : (s,)
+        Impulses of the strikes, NaN where unknown.
+    freq_hz, decay_per_s, freq_sd_hz, decay_sd_per_s : (k,)
+        The lines and their spreads.
+    amplitude, amplitude_sd : (s, k)
+        Complex at the onset, and its spread.
+    mode : tuple of arrays
+        The modes of `model` that each line represents.
+    model_hz : (k,)
+        The mesh's own frequencies, without corrections.
+    expected_decay_per_s, expected : (k,), (s, k)
+        Of the model with the effects found so far.
+    pattern : (s, k)
+        J ψ, real.
+    foreign_hz, foreign_decay_per_s, foreign_amplitude, foreign_sd : (f,), (f,), (s, f), (s, f)
+        Lines that are no mode.
+    model : ModalModel
+        The body, with its strikes and sensor as last vertices.
+    strike_vertex, strike_direction : (s,), (s, 3)
+        Of the strikes.
+    sensor_vertex, sensor_direction : int, (3,)
+        Of the sensor.
+    signal, predicted : (s, n)
+        Recordings and the model's, from the onset on; None for lists of features.
+    noise : (s,)
+        Rms of the recordings' noise.
+    sr : int
+        Sampling rate in Hz.
+    signed : bool
+        Whether phases are true.
+    push : (s, m) complex
+        Amplitude of every mode at the sensor by the model so far, its pulse included.
+    pressed : (s, m)
+        Fraction of the strike's impulse that each mode takes, by the pulse so far.
+    all_hz : (m,)
+        Frequencies of the modes.
+    plain : ModalModel
+        `model` with the mesh's own frequencies.
+    strike : tuple of int
+        Indices of the strikes in the case.
+    source : Any
+        What they were recorded from, the host's own.
+    elastic : Elastic
+        The body under other elasticities, where there is a mesh.
+    poisson : Poisson
+        Of `plain`, where nothing has moved its modes yet.
+    own : (s, n)
+        Recordings without other resonators found so far.
+    dry : bool
+        Whether the lines are those outside the room.
     """
 
     impulse_n_s: Array
@@ -102,24 +159,39 @@ class ObjectEvidence:
 
     @property
     def residual(self) -> Array:
-        """signal - predicted (s, n)."""
+        """Compute signal − predicted (s, n)."""
         assert self.signal is not None and self.predicted is not None
         return np.asarray(self.signal - self.predicted)
 
     @property
     def omega(self) -> Array:
-        """Undamped angular frequency (k,) of the lines."""
+        """Compute the undamped angular frequencies (k,) of the lines in rad/s."""
         return np.asarray(np.hypot(2 * np.pi * self.freq_hz, np.nan_to_num(self.decay_per_s)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """All that an effect may read: the objects' strikes, the material's α and β and the case's gain so far, effects
-    found so far by id, band and seed.
+    """All that an effect may read.
 
-    known: what the effect said of the whole evidence, or beside other effects: it is there to be fitted again, not to
-    be looked for. held_out: whether this is the evidence without a strike, known's numbers to be estimated again; axes
-    of degenerate pairs, which a linear body has no part of, stand as known has them.
+    Attributes
+    ----------
+    observed : tuple of ObjectEvidence
+        The objects' strikes.
+    alpha_per_s, beta_s : float
+        The material's Rayleigh damping so far.
+    gain : float
+        The case's gain so far.
+    found : tuple of str
+        Ids of the effects found so far.
+    band_hz : (2,)
+        Band of the analysis.
+    seed : int
+        Of anything random.
+    known : Effect
+        The effect as found in the whole evidence, or beside other effects: to be fitted again, not to be looked for.
+    held_out : bool
+        Whether a strike is left out and the numbers of `known` are to be estimated again; axes of degenerate pairs,
+        which a linear body does not show, stay those of `known`.
     """
 
     observed: tuple[ObjectEvidence, ...]
@@ -134,6 +206,6 @@ class Evidence:
 
     @property
     def on_trial(self) -> bool:
-        """Former name of `held_out`."""
+        """Return `held_out` by its former name."""
         warnings.warn("Evidence.on_trial is now held_out", DeprecationWarning, stacklevel=2)
         return self.held_out

@@ -1,9 +1,9 @@
-"""What effects read, and what every effect is; what they act on is in stages.py.
+"""Base classes of effects; what they act on is in stages.py, what they read in evidence.py.
 
-An effect is physics with few parameters. `propose` reads them off the evidence, or says None; it never scores itself:
-the diagnosis renders strikes that were not fitted, with and without it. What a host must know beforehand stands in its
-`Traits`; what only some can do (a room is taken out of the lines, pairs are turned or split, something rings beside the
-body) in small classes that they derive from.
+An effect is physics with few parameters. `propose` fits them to the evidence, or returns None; it never scores itself:
+the diagnosis renders strikes that were not fitted, with and without it. What a host must know beforehand is in its
+`Traits`; what only some can do (remove a room from the lines, turn or split pairs, add another resonator) in small
+classes that they derive from.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ __all__ = [
 
 
 class Owner(Enum):
-    """Whose an effect is.
+    """Owner of an effect: whose property it is.
 
     What belongs to material and object goes into a preset; to material, room and chain, to other objects too.
     """
@@ -63,7 +63,7 @@ CARRIES = frozenset({Owner.MATERIAL, Owner.STRIKER, Owner.ROOM, Owner.CHAIN})  #
 
 
 class Cost(Enum):
-    """What asking an effect costs, and so when it is asked."""
+    """Cost of proposing an effect, which decides when it is asked."""
 
     CHEAP = "cheap"
     COSTLY = "costly"  # asked last, and only where cheaper candidates leave much open
@@ -71,7 +71,7 @@ class Cost(Enum):
 
 
 class Mixing(Enum):
-    """What an effect that moves modes makes of their shapes."""
+    """Change of the mode shapes by an effect that moves modes."""
 
     NONE = "none"  # each mode stays itself
     NEIGHBOURS = "neighbours"  # a mode takes on its neighbours' shapes: dashpots
@@ -80,14 +80,25 @@ class Mixing(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """What a host must know of a kind of effect before it asks it anything.
+    """Properties of a kind of effect that a host must know before it asks for a proposal.
 
-    moves_modes: modes are no longer where, or what, they were: lines are paired and corrections learnt anew. What acts
-    on the MATERIAL always does. mixing: what becomes of their shapes then. replaces_rayleigh: it is a law of its own in
-    the place of α and β, and has these two numbers less than it states. cost: when it is asked. by_line: its numbers
-    are of single lines, which no other line states, or it may be observed in one: in cross-validation it is given all
-    lines, of the other strikes. certain: it is proposed where lines agree on it, each by its own baseband, and nowhere
-    else, and goes with level: a smaller drop will do on strikes left out, of which a loud one gains most.
+    Attributes
+    ----------
+    moves_modes : bool
+        Modes change their frequency or shape: lines are paired and corrections estimated anew. True of all that act on
+        the MATERIAL.
+    mixing : Mixing
+        The change of their shapes.
+    replaces_rayleigh : bool
+        The effect replaces α and β, and has these two numbers less than it states.
+    cost : Cost
+        When it is asked.
+    by_line : bool
+        Its numbers are of single lines, which no other line determines, or one line may show it: in cross-validation it
+        is given all lines, of the other strikes.
+    certain : bool
+        It is proposed only where lines agree on it, each by its own baseband, and goes with level: a smaller gain on
+        excluded strikes is enough, of which a loud one gains most.
     """
 
     moves_modes: bool = False
@@ -100,10 +111,18 @@ class Traits:
 
 @dataclass(frozen=True, slots=True)
 class BaselineChange:
-    """What an effect has found of the baseline's own numbers beside its own; None, 0 and 1 where it leaves them.
+    """Changes of the baseline's numbers that an effect has found with its own; None, 0 and 1 where there are none.
 
-    alpha_per_s, beta_s: Rayleigh's, both or neither. stretch: ln of what all frequencies of the bare body are to the
-    baseline's. poisson_ratio: ν. onset_gain: modes at the onset over what their lines say.
+    Attributes
+    ----------
+    alpha_per_s, beta_s : float
+        Rayleigh damping, both or neither.
+    stretch : float
+        ln of all frequencies of the bare body over the baseline's.
+    poisson_ratio : float
+        ν.
+    onset_gain : float
+        Modes at the onset over what their lines give.
     """
 
     alpha_per_s: float | None = None
@@ -114,72 +133,86 @@ class BaselineChange:
 
 
 class ChangesBaseline(ABC):
-    """An effect beside which the baseline's own numbers are others."""
+    """An effect with which the baseline's own numbers are others."""
 
     @abstractmethod
     def baseline_change(self) -> BaselineChange:
-        """What it found of them."""
+        """Return the changes."""
 
 
 class Dereverberates(ABC):
-    """An effect that hides the modes' own decays and levels from the lines, and can take itself out of them
-    (a room).
-    """
+    """An effect that hides the modes' own decays and levels, and can be removed from the lines (a room)."""
 
     @abstractmethod
     def dereverberated(self, observed: ObjectEvidence) -> ObjectEvidence:
-        """The same lines as they would be without it."""
+        """Return the lines as they would be without it."""
 
     @abstractmethod
     def identified_from(self, signal: Array, sound: Array, noise: Array, sr: int, *, fully: bool = False) -> Self:
-        """The effect with its response identified from recordings (s, n) and what is played without it (s, n); noise
-        (s,): rms. fully: to the end.
+        """Identify the effect's response from recordings.
+
+        Parameters
+        ----------
+        signal : (s, n)
+            Recordings of strikes.
+        sound : (s, n)
+            The same without the effect, synthesized.
+        noise : (s,)
+            Rms of the recordings' noise.
+        sr : int
+            Sampling rate in Hz.
+        fully : bool
+            Iterate to convergence.
         """
 
 
 class RotatesPairs(ABC):
-    """An effect under which the axes of degenerate pairs are observed, which in a linear body nothing shows."""
+    """An effect under which the axes of degenerate pairs are observable, which a linear body does not show."""
 
     @abstractmethod
     def turned(self, x: ModalModel) -> ModalModel:
-        """The modes as they were, degenerate pairs about their own axes."""
+        """Turn degenerate pairs to their own axes."""
 
     @abstractmethod
     def angles(self) -> int:
-        """How many of its free numbers are such axes: all fitted strikes state those once, like a correction."""
+        """Count its free numbers that are such axes: all fitted strikes share those, like a correction."""
 
 
 class SplitsPairs(ABC):
-    """An effect that sets degenerate pairs apart: their corrections are its own, not the mesh's."""
+    """An effect that splits degenerate pairs: their corrections are its own, not the mesh's."""
 
     @abstractmethod
     def observed_correction(self, freq_hz: Array) -> Array:
-        """Relative correction (m,) of the mesh's modes freq_hz (m,), ascending, to the middle of what was split."""
+        """Compute the relative correction (m,) of the mesh's modes to the middles of split pairs.
+
+        Parameters
+        ----------
+        freq_hz : (m,)
+            Frequencies of the mesh's modes, ascending.
+        """
 
 
 class RingsAlong(ABC):
-    """An effect that rings beside the body: its lines are none of the body's modes, and nobody else's evidence."""
+    """An effect that adds another resonator: its lines are none of the body's modes, and no other effect's evidence."""
 
     @abstractmethod
     def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Frequencies in Hz and decays in 1/s of what rings."""
+        """Return its frequencies in Hz and decays in 1/s."""
 
 
 class Alternatives(ABC):
-    """An effect with choices to which no step leads from where it is."""
+    """An effect with discrete choices that no step of a fit connects."""
 
     @abstractmethod
     def others(self) -> tuple[Effect, ...]:
-        """The same effect by its other choices."""
+        """Return the same effect with its other choices."""
 
 
 class Effect(Protocol):
     """One physical effect: a frozen dataclass of its parameters.
 
-    Every member also has a docstring that gives its equation.
-
-    What only some effects can do they say by deriving from one of the small classes above; a host asks for those, never
-    for a name.
+    The docstring of each gives its equation. What only some effects can do is in the small classes above, from which
+    they derive; a host asks for those, never for a name.
     """
 
     id: ClassVar[str]
@@ -189,25 +222,35 @@ class Effect(Protocol):
     traits: ClassVar[Traits]
 
     def apply(self, x: Any) -> Any:
-        """The stage's value with the effect in it; x is left as it is."""
+        """Apply the effect to its stage's value; x is not changed."""
         ...
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        """The effect with the parameters that the evidence suggests, or None where it suggests none."""
+        """Fit the effect to the evidence; None where the evidence suggests none."""
         ...
 
     def parameters(self) -> dict[str, Any]:
-        """Numbers, by name with unit, that say what it is: what a report and a preset hold."""
+        """Return its numbers by name with unit, for reports and presets."""
         ...
 
     def freedom(self) -> int:
-        """How many numbers were free when it was proposed."""
+        """Count the numbers that were free when it was proposed."""
         ...
 
 
 def ascending(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> ModalModel:
-    """The model with other frequencies, decays (m,) and shapes (v, 3, m), its own where None, in ascending order."""
+    """Return a model with other modes in ascending order.
+
+    Parameters
+    ----------
+    x : ModalModel
+        The model.
+    freq_hz, decay_per_s : (m,)
+        Its new frequencies and decays.
+    shape : (v, 3, m)
+        Its new shapes, the old ones where None.
+    """
     order = np.argsort(freq_hz, kind="stable")
     shape = x.shape if shape is None else shape
     if (np.diff(order) < 0).any():
