@@ -1,4 +1,4 @@
-"""What does the model lack?
+"""Diagnosis of a fitted model: which physical effects it lacks.
 
 Recordings against the fitted model, candidate effects tried on strikes they were not fitted to, a verdict.
 

@@ -1,5 +1,6 @@
-"""The one measurement that would decide what a diagnosis leaves open, in a sentence: the first that applies, by when,
-where and with what it goes what is left.
+"""The one measurement that would decide what a diagnosis leaves open, in a sentence.
+
+It is the first that applies, by the times, frequencies and dependences of what is left.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ SLOPE = 0.3
 
 
 def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[str, Any]) -> str:
-    """Say which one measurement would decide; of a verdict that leaves nothing open what the fit leaves open."""
+    """Name the one measurement that would decide; after a verdict that leaves nothing open, the fit's."""
     return of_fit(found) if isinstance(end, NothingCompared) or not left else next(_open(end, left))
 
 
 def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
-    """What would decide each thing that is open, the first things first."""
+    """Yield a measurement for each thing that is open, the most important first."""
     most = max(left["when"], key=left["when"].__getitem__)
     slope = left["slope_against_impulse"]
     if len(end.judged) == 1:

@@ -3,8 +3,8 @@
     read the 'fit' strikes -> fit the baseline (baseline.py) -> select effects (stepwise.py) -> verdict, errors on all
         splits, predictions
 
-Of 'holdout' the baseline is asked whether it is nearer than silence, as `fit` asks: else there is nothing to select
-from. Apart from that nothing of 'holdout' and 'transfer' changes anything; they are compared at the very end.
+The baseline must be nearer to the 'holdout' strikes than silence is, as in `fit`: else there is nothing to select from.
+Apart from that nothing of 'holdout' and 'transfer' has any influence; they are compared at the very end.
 """
 
 from __future__ import annotations
@@ -43,13 +43,31 @@ SPLITS = ("fit", "holdout", "transfer")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnosis:
-    """What the model lacks. errors, errors_sone: {"before": {split:
+    """Result of a diagnosis: what the model lacks.
 
-    …}, "after": {split: …}, "floor": …}, None where there is no audio, or none of it could be compared. not_compared:
-    by split, what could not be; empty where all could.
-
-    errors_lines: likewise for measured lines in place of audio, of ln f and ln d. unexplained: what is left, in words
-    and numbers; empty where nothing is. warnings: one line each, the fit's among them.
+    Attributes
+    ----------
+    case : Case
+        What was diagnosed.
+    found : CaseFit
+        The fit.
+    bodies : tuple of Struck
+        The objects.
+    takes : tuple of Take
+        The fitted strikes that have audio.
+    closed : Closed or NothingCompared
+        The end of the selection.
+    errors, errors_sone : dict
+        {"before": {split: …}, "after": {split: …}, "floor": …} in dB, in sone; None where there is no audio, or none of
+        it could be compared.
+    errors_lines : dict
+        Likewise for measured lines in place of audio, of ln f and ln d.
+    unexplained : dict
+        What is left, in words and numbers; empty where nothing is.
+    not_compared : dict
+        By split, what could not be compared; empty where all could.
+    warnings : tuple of str
+        One line each, the fit's among them.
     """
 
     case: Case
@@ -66,6 +84,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
+        """Return "explained", "none", "unexplained" or "worse-than-silence"."""
         return self.closed.verdict
 
 
@@ -79,10 +98,25 @@ def diagnose(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Say what the fitted model lacks, from the case's 'fit' strikes. effects: the candidates, your own beside the
-    package's: ``EFFECTS + (Mine,)``.
+    """Find what the fitted model lacks, from the case's 'fit' strikes.
 
-    Raises SonicBulletError where a file, mesh or number makes a fit impossible.
+    Parameters
+    ----------
+    case : Case or path
+        The case.
+    effects : sequence of types
+        The candidates, your own with the package's: ``EFFECTS + (Mine,)``.
+    seed : int
+        Of the control effects and folds.
+    cache : Place
+        Where solved modes are kept.
+    progress : callable
+        Called with what is being done.
+
+    Raises
+    ------
+    SonicBulletError
+        A file, mesh or number makes a fit impossible.
     """
     if not isinstance(case, Case):
         case = read_case(case)
@@ -120,13 +154,13 @@ def diagnose(
 
 
 def _before_and_after(end: Closed | NothingCompared, bodies: Sequence[Struck]) -> dict[str, Predictions]:
-    """What the hypothesis without effects and the one with them say of the bodies; one where these are one."""
+    """Predict the bodies by the hypotheses without effects and with them; once where these are one."""
     before = predict_each(end.before, bodies)
     return {"before": before, "after": before if end.after is end.before else predict_each(end.after, bodies)}
 
 
 def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]) -> list[str]:
-    """What a verdict does not rest on, and what stands in its way: a line each."""
+    """List what a verdict does not rest on, and what obstructs it, a line each."""
     said = [f"{len(one)} of split '{split}' could not be compared: {listing(one)}" for split, one in out.items()]
     if isinstance(end, NothingCompared):
         return said
@@ -143,9 +177,7 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
 
 
 def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompared) -> dict[str, Any]:
-    """Rms of ln f and of ln d of measured lines that came in place of audio, before and after, by split; empty where
-    there are none.
-    """
+    """Compute rms of ln f and ln d of measured lines in place of audio, before and after, by split; empty without."""
     found: dict[str, Any] = {}
     lined = [body for body in bodies if any(r.lines for r in body.recordings)]
     made = _before_and_after(end, lined)
@@ -169,7 +201,7 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
 
 
 def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], split: str) -> tuple[Take, ...]:
-    """Strikes of another split whose audio is there."""
+    """Read the strikes of another split whose audio is there."""
     found = []
     for body in bodies if takes else ():
         thing = body.recorded.thing if body.recorded is not None else case.objects[body.name]
@@ -181,7 +213,7 @@ def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], spl
 
 
 def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
-    """The sample at which strikes arrive: as declared, or the median of where the fitted ones did."""
+    """Return the sample at which strikes arrive: as declared, or the median of the fitted ones."""
     if case.onset_s is not None:
         return round(case.onset_s * sr)
     files = [
@@ -196,14 +228,18 @@ def onset_of(case: Case, bodies: tuple[Struck, ...], sr: int) -> int:
 
 
 def length_of(recording: CaseRecording) -> tuple[int, int]:
-    """Samples and rate of a recording's file."""
+    """Return samples and rate of a recording's file."""
     sample, sr = read_audio(recording.file or "")
     return sample.shape[1], sr
 
 
 def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
-    """(stem, sr, before (n,), after (n,)) of every strike that has a place, of every split: as long as the fitted
-    recordings, in their units.
+    """Synthesize every strike that has a place, of every split, before and after the diagnosis.
+
+    Returns
+    -------
+    list of (stem, sr, before, after)
+        Sounds (n,) as long as the fitted recordings, in their units.
     """
     known = [r for b in d.bodies if b.recorded is not None for r in b.recorded.recordings if r.file is not None]
     if not known:
@@ -221,7 +257,7 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
 
 
 def described(d: Diagnosis) -> dict[str, Any]:
-    """The diagnosis as JSON holds it."""
+    """Return the diagnosis as JSON holds it."""
     from sonic_bullet.diagnosis.selection.stepwise import described as tried
 
     return {

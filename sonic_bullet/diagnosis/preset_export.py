@@ -1,8 +1,8 @@
-"""What a diagnosis leaves behind in a preset: the fitted material, with the effects that belong to it and its object.
+"""Preset of a diagnosis: the fitted material, with the effects that belong to it and its object.
 
 Stiffness that depends on direction becomes the preset's elasticity; what belongs to fixture, striker, room and chain
-stays with the case. A diagnosis plays total decays, until it names radiation: then α and β, or the law in their place,
-are what is left beside it, and the run time's own takes its part.
+stays with the case. A diagnosis uses total decays, until it names radiation: then α and β, or the law in their place,
+are the rest, and the run time adds its own radiation.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sonic_bullet.presets import Elasticity, Preset, material_of
 
 
 def preset_of(d: Diagnosis) -> Preset:
-    """The preset of a diagnosis."""
+    """Build the preset of a diagnosis."""
     base = fitted_preset(d.found)
     after = d.closed.after
     total = d.found.radiation == "damping" and not any(isinstance(e, Radiation) for e in after.effects)
@@ -47,5 +47,5 @@ def preset_of(d: Diagnosis) -> Preset:
 
 
 def kept(effect: Effect) -> bool:
-    """Whether a preset holds the effect."""
+    """Decide whether a preset holds the effect."""
     return effect.owner in (Owner.MATERIAL, Owner.OBJECT) and isinstance(effect, KEPT)

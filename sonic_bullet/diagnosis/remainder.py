@@ -1,5 +1,4 @@
-"""What no candidate effect accounts for, in words by which a person can name it: when, where in frequency, how it goes
-with strength and place.
+"""Description of what no candidate effect explains: times, frequencies, dependence on strength and place.
 
 e = |recorded − played|² in third octaves and thirds of the time, over the recording's own; slopes against ln J; lines
 that are no mode, or none that a linear body has (coherent_residual.py)
@@ -28,7 +27,7 @@ NOTHING = "nothing could be compared"
 
 
 def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str, Any]:
-    """Of the last hypothesis; empty where the verdict leaves nothing open or there is no audio."""
+    """Describe what the last hypothesis leaves; empty where the verdict leaves nothing open or there is no audio."""
     if isinstance(end, WorseThanSilence):
         words = (
             f"what was fitted is {end.before_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
@@ -102,7 +101,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
 
 
 def _places(takes: Sequence[Take], scatter: float) -> str:
-    """How it goes with the place of the strike, in words. scatter: standard deviation of its logarithm."""
+    """Describe its dependence on the strike's place; scatter: standard deviation of its logarithm."""
     at = {t.body.recordings[t.strike].position_m for t in takes} - {None}
     if not at:
         return "no strike has a place: whether it differs from place to place is not known"
@@ -112,13 +111,13 @@ def _places(takes: Sequence[Take], scatter: float) -> str:
 
 
 def listing(left_out: Sequence[LeftOut]) -> str:
-    """The first SHOWN of what could not be compared, each with its reason."""
+    """List the first SHOWN of what could not be compared, each with its reason."""
     said = "; ".join(map(str, left_out[:SHOWN]))
     return f"{said}; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else said
 
 
 def _again(takes: Sequence[Take]) -> float | None:
-    """The ratio of frequencies at which a body's lines come again, if they do."""
+    """Find the ratio of frequencies at which a body's lines recur, if they do."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
     return next(
         (r for g in recorded if (r := copied(g.lines.freq_hz, g.lines.decay_per_s, g.lines.amplitude)) is not None),
@@ -127,7 +126,7 @@ def _again(takes: Sequence[Take]) -> float | None:
 
 
 def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Array]:
-    """Energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
+    """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
     edges = edges[edges < 0.5 * sr]
@@ -155,5 +154,6 @@ def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Arr
 
 
 def _slope(x: Array, y: Array) -> float:
+    """Compute the slope of y over x by least squares."""
     x = x - x.mean()
     return float((x * (y - y.mean())).sum() / max(float((x * x).sum()), 1e-300))

@@ -1,3 +1,4 @@
-"""What the recordings say beside a hypothesis: baseline, refit, unmatched modes, degenerate pairs, modes that go with
-their level.
+"""Evidence of the recordings against a hypothesis.
+
+Baseline, refit, unmatched modes, degenerate pairs, modes that depend on their level.
 """

@@ -1,8 +1,8 @@
-"""Modes whose frequency goes with their level: how far it shifts, and how fast they fall.
+"""Modes whose frequency depends on their level: how far it shifts, and how fast they decay.
 
 A linear fit identifies such a mode as a chain of lines (recording_chain.py), none with its decay. But only its
 frequency bends: its level falls as the linear mode's does. Degenerate modes beat once each shifts by its own level, so
-their decay is identified by what is played: recorded over played falls as e^{−δt}, δ what their decay lacks.
+their decay is identified by the synthesis: recorded over synthesized falls as e^{−δt}, δ the error of their decay.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LACKS = 0.5  # of a decay, at most
 
 
 def turns_rad(p: Prediction, one: ObjectEvidence) -> Array:
-    """By how much the effects turn the phases of each line's modes (s, k) until they have rung down."""
+    """Compute the phase (s, k) that each line's modes gain by the effects until they have decayed."""
     each = [(p.ring(i), p.impact(i)) for i in p.strikes_of(one)]
     level = [r.level * np.abs(b.spectrum(r.freq_hz)) for r, b in each]  # what a long pulse leaves of it
     turned = np.stack(
@@ -37,16 +37,12 @@ def turns_rad(p: Prediction, one: ObjectEvidence) -> Array:
 
 
 def amplitude_dependent(p: Prediction, one: ObjectEvidence) -> Array:
-    """Whether each line (k,) is of modes whose phases the effects turn by TURNS_RAD or more in the end, at the strike
-    that moves them most.
-    """
+    """Decide for each line (k,) whether the effects turn its modes' phases by TURNS_RAD or more in some strike."""
     return np.asarray(turns_rad(p, one).max(axis=0) > TURNS_RAD)
 
 
 def fallen(p: Prediction, one: ObjectEvidence) -> ObjectEvidence:
-    """The evidence, the decays of amplitude-dependent lines identified by their levels' own fall, where they stand
-    alone.
-    """
+    """Identify the decays of isolated, amplitude-dependent lines by the fall of their own levels."""
     if not bends(p.hypothesis) or one.signal is None or one.dry or not len(one.freq_hz):
         return one  # in a room no line is one mode's alone
     dependent = amplitude_dependent(p, one)
@@ -70,8 +66,16 @@ def fallen(p: Prediction, one: ObjectEvidence) -> ObjectEvidence:
 
 
 def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
-    """The decay of a degenerate pair, in 1/s, by how what was recorded falls against what is played with one decay;
-    that one where too little is clear in both.
+    """Compute the decay of a degenerate pair in 1/s by the fall of the recorded over the synthesized level.
+
+    Parameters
+    ----------
+    e, made : Envelopes
+        Of the recordings, and of the synthesis.
+    q : int
+        Index of the line among them.
+    decay_per_s : float
+        Decay in the synthesis, returned where too little is clear in both.
     """
     top = bottom = 0.0
     for s in range(len(e.z)):

@@ -1,8 +1,8 @@
-"""The baseline of a case: the fitted model, its bodies, and the hypothesis that nothing is lacking.
+"""Baseline of a case: the fitted model, its bodies, and the hypothesis without effects.
 
-recorded lines -> estimator.fit -> bodies (groups separated, corrections learnt) -> Hypothesis lines in chains
-(recording_chain.py): the same with every chain as one line, where what that plays is nearer to the recordings, or most
-modes are chains and it is not clearly farther;
+recorded lines -> estimator.fit -> bodies (groups separated, corrections learnt) -> Hypothesis; lines in chains
+(recording_chain.py): the same with every chain as one line, where that is nearer to the recordings, or most modes are
+chains and it is not clearly farther;
     and with the lines of the softer strikes, whose modes are nearest to linear ones, or of those below a limit, at all
         strikes
 """
@@ -44,9 +44,18 @@ OFTEN, MOSTLY = 0.4, 1.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Baseline:
-    """What the case's linear model is.
+    """Linear model of a case.
 
-    found: the fit. bodies: every object, fitted ones first. takes: the fitted strikes that have audio.
+    Attributes
+    ----------
+    found : CaseFit
+        The fit.
+    bodies : tuple of Struck
+        Every object, fitted ones first.
+    hypothesis : Hypothesis
+        Without effects.
+    takes : tuple of Take
+        The fitted strikes that have audio.
     """
 
     found: CaseFit
@@ -62,7 +71,19 @@ def baseline(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Baseline:
-    """Fit it to recorded evidence. Raises SonicBulletError."""
+    """Fit the linear model to recorded evidence. Raises SonicBulletError.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    recorded : tuple of RecordedObject
+        Its evidence.
+    cache : Place
+        Where solved modes are kept.
+    progress : callable
+        Called with what is being done.
+    """
     plain = _of(case, recorded, cache, progress)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
     directions += (
@@ -84,13 +105,15 @@ def baseline(
 
 
 def _unchained(one: Recorded, link: tuple[float, float, bool]) -> Recorded:
+    """Replace each chain of an object's lines by one line."""
     lines = unchained(one.lines, link) if one.signals is not None else None
     return one if lines is None else replace(one, lines=lines)
 
 
 def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
-    """Evidence with the lines of its softer strikes alone, each chain of them as one; the same where chains are few or
-    no strikes are much softer than the others.
+    """Use the lines of the softer strikes alone, each chain of them as one.
+
+    Unchanged where chains are few or no strikes are much softer than the others.
     """
     if one.signals is None or unchained(one.lines, LINKS[0]) is None:
         return one
@@ -103,9 +126,7 @@ def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
 
 
 def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
-    """Evidence with the lines of the strikes that stay below a limit, at all strikes; the same where there is no limit,
-    or fewer than two stay below it.
-    """
+    """Use the lines of the strikes below a limit, at all strikes; unchanged without a limit or two such strikes."""
     if one.signals is None or not (limit := limit_of([one.signals])):
         return one
     below = np.flatnonzero((np.abs(one.signals) > BELOW * limit).sum(axis=1) <= TOUCHES)
@@ -119,8 +140,9 @@ def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
 
 
 def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Lines | None:
-    """The lines of some strikes, by index, at all of them; None where those are too soft to tell, or lines are
-    those after the attack.
+    """Identify the lines of some strikes, by index, at all of them.
+
+    None where those are too soft, or the lines are those after the attack.
     """
     if one.signals is None or one.ringing:
         return None
@@ -134,7 +156,7 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
 
 
 def _off_db(b: Baseline) -> float:
-    """How far its strikes are; ∞ where none can be compared: no way of fitting is nearer than another then."""
+    """Compute the mean distance of its strikes; ∞ where none can be compared, so that no other fit is farther."""
     h = refitted(b.hypothesis, b.bodies)
     made = predict_takes(h, b.takes)
     found = comparable(b.takes, made)
@@ -142,6 +164,7 @@ def _off_db(b: Baseline) -> float:
 
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
+    """Build the baseline of some evidence."""
     found = fit_evidence(case, recorded, total=True, progress=progress)
     lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g)}
     shaped = struck_bodies(found, cache=cache, progress=progress) if len(lines) < len(recorded) else ()
@@ -155,15 +178,16 @@ def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Call
 
 
 def _shaped(found: CaseFit, one: Recorded) -> bool:
-    """Whether an object is played by the modes of its shape, as `fit` plays it; of a list of lines, whether it has one:
-    frequencies tell of stiffness.
+    """Decide whether an object is modelled by the modes of its shape, as in `fit`.
+
+    For a list of lines it is where there is a shape: frequencies depend on stiffness.
     """
     placed = any(r.position_m is not None for r in one.recordings)
     return one.family is not None and (one.signals is None or (placed and found.plays_modes(one)))
 
 
 def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
-    """The fitted strikes that have audio."""
+    """Return the fitted strikes that have audio."""
     takes: list[Take] = []
     for body in bodies:
         if body.recorded is None or body.recorded.signals is None:

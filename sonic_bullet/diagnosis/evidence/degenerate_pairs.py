@@ -1,11 +1,11 @@
-"""Modes that a mesh leaves side by side by accident, and that two lines show to be two.
+"""Modes that a mesh leaves at one frequency by accident, and that two lines show to be two.
 
-    a group of three modes or more, cut at its widest gap -> two lines near it, one no mode's so far, like the one part
-        and the other  ->  each its own line
+    a group of three modes or more, cut at its widest gap -> two lines near it, one without a mode so far, like the one
+        part and the other  ->  each its own line
 
-A plate has pairs of modes for its symmetry, and now and then a lone mode beside a pair: as one group they would be one
-line, and the other line foreign. Of two modes alone nobody can say whether a mesh or an imperfection sets them apart:
-they stay together.
+A plate has pairs of modes for its symmetry, and now and then a single mode at a pair's frequency: as one group they
+would be one line, and the other line foreign. For two modes alone it is undecidable whether a mesh or an imperfection
+splits them: they stay together.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LEAST_STRIKES = 3  # by which a pattern is known
 
 
 def separated(body: Struck) -> Struck:
-    """The body with such groups as the two lines they are."""
+    """Divide a body's groups of modes that two lines show to be two."""
     if body.recorded is None or body.family is None or len(body.fitted) < LEAST_STRIKES:
         return body
     lines, row = body.recorded.lines, pattern(body, body.model)[body.fitted]
@@ -54,6 +54,6 @@ def separated(body: Struck) -> Struck:
 
 
 def like(amplitude: Array, pattern_of: Array) -> float:
-    """Cosine of a line's |A| (s,) and |Σ J ψ| (s,) of some modes' patterns (s, p)."""
+    """Compute the cosine of a line's |A| (s,) and |Σ J ψ| (s,) of some modes' patterns (s, p)."""
     a, b = np.abs(amplitude), np.abs(pattern_of.sum(axis=1))
     return float(a @ b / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))

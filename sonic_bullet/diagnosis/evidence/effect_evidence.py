@@ -1,9 +1,9 @@
-"""What effects propose from: fitted lines beside the hypothesis' own modes, and the sounds beside what it plays.
+"""Evidence from which effects are proposed: fitted lines with the hypothesis' modes, recordings with its synthesis.
 
-    Struck + Lines + Hypothesis -> which modes each line stands for -> ObjectEvidence (effects.protocol), one per fitted
+    Struck + Lines + Hypothesis -> which modes each line represents -> ObjectEvidence (effects.protocol), one per fitted
         object -> Evidence
 
-Strikes can be left out (their amplitudes and sounds), and lines: what an effect says must hold for those it never saw.
+Strikes can be left out (their amplitudes and sounds), and lines: an effect must hold for those it was not fitted to.
 """
 
 from __future__ import annotations
@@ -30,7 +30,19 @@ DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
-    """All fitted objects' evidence under a hypothesis."""
+    """Collect all fitted objects' evidence under a hypothesis.
+
+    Parameters
+    ----------
+    h : Hypothesis
+        The hypothesis.
+    bodies : tuple of Struck
+        The objects.
+    band_hz : (2,)
+        Band of the analysis.
+    seed : int
+        Of anything random in effects.
+    """
     observed = tuple(object_evidence(p) for p in predict_fitted(h, bodies).values())
     return Evidence(observed, h.alpha_per_s, h.beta_s, h.gain, tuple(e.id for e in h.effects), band_hz, seed)
 
@@ -38,10 +50,18 @@ def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float,
 def object_evidence(
     p: Prediction, *, sounds: bool = True, anew: bool = False, plain: Prediction | None = None
 ) -> ObjectEvidence:
-    """One fitted object's.
+    """Collect one fitted object's evidence.
 
-    sounds: whether what it would sound like is wanted too, which takes longest. anew: lines paired as beside effects
-    that move modes. plain: p.uncorrected(), where it is known already.
+    Parameters
+    ----------
+    p : Prediction
+        The hypothesis on the object.
+    sounds : bool
+        Whether to synthesize its strikes, which takes longest.
+    anew : bool
+        Pair lines as with effects that move modes.
+    plain : Prediction
+        p.uncorrected(), where it is known already.
     """
     h, body, model, recorded = p.hypothesis, p.body, p.model, p.body.recorded
     assert recorded is not None
@@ -110,9 +130,7 @@ def object_evidence(
 
 
 def _played(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, Array | None]:
-    """What strikes sound like (s, n), and the recordings without what rings beside the body, where the hypothesis knows
-    of such.
-    """
+    """Synthesize strikes (s, n), and subtract other resonators from the recordings, where there are such."""
     assert p.body.recorded is not None
     n, sr, h = signals.shape[1], p.body.recorded.sr, p.hypothesis
     all_of_it, rest = p.sounds(strikes, n, sr), tuple(e for e in h.effects if not isinstance(e, RingsAlong))
@@ -122,9 +140,7 @@ def _played(p: Prediction, strikes: list[int], signals: Array) -> tuple[Array, A
 
 
 def named(h: Hypothesis, lines: Lines) -> Array:
-    """Which lines (l,), one of each mode, are nearest to what the hypothesis knows to ring beside the body: no other
-    effect sees these.
-    """
+    """Find the lines (l,), one of each mode, nearest to known lines of other resonators: no effect sees these."""
     voices = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
     freq, decay = np.concatenate(voices, axis=1) if voices else np.zeros((2, 0))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
@@ -134,7 +150,7 @@ def named(h: Hypothesis, lines: Lines) -> Array:
 
 
 def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
-    """The evidence with its lines as they would be outside the room that the hypothesis has found."""
+    """Remove the room that the hypothesis has found from the lines of the evidence."""
     for effect in h.effects:
         if isinstance(effect, Dereverberates):
             observed = effect.dereverberated(observed)
@@ -142,8 +158,9 @@ def outside(h: Hypothesis, observed: ObjectEvidence) -> ObjectEvidence:
 
 
 def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ...]]:
-    """Lines (p,) and the predicted modes that each stands for: as they were fitted, where no effect has moved the
-    modes, else, or anew, by nearness and pattern.
+    """Pair lines (p,) and predicted modes.
+
+    As they were fitted, where no effect has moved the modes; else, or anew, by frequency and pattern.
     """
     place = {int(k): i for i, k in enumerate(p.order)}
     body = p.body
@@ -160,6 +177,7 @@ def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ..
 
 
 def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
+    """Pair lines and modes by frequency, pattern and decay."""
     from scipy.optimize import linear_sum_assignment
 
     assert p.body.recorded is not None
@@ -191,8 +209,9 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
 
 
 def path_response(h: Hypothesis, freq_hz: Array, sr: int) -> Array:
-    """Complex response (f,) of the sound path's first milliseconds: its effects applied to a weak impulse less what
-    they add to silence.
+    """Compute the complex response (f,) of the sound path's first milliseconds.
+
+    Its effects are applied to a weak impulse, less what they add to silence.
     """
     # lines are dereverberated already
     effects = [e for e in h.at(Stage.SOUND) if not isinstance(e, Dereverberates)]
@@ -207,10 +226,18 @@ def path_response(h: Hypothesis, freq_hz: Array, sr: int) -> Array:
 
 
 def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.random.Generator) -> Evidence:
-    """The same without one strike, at: whose, and which of those, and without a random part of all lines: ``keep`` of
-    them stay.
+    """Remove one strike and a random part of all lines from evidence; an object with no other recording goes, too.
 
-    An object of which nothing else was recorded is left out with it.
+    Parameters
+    ----------
+    evidence : Evidence
+        The whole.
+    at : (RecordedObject, int)
+        The strike: whose, and which of those.
+    keep : float
+        Fraction of the lines that stay.
+    rng : Generator
+        Selects them.
     """
     source, strike = at
     rest = [h for h in evidence.observed if h.source is not source or len(h.impulse_n_s) > 1]
@@ -218,6 +245,7 @@ def thinned(evidence: Evidence, at: tuple[Recorded, int], keep: float, rng: np.r
 
 
 def _thin(h: ObjectEvidence, strike: int | None, keep: float, rng: np.random.Generator) -> ObjectEvidence:
+    """Remove one strike and a random part of the lines from one object's evidence."""
     s = np.array([i for i in range(len(h.impulse_n_s)) if i != strike], int)
     k = (
         np.sort(rng.permutation(len(h.freq_hz))[: max(3, round(keep * len(h.freq_hz)))])

@@ -1,4 +1,4 @@
-"""What a mesh's errors make of the distance: how much of what nothing explains may be theirs.
+"""Errors of a mesh: how much of an unexplained distance may be theirs.
 
     modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
     lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put
@@ -7,8 +7,8 @@
         outside   -> the same
 
 A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes,
-with h⁴ of quadratic ones [Hughes 2000, ch. 7]. That is no effect and nothing that anybody would want named, so a
-verdict knows of it; what is played before and after does not.
+with h⁴ of quadratic ones [Hughes 2000, ch. 7]. That is no effect to be named, so a verdict takes it into account; the
+sounds before and after do not.
 """
 
 from __future__ import annotations
@@ -34,8 +34,12 @@ NEARER_DB = 0.05  # without a mode, that ought to be silent
 
 
 def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
-    """The hypothesis with unmatched modes where lines of their pattern are, or outside the band; and how far the
-    farthest was put, relative: 0 where none was.
+    """Move unmatched modes to lines of their pattern, or outside the band.
+
+    Returns
+    -------
+    Hypothesis, float
+        With these corrections, and the largest move, relative: 0 where there was none.
     """
     start, most = h, 0.0
     mine = [
@@ -58,9 +62,7 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
 
 
 def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
-    """The hypothesis with a body's modes near the band's upper edge outside it, one frequency after another from the
-    top, where strikes are nearer so.
-    """
+    """Move a body's modes near the band's upper edge outside it, from the top, where strikes are nearer so."""
     p = predict(h, body)
     model, order = p.model, p.order
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
@@ -83,7 +85,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
 
 
 def _put(p: Prediction) -> tuple[Array, float]:
-    """Corrections (m,) of a body with such modes put to their lines, the loudest first, and the largest step."""
+    """Compute corrections (m,) that move a body's unmatched modes to their lines, the loudest first; largest step."""
     body, model, order = p.body, p.model, p.order
     assert body.recorded is not None and p.hypothesis.correction is not None
     lines, correction = body.recorded.lines, p.hypothesis.correction[body.name]
@@ -111,8 +113,11 @@ def _put(p: Prediction) -> tuple[Array, float]:
 
 
 def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
-    """What a mesh's errors would add to the distance, in dB: modes that no line could correct moved at random by as
-    much as the others were corrected, and every shape at the strikes by ROUGH of its strongest there."""
+    """Estimate what a mesh's errors would add to the distance, in dB.
+
+    Modes that no line could correct are moved at random by as much as the others were corrected, and every shape at the
+    strikes by ROUGH of its strongest there.
+    """
     rng = np.random.default_rng([problem.seed, 5])
     moved, other = dict(h.correction or {}), {}
     for body in problem.bodies:
@@ -136,7 +141,7 @@ def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
 
 
 def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
-    """The body with shapes at its strikes off by ROUGH of each mode's strongest there."""
+    """Change shapes at a body's strikes at random by ROUGH of each mode's strongest there."""
     shape = body.model.shape.copy()
     at = slice(body.surface_count(), len(shape) - 1)
     most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.direction[:-1])).max(axis=0)

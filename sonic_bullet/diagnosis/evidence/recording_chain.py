@@ -1,14 +1,14 @@
-"""What a mode that depends on its own level leaves among the lines: a chain of them; and the one line it rings as when
-it is faint.
+"""Chains of lines: what a mode that depends on its own level leaves in a linear fit, and its linear limit.
 
     a e^{−dt} e^{iβ(1 − e^{−2dt})} = a e^{−dt} [e^{iβ} − iβ e^{iβ} e^{−2dt} + …]      decays d, 3d, 5d, …      frequency
         goes with level²     (effects.amplitude_pitch)
     a/((1 + c)e^{dt} − c)          = a/(1 + c) [e^{−dt} + c/(1 + c) e^{−2dt} + …]      decays d, 2d, 3d, …      decay
         goes with level; with its square: d, 3d, 5d, …   (effects.amplitude_damping)
 
-Least squares fit such a mode by a few lines, each shorter than the one before and hardly beside it. The slowest is the
-linear mode, the body's and the material's own, and of a mode that is only bent the whole chain's level falls as it
-does; at the onset all lines add up to what was struck. A baseline fitted to the loudest line of each chain has neither.
+Least squares fit such a mode by a few lines, each shorter than the one before and near it. The slowest is the linear
+mode, the body's and the material's own, and the level of a whole chain of a mode whose frequency alone bends falls as
+it does; at the onset all lines add up to the excitation. A baseline fitted to the loudest line of each chain has
+neither.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ PLAIN = 4
 
 
 def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
-    """Every chain of such links as one line: the slowest's frequency, the slowest's decay or the chain's own, the
-    amplitudes' sum.
+    """Replace every chain of such links by one line.
 
-    Where there are too few chains to speak of, those alone that are plain, if the loudest line is in one; None if not.
+    It has the slowest's frequency, the slowest's decay or the chain's own, and the amplitudes' sum. Where there are too
+    few chains, only those that are plain are replaced, if the loudest line is in one; None if not.
     """
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
@@ -66,19 +66,20 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
 
 
 def _one_direction(freq_hz: Array) -> bool:
-    """Whether all steps from line to line go the same way."""
+    """Decide whether all steps from line to line have one sign."""
     return len(set(np.sign(np.diff(freq_hz)).tolist())) == 1
 
 
 def share(lines: Lines, link: tuple[float, float, bool]) -> float:
-    """Chains, of all groups."""
+    """Compute the fraction of chains among all groups."""
     groups = chains(lines, link)
     return sum(len(g) > 1 for g in groups) / max(len(groups), 1)
 
 
 def _falls(lines: Lines, group: Array) -> float:
-    """The decay at which a chain's level falls, in 1/s: bent or not, a mode's level does as e^{−dt}, and no line of
-    many is as certain.
+    """Compute the decay of a chain's level in 1/s.
+
+    Bent or not, a mode's level goes as e^{−dt}, and no single line of many is as certain.
     """
     pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
     time = np.linspace(0, LONG / lines.decay_per_s[group[0]], FRAMES)
@@ -94,10 +95,10 @@ def _falls(lines: Lines, group: Array) -> float:
 
 
 def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
-    """The lines in groups, by index, the slowest first; most stand alone.
+    """Group the lines, by index, the slowest first; most groups hold one line.
 
     A line follows the nearest one that it may; two that follow none are two modes though others lie between, unless
-    they are one on the other.
+    they are at one frequency.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components

@@ -1,4 +1,4 @@
-"""What the baseline's own numbers become once an effect is there: α, β, σ and the corrections, from the same lines.
+"""Baseline fitted again with effects: α, β, σ and the corrections, from the same lines.
 
     d − Δd(effects) = ½(α + βλ)         (estimator.rayleigh)
     |A_sk| = σ |J ψ F̂|
@@ -41,10 +41,18 @@ NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 def refitted(
     h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...] | None = None, *, anew: bool = False
 ) -> Hypothesis:
-    """The hypothesis with α, β and σ fitted again beside its effects; ``observed``: evidence to fit them to, thinned
-    or whole, of all bodies or some.
+    """Fit α, β and σ again with a hypothesis' effects.
 
-    anew: with lines paired and corrections learnt again, too, as they are beside effects that move modes.
+    Parameters
+    ----------
+    h : Hypothesis
+        The hypothesis.
+    bodies : tuple of Struck
+        The objects.
+    observed : tuple of ObjectEvidence
+        Evidence to fit to, thinned or whole, of all bodies or some; all where None.
+    anew : bool
+        Pair lines and learn corrections again, as with effects that move modes.
     """
     moved = anew or moves(h)
     if moved:
@@ -66,9 +74,18 @@ def reidentified(
     *,
     fully: bool = False,
 ) -> Hypothesis:
-    """The hypothesis with a room's response identified again, beside all that has been found.
+    """Identify a room's response again, with all other effects.
 
-    observed: the strikes it is identified from; all where None. fully: to the end.
+    Parameters
+    ----------
+    h : Hypothesis
+        The hypothesis.
+    bodies : tuple of Struck
+        The objects.
+    observed : tuple of ObjectEvidence
+        The strikes it is identified from; all where None.
+    fully : bool
+        Iterate to convergence.
     """
     # lists of lines say nothing of a response
     fitted = [b for b in bodies if b.recorded is not None and b.recorded.signals is not None]
@@ -94,18 +111,19 @@ def reidentified(
 
 
 def baseline_changes(h: Hypothesis) -> list[BaselineChange]:
-    """What its effects have found of the baseline's own numbers, in their order."""
+    """Return the changes of the baseline that its effects have found, in their order."""
     return [e.baseline_change() for e in h.effects if isinstance(e, ChangesBaseline)]
 
 
 def _whose(one: ObjectEvidence, bodies: tuple[Struck, ...]) -> Struck:
-    """The body that lines are of."""
+    """Find the body of an object's evidence."""
     return next(body for body in bodies if body.recorded is one.source)
 
 
 def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The hypothesis with other effects, not yet refitted; where none moves modes any more, or bends them otherwise,
-    corrections are the baseline's again.
+    """Replace the effects of a hypothesis, without a refit.
+
+    Where none moves modes any more, or bends them otherwise, corrections are the baseline's again.
     """
     made = replace(h, effects=effects)
     return (
@@ -116,8 +134,9 @@ def with_effects(h: Hypothesis, effects: tuple[Effect, ...], bodies: tuple[Struc
 
 
 def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) -> Hypothesis:
-    """The hypothesis with E/ρ and corrections learnt on its own modes, from where its effects have found E/ρ and ν
-    (``stretch``, ``poisson_ratio``). anew: see refitted.
+    """Learn E/ρ and corrections on the hypothesis' own modes; anew: see `refitted`.
+
+    From where its effects have found E/ρ and ν (``stretch``, ``poisson_ratio``).
     """
     changes = baseline_changes(h)
     known = [c.poisson_ratio for c in changes if c.poisson_ratio is not None]
@@ -156,15 +175,16 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
 
 
 def _alike(freq_hz: Array, correction: Array) -> Array:
-    """Corrections (m,), the mean of each run of modes that a mesh leaves side by side: what sets degenerate modes apart
-    is an effect's, or they would change places.
+    """Average corrections (m,) over each run of degenerate modes, as their splitting is an effect's.
+
+    Otherwise they would change places.
     """
     run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > DEGENERATE * MESHED)
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 
 def _off(p: Prediction, anew: bool) -> tuple[Array, Array]:
-    """Uncorrected modes (p,) of a body and ln f of their lines over their own (p,)."""
+    """Return the uncorrected modes (p,) of a body that have lines, and ln f of the lines over their own (p,)."""
     assert p.body.recorded is not None
     line, mode = paired(p, anew=anew)
     place = np.concatenate([p.order[who] for who in mode]) if mode else np.zeros(0, int)
@@ -180,7 +200,7 @@ def _off(p: Prediction, anew: bool) -> tuple[Array, Array]:
 
 
 def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
-    """α and β beside the effects' own decay."""
+    """Fit α and β with the effects' own decay."""
     if any(e.traits.replaces_rayleigh for e in h.effects):
         return h
     known = [
@@ -211,9 +231,7 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
 
 
 def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
-    """The modes, by index, that each line stands for in a model whose modes have hardly moved: as many as before, about
-    the one that is nearest.
-    """
+    """Find the modes of each line, by index, in a model whose modes have hardly moved: about the nearest one."""
     near = model.freq_hz[np.abs(np.subtract.outer(one.freq_hz, model.freq_hz)).argmin(axis=1)]
     return [
         np.argsort(np.abs(model.freq_hz - f), kind="stable")[: len(who)] for f, who in zip(near, one.mode, strict=True)
@@ -221,14 +239,15 @@ def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:
 
 
 def _participation(p: Prediction, one: ObjectEvidence) -> Array:
-    """Jψ (s, k) of the lines as effects have them sound that leave modes where they were."""
+    """Compute Jψ (s, k) of the lines under effects that leave modes where they were."""
     row = p.pattern()[p.strikes_of(one)]
     return np.stack([row[:, who].sum(axis=1) for who in _members(one, p.model)], axis=1)
 
 
 def whole(one: ObjectEvidence) -> Array:
-    """Amplitudes (s, k) with those of lines so near that they may be the same mode, bent or split: at the onset they
-    add up to what was struck.
+    """Add to amplitudes (s, k) those of lines so near that they may be the same mode, bent or split.
+
+    At the onset they add up to the excitation.
     """
     if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
         return one.amplitude  # in a room what rings close by is mostly the room
@@ -242,14 +261,14 @@ def whole(one: ObjectEvidence) -> Array:
 
 
 def _middle(ratio: Array, weight: Array) -> float:
-    """Weighted median, no heavier than 100 to 1: where weights that fall off with the misfit may start from."""
+    """Compute a weighted median, weights within 100 to 1, from which an iteration of weights may start."""
     order = np.argsort(ratio)
     total = np.cumsum(np.clip(weight[order], weight.max() / 100, None))
     return float(ratio[order][np.searchsorted(total, total[-1] / 2)])
 
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
-    """σ by the amplitudes, times what effects that hide them from the lines know better."""
+    """Fit σ to the amplitudes, times the gains of effects that hide them from the lines."""
     louder = float(np.prod([c.onset_gain for c in baseline_changes(h)]))
     modeled, seen, spread = [], [], []
     others = bool(h.at(Stage.MODES)) and not moves(h)  # participations than the evidence's own

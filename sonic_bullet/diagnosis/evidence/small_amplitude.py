@@ -1,10 +1,10 @@
-"""Where modes are at rest, beside an effect under which their frequency goes with their level.
+"""Frequencies of modes at small amplitude, under an effect by which they depend on their level.
 
-    line k of strike s, shifted to 0 Hz: recorded z(t), played z'(t)      δ_k -> argmax Σ_s |Σ_t w z z'* / |z z'|
+    line k of strike s, shifted to 0 Hz: recorded z(t), synthesized z'(t)      δ_k -> argmax Σ_s |Σ_t w z z'* / |z z'|
         e^{−2πi δ t}|      f_k -> f_k + δ_k
 
-A linear fit puts such a mode where it is while it is loud, and the mesh's correction was learnt on that: beside the
-effect it would shift from the wrong end. Whether it hardens or softens, and how far, stays the effect's.
+A linear fit finds such a mode at its frequency while it is loud, and the mesh's correction was learnt on that: with the
+effect it would shift from the wrong end. The sign and size of the shift stay the effect's.
 """
 
 from __future__ import annotations
@@ -32,8 +32,18 @@ AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was re
 def at_rest(
     h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...], *, every: bool = False
 ) -> Hypothesis:
-    """The hypothesis with the corrections of amplitude-dependent modes learnt on what they ring down to, by the strikes
-    in ``observed``. every: of all modes that stand alone.
+    """Learn the corrections of amplitude-dependent modes on their frequencies at small amplitude.
+
+    Parameters
+    ----------
+    h : Hypothesis
+        The hypothesis.
+    bodies : tuple of Struck
+        The objects.
+    observed : tuple of ObjectEvidence
+        The strikes to learn from.
+    every : bool
+        Correct all isolated modes.
     """
     found = dict(h.correction or {})
     for body in bodies:
@@ -44,7 +54,7 @@ def at_rest(
 
 
 def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
-    """Corrections (m,) of a body."""
+    """Compute the corrections (m,) of a body."""
     body, modes, count = p.body, p.model, p.base.mode_count
     assert body.recorded is not None and body.recorded.signals is not None
     correction = np.array((p.hypothesis.correction or {}).get(body.name, np.zeros(count)), float)
@@ -72,7 +82,7 @@ def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
 
 
 def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> float:
-    """δ of a line, in Hz."""
+    """Compute δ of a line in Hz."""
     rows = []
     for s in range(len(recorded.z)):
         use = recorded.good[s, q] & (np.abs(model.z[s, q]) > 0)

@@ -1,7 +1,7 @@
-"""How strikes of unknown impulse compare: by what each leaves of the lines, over what the model has it leave.
+"""Relative levels of strikes of unknown impulse: their lines over the model's.
 
-ln l_s = median over k of ln |A_sk| / (σ |ψ_sk|), each line weighing as it stands over its spread
-    over their mean where no impulse of the body is known: then l says ratios alone
+ln l_s = median over k of ln |A_sk| / (σ |ψ_sk|), each line weighted by its amplitude over its spread
+    over their mean where no impulse of the body is known: then l is relative
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MOST_SPREADS = 100.0
 
 
 def with_levels(body: Struck, gain: float) -> Struck:
-    """The body with the levels of its fitted strikes of unknown impulse; see `Struck.level_n_s`."""
+    """Estimate the levels of a body's fitted strikes of unknown impulse; see `Struck.level_n_s`."""
     recorded = body.recorded
     unknown = ~np.isfinite(body.impulse_n_s)
     if recorded is None or recorded.signals is None or not unknown[body.fitted].any():

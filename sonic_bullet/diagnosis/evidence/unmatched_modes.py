@@ -1,12 +1,12 @@
-"""Unmatched modes, those without a line: what their frequencies are, by the recordings themselves.
+"""Frequencies of unmatched modes, those without a line, by the recordings themselves.
 
     T_s = recording − all other modes;   r_j -> argmin Σ_s ∫ |T_s(f) − A_sj L(f; f_j (1 + r_j), d_j)|² df,   |r_j| <= 1
         %,   L(f) = ½ Σ_t e^{(−d + iω)t} e^{−2πi f t}
 
-Degenerate modes that a mesh has set apart, modes it has put together, modes in each other's skirts and short ones stand
-in no list of lines, but the model knows their amplitudes at every strike, so their place shows. The baseline's
-correction of a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays.
-Beyond the band's edges L is 0: a mode that the mesh has just inside, and that nobody hears, may lie just outside.
+Degenerate modes that a mesh has split, modes it has put together, modes in each other's skirts and short ones are in no
+list of lines, but the model gives their amplitudes at every strike, so their place shows. The baseline's correction of
+a mesh's error, for those of its modes; one that the recordings do not clearly want elsewhere stays. Beyond the band's
+edges L is 0: a mode that the mesh has just inside, and that is not recorded, may lie just outside.
 """
 
 from __future__ import annotations
@@ -30,14 +30,12 @@ FINE = 0.25  # of a mode's half width, or of a bin: steps of the search
 
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
-    """The bodies, modes without a line corrected where their sounds say so; a mode that has come to a line's frequency
-    belongs to it.
-    """
+    """Correct the bodies' modes without a line by their recordings; one that comes to a line's frequency takes it."""
     return tuple(_settled(predict(h, body)) if can_tell(body) else body for body in bodies)
 
 
 def can_tell(body: Struck) -> bool:
-    """Whether amplitudes are known with their signs, and there are sounds to hold them against."""
+    """Decide whether amplitudes are known with their signs, and there are recordings to compare."""
     g = body.recorded
     return (
         g is not None
@@ -49,6 +47,7 @@ def can_tell(body: Struck) -> bool:
 
 
 def _settled(p: Prediction) -> Struck:
+    """Correct one body's modes without a line."""
     h, body = p.hypothesis, p.body
     assert body.recorded is not None
     shared = np.bincount(body.line[body.line >= 0], minlength=1)[np.maximum(body.line, 0)] > 1
@@ -65,11 +64,17 @@ def _settled(p: Prediction) -> Struck:
 
 
 def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
-    """The corrections (m,) of a body, those of ``which`` modes searched for anew, the loudest first. alone
-    (m,): without a line; all where None.
+    """Search for corrections (m,) of some of a body's modes, the loudest first.
 
-    One that shares a line goes elsewhere only if nothing but itself, as the mesh has it, is there: degenerate modes
-    that an imperfection has turned are not the mesh's.
+    Parameters
+    ----------
+    p : Prediction
+        The hypothesis on the body.
+    which : (w,)
+        Indices of the modes.
+    alone : (m,) bool
+        Modes without a line; all where None. Another moves only if nothing but itself, as the mesh has it, is at its
+        line: degenerate modes that an imperfection has turned are not the mesh's.
     """
     body, known, model, plain = p.body, p.hypothesis.correction, p.model, p.uncorrected()
     assert body.recorded is not None and body.recorded.signals is not None
@@ -115,8 +120,9 @@ def _best(
     most: float,
     band_hz: tuple[float, float],
 ) -> float:
-    """The correction of a mode of amplitudes push (s,) that leaves least around it, if it is clearly better than the
-    one it has and leaves no more than ``most``.
+    """Find the correction of a mode of amplitudes push (s,) that leaves least near it.
+
+    The old one stays unless the new one is clearly better and leaves no more than ``most``.
     """
     step = FINE * max(decay / (2 * np.pi), sr / n) / own
     grid = np.concatenate([[now], np.linspace(-CORRECTION, CORRECTION, 2 * int(np.ceil(CORRECTION / step)) + 1)])
@@ -134,11 +140,12 @@ def _best(
 
 
 def _bins(freq_hz: float, half_hz: float, n: int, sr: int) -> Array:
+    """Return the bins of a spectrum about a frequency."""
     return np.arange(max(int((freq_hz - half_hz) * n / sr), 1), min(int((freq_hz + half_hz) * n / sr) + 2, n // 2))
 
 
 def _line(freq_hz: Array | float, decay: float, bins: Array, n: int, sr: int, band_hz: tuple[float, float]) -> Array:
-    """½ Σ_t e^{(−d + iω)t} e^{−2πi kt/n} at some bins of n-point spectra; 0 outside the band."""
+    """Compute ½ Σ_t e^{(−d + iω)t} e^{−2πi kt/n} at some bins of n-point spectra; 0 outside the band."""
     freq = np.asarray(freq_hz)
     start = (-decay + 2j * np.pi * freq) / sr  # the bins' own turns come full circle after n samples
     line = 0.5 * (1 - np.exp(start * n)) / (1 - np.exp(start) * np.exp(-2j * np.pi * bins / n))

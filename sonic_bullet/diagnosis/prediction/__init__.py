@@ -1,1 +1,1 @@
-"""Hypothesis × body -> modes, impacts, ringing, sound, and how far that is from what was recorded."""
+"""Prediction of a body by a hypothesis: modes, impacts, vibration, sound, and the distance from the recordings."""

@@ -1,10 +1,10 @@
-"""What stays the same while effects are selected, and what a hypothesis scores on it.
+"""The fixed part of a selection of effects, and the score of a hypothesis in it.
 
     Struck bodies + comparable strikes + band + candidate effects + seed -> DiagnosisProblem;
         DiagnosisProblem × Hypothesis -> Score
 
-Strikes are `Comparable`, so a problem can only be posed once somebody has asked `comparable` and seen to what it said:
-where nothing can be compared there is no problem, and no score.
+Strikes are `Comparable`, so a problem can only be posed after `comparable`: where nothing can be compared there is no
+problem, and no score.
 """
 
 from __future__ import annotations
@@ -20,15 +20,32 @@ from sonic_bullet.effects.protocol import Effect
 
 
 def silent(_: str) -> None:
-    """Progress that nobody wants."""
+    """Ignore progress."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiagnosisProblem:
-    """bodies: every object. takes: what a hypothesis is held against. band_hz: of the recordings. effects: the
-    candidates.
+    """What stays the same while effects are selected.
 
-    seed: of all that is drawn. say: where progress goes. Raises ValueError where there is no strike, or no band.
+    Attributes
+    ----------
+    bodies : tuple of Struck
+        Every object.
+    takes : Comparable
+        What a hypothesis is compared with.
+    band_hz : (2,)
+        Of the recordings.
+    effects : tuple of types
+        The candidates.
+    seed : int
+        Of all that is drawn.
+    say : callable
+        Takes progress.
+
+    Raises
+    ------
+    ValueError
+        There is no strike, or no band.
     """
 
     bodies: tuple[Struck, ...]
@@ -39,6 +56,7 @@ class DiagnosisProblem:
     say: Callable[[str], None] = silent
 
     def __post_init__(self) -> None:
+        """Check that there is something to compare with, and a band."""
         if not self.takes:
             raise ValueError("a problem needs something to compare with")
         if not 0 <= self.band_hz[0] < self.band_hz[1]:
@@ -46,30 +64,30 @@ class DiagnosisProblem:
 
     @property
     def has_audio(self) -> bool:
-        """Whether all that is compared was recorded: strikes, no lists of lines."""
+        """Decide whether all that is compared are recordings, no lists of lines."""
         return all(isinstance(take, Take) for take in self.takes)
 
     @property
     def has_meshes(self) -> bool:
-        """Whether every body has a mesh."""
+        """Decide whether every body has a mesh."""
         return all(body.family is not None for body in self.bodies)
 
     def predict(self, h: Hypothesis) -> Predictions:
-        """What the hypothesis says of the bodies that the strikes are of."""
+        """Predict the bodies that the strikes are of."""
         return predict_takes(h, self.takes)
 
     def distance_db(self, h: Hypothesis) -> float:
-        """Mean distance of the strikes from the hypothesis; ∞ where that plays nothing finite."""
+        """Compute the mean distance of the strikes from the hypothesis; ∞ where it gives no finite sound."""
         return mean_db(self.takes, self.predict(h))
 
     def score(self, h: Hypothesis) -> Score:
-        """Distance and noise floor, means over the strikes."""
+        """Compute distance and noise floor, means over the strikes."""
         return self.scored(self.predict(h))
 
     def scored(self, made: Predictions) -> Score:
-        """The same of what has been predicted already."""
+        """Compute the same of a prediction at hand."""
         return Score(mean_db(self.takes, made), least_db(self.takes, made))
 
     def only(self, *effects: type[Effect]) -> DiagnosisProblem:
-        """The same with other candidates."""
+        """Return the problem with other candidates."""
         return replace(self, effects=effects)

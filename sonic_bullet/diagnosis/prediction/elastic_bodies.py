@@ -1,9 +1,9 @@
-"""One object under any elasticity: its tensor family (modal.tensor), struck and recorded as the case says.
+"""One object under any elasticity: its tensor family (modal.tensor), struck and recorded as in the case.
 
     C/ρ -> λ (m,), ∂ ln λ/∂(C_k/ρ), J ψ (s, m)      cheap, for a search
         -> ModalModel, strikes and sensor last      as struck_bodies.modal_model makes them
 
-The family is computed, or fetched from the cache, when it is first asked for: most cases never ask.
+The family is computed, or fetched from the cache, at its first use: most cases never need it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,19 @@ def with_elastic(
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Struck, ...]:
-    """The same bodies, those with a mesh able to be of any elasticity."""
+    """Make the bodies with a mesh able to take any elasticity.
+
+    Parameters
+    ----------
+    found : CaseFit
+        The fit.
+    bodies : tuple of Struck
+        The objects.
+    cache : Place
+        Where families are kept.
+    progress : callable
+        Called with what is being done.
+    """
     made = []
     for body in bodies:
         if body.family is None:
@@ -76,10 +88,26 @@ def elastic_of(
     cache: Place = "default",
     say: Callable[[str], None],
 ) -> Elastic:
-    """An object's.
+    """Make an object able to take any elasticity; raises SonicBulletError at its first use.
 
-    level_n_s (s,): impulses, see `Struck`; material: isotropic, as fitted; count: of modes wanted. Raises nothing now;
-    SonicBulletError when first asked.
+    Parameters
+    ----------
+    case : Case
+        The case.
+    name : str
+        The object.
+    recordings : tuple of CaseRecording
+        Its strikes.
+    level_n_s : (s,)
+        Impulses, see `Struck`.
+    material : Material
+        Isotropic, as fitted.
+    count : int
+        Modes wanted.
+    cache : Place
+        Where families are kept.
+    say : callable
+        Takes progress.
     """
     thing = case.objects[name]
 

@@ -1,4 +1,4 @@
-"""Lines in place of recordings: how far the modes of a hypothesis are from a list of measured frequencies and decays.
+"""Distance of a hypothesis' modes from a list of measured frequencies and decays in place of recordings.
 
     D = 20 lg(1 + rms min(|ln f_k/f_j|, CAP)/MESH), its mean with 8.7 rms |ln d_k/d_j| where decays are known
         in dB
@@ -27,32 +27,30 @@ DB = 20 / np.log(10)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listed:
-    """Some lines (k,) of a body, by index, to be held against what a hypothesis says; the others are there to learn
-    from.
-    """
+    """Some lines (k,) of a body, by index, to be compared with a hypothesis; the others are for learning."""
 
     body: Struck
     line: Array
 
     @property
     def name(self) -> str:
-        """Whose lines they are."""
+        """Name the list."""
         return f"the list of lines of {self.body.name}"
 
     def hindrance(self, p: Prediction) -> str:
-        """Why they have no distance from what is predicted; empty where they have one."""
+        """Return the reason why they have no distance from a prediction; empty where they have one."""
         assert self.body.recorded is not None
         count = len(self.body.recorded.lines.freq_hz)
         return "" if count >= 2 * FOLDS else f"holds {count}, and {2 * FOLDS} are needed to leave some out in turn"
 
     def distance(self, p: Prediction) -> float:
-        """D in dB."""
+        """Compute D in dB."""
         assert self.body.recorded is not None
         lines = self.body.recorded.lines
         return distance_db(*off_by(p, lines.freq_hz[self.line], lines.decay_per_s[self.line]))
 
     def least(self, p: Prediction) -> float:
-        """D of the lines' own spreads."""
+        """Compute D of the lines' own spreads."""
         assert self.body.recorded is not None
         lines = self.body.recorded.lines
         sd, decay = np.nan_to_num(lines.freq_sd_hz[self.line]) / lines.freq_hz[self.line], lines.decay_per_s[self.line]
@@ -64,7 +62,7 @@ class Listed:
         )
 
     def rest(self, bodies: tuple[Struck, ...], h: Hypothesis) -> tuple[tuple[Struck, ...], Hypothesis]:
-        """Bodies without these lines, and the hypothesis without what it learnt of them."""
+        """Remove these lines from the bodies, and what the hypothesis learnt of them."""
         mine = _without(self.body, self.line)
         correction = dict(h.correction or {})
         old = correction.get(self.body.name)
@@ -74,7 +72,7 @@ class Listed:
 
 
 def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
-    """Every body's lines in turns; too few to leave some out as they are (`Listed.hindrance`)."""
+    """Divide every body's lines into parts that are left out in turn; too few stay together (`Listed.hindrance`)."""
     made = []
     for body in (b for b in bodies if b.recorded is not None):
         count = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
@@ -83,8 +81,9 @@ def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
 
 
 def off_by(p: Prediction, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Array]:
-    """|ln f/f_j| (k,), at most CAP, of lines and the modes that fit them best, and |ln d/d_j|, NaN where unknown or
-    unpaired.
+    """Compute |ln f/f_j| (k,) of lines and the modes that fit them best, at most CAP, and |ln d/d_j|.
+
+    The latter is NaN where unknown or unpaired.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -101,7 +100,7 @@ def off_by(p: Prediction, freq_hz: Array, decay_per_s: Array) -> tuple[Array, Ar
 
 
 def distance_db(off: Array, lost: Array) -> float:
-    """D of the two."""
+    """Compute D of |ln f/f_j| (k,) and |ln d/d_j| (k,)."""
     if not len(off):
         return float("nan")
     found = [20 * np.log10(1 + np.sqrt((off**2).mean()) / MESH)]
@@ -111,6 +110,7 @@ def distance_db(off: Array, lost: Array) -> float:
 
 
 def _without(body: Struck, line: Array) -> Struck:
+    """Remove some lines from a body."""
     assert body.recorded is not None
     keep = np.setdiff1d(np.arange(len(body.recorded.lines.freq_hz)), line)
     place = np.full(len(body.recorded.lines.freq_hz) + 1, -1)

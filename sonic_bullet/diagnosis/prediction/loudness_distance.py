@@ -1,4 +1,4 @@
-"""The psychoacoustic distance: how much louder or softer each band is, in sone, as an ear would have it.
+"""Psychoacoustic distance: by how much each band is louder or softer, in sone.
 
     Σ over bands |N'_recorded − N'_played|, mean over frames in which the recording is audible
         [N': estimator.loudness, ISO 226; bands: Bark]
@@ -22,7 +22,7 @@ OBSERVED = 0.05  # sone
 
 
 def sone_distance(takes: Comparable, made: Predictions) -> float | None:
-    """Mean over takes; None where none is audible."""
+    """Compute the mean distance of the takes from a prediction in sone; None where none is audible."""
     found = []
     for take in (t for t in takes if isinstance(t, Take)):
         played = with_noise(take.played(made[take.body]), take.floor, take.strike)

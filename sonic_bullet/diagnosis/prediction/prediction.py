@@ -1,10 +1,10 @@
-"""What a hypothesis says of a body: its modes, and how it rings and sounds under any strike. Made once, and handed on.
+"""Prediction of a body by a hypothesis: its modes, and their vibration and sound under any strike.
 
     λ -> corrections -> d = ½(α + βλ) -> MODES -> A = g J (φ(p)·e)(φ(q)·n) · start -> Ring -> BANK -> hits and pulses ->
         SOUND -> samples
 
-Every stage hands a value to the next. Modes are all strikes', so they are worked out when a prediction is made; what
-one strike makes of them is worked out when it is asked for.
+Every stage hands a value to the next. Modes are common to all strikes, so they are computed when a prediction is made;
+what depends on one strike is computed when it is asked for.
 """
 
 from __future__ import annotations
@@ -35,8 +35,20 @@ SAMPLED = 300  # vertices by which modes are compared
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """A hypothesis on one body. base: undamped, uncorrected. model: damped, with all that acts on modes. order (m,):
-    which mode of base each of model's was.
+    """A hypothesis on one body.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+        The hypothesis.
+    body : Struck
+        The body.
+    base : ModalModel
+        Undamped, uncorrected.
+    model : ModalModel
+        Damped, with all that acts on modes.
+    order : (m,)
+        The mode of `base` that each of `model` was.
     """
 
     hypothesis: Hypothesis
@@ -46,37 +58,37 @@ class Prediction:
     order: Array
 
     def acting(self, stage: Stage) -> tuple[Effect, ...]:
-        """The effects of a stage that act on this body."""
+        """Return the effects of a stage that act on this body."""
         return self.hypothesis.at(stage, fitted=self.body.recorded is not None)
 
     def uncorrected(self) -> Prediction:
-        """The same with the mesh's own frequencies; itself where the body has no corrections."""
+        """Predict with the mesh's own frequencies; itself where the body has no corrections."""
         h = self.hypothesis
         known = self.body.name in (h.correction or {})
         return predict(replace(h, correction=None), self.body) if known else self
 
     def strikes_of(self, one: ObjectEvidence) -> list[int]:
-        """Which of the body's strikes the evidence is of."""
+        """Return the indices of the body's strikes that the evidence is of."""
         fitted = self.body.fitted
         return [fitted[i] for i in one.strike]
 
     def pattern(self) -> Array:
-        """J ψ (s, m) of its modes; see the function."""
+        """Compute J ψ (s, m) of its modes; see the function."""
         return pattern(self.body, self.model)
 
     def start(self, strikes: list[int]) -> Array:
-        """Complex factors (s, m) of the amplitudes of some strikes: the phases that modes start with."""
+        """Compute complex factors (s, m) of the amplitudes of some strikes: the phases at the onset."""
         own = self.body.own_phase
         if own is None:
             return np.tile(start(self.body.kind, self.model), (len(strikes), 1))
         return np.asarray(own[strikes][:, self.order])
 
     def impact(self, strike: int) -> Impact:
-        """What the strike is."""
+        """Return a strike with the effects on its force."""
         return impact_of(float(self.body.level_n_s[strike]), self.acting(Stage.FORCE))
 
     def ring(self, strike: int) -> Ring:
-        """The modes as a strike starts them, before its pulse's spectrum; those outside the band are silent."""
+        """Compute the modes as a strike excites them, before its pulse's spectrum; silent outside the band."""
         body, model, count = self.body, self.model, self.body.surface_count(self.model)
         row = self.pattern()[strike] * in_band(body, model)
         push = np.einsum("xm,x->m", model.shape[count + strike].astype(float), body.direction[strike])
@@ -99,7 +111,17 @@ class Prediction:
         return ring
 
     def sound(self, strike: int, n: int, sr: int) -> Array:
-        """The strike's sound (n,) from the onset on, in units of the file."""
+        """Synthesize a strike (n,) from the onset on, in units of the file.
+
+        Parameters
+        ----------
+        strike : int
+            Index of the strike.
+        n : int
+            Length in samples.
+        sr : int
+            Sampling rate in Hz.
+        """
         impact = self.impact(strike)
         sample = sounded(self.ring(strike), impact, n, sr)
         index = -1
@@ -111,7 +133,7 @@ class Prediction:
         return sound.sample
 
     def sounds(self, strikes: Iterable[int], n: int, sr: int) -> Array:
-        """Those of several strikes (s, n)."""
+        """Synthesize several strikes (s, n)."""
         return np.stack([self.sound(strike, n, sr) for strike in strikes])
 
 
@@ -119,19 +141,19 @@ Predictions = Mapping[Struck, Prediction]  # one hypothesis on several bodies
 
 
 def predict_each(h: Hypothesis, bodies: Iterable[Struck]) -> Predictions:
-    """What a hypothesis says of every body, once each."""
+    """Predict every body, once each."""
     return {body: predict(h, body) for body in dict.fromkeys(bodies)}
 
 
 def predict_fitted(h: Hypothesis, bodies: Iterable[Struck]) -> Predictions:
-    """The same of those bodies that were fitted."""
+    """Predict the bodies that were fitted."""
     return predict_each(h, (body for body in bodies if body.recorded is not None))
 
 
 def predict(h: Hypothesis, body: Struck) -> Prediction:
-    """What a hypothesis says of a body.
+    """Predict a body.
 
-    Corrections come before the effects; where these mix modes, after them, as they were learnt on what came of it.
+    Corrections come before the effects; where these mix modes, after them, as they were learnt on the result.
     """
     base, fitted = undamped(h, body), body.recorded is not None
     none = np.zeros(base.mode_count)
@@ -157,7 +179,7 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
 
 
 def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:
-    """A strike under the effects on its force."""
+    """Apply the effects on a strike's force."""
     impact = Impact(impulse_n_s, np.zeros(1), np.ones(1))
     for effect in effects:
         impact = effect.apply(impact)
@@ -165,7 +187,7 @@ def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:
 
 
 def undamped(h: Hypothesis, body: Struck) -> ModalModel:
-    """The body's model under the effects on its material, uncorrected."""
+    """Return the body's model under the effects on its material, uncorrected."""
     effects = h.at(Stage.MATERIAL, fitted=body.recorded is not None)
     if not effects or body.elastic is None:
         return body.model if h.poisson is None or body.other is None else body.other(h.poisson)
@@ -176,7 +198,7 @@ def undamped(h: Hypothesis, body: Struck) -> ModalModel:
 
 
 def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array) -> tuple[ModalModel, Array]:
-    """The model with other modes, ascending, and which mode (m,) went where; overdamped ones are gone."""
+    """Return a model with other modes, ascending, and the old index (m,) of each; overdamped ones are removed."""
     good = np.flatnonzero((freq_hz > 0) & np.isfinite(freq_hz))
     order = good[np.argsort(freq_hz[good], kind="stable")]
     kept = model.shape
@@ -186,7 +208,7 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array) -> tuple[Moda
 
 
 def came_from(old: ModalModel, new: ModalModel) -> Array:
-    """The old mode (m,) that each new one is most like, by their motion on the surface, one to one."""
+    """Match each new mode (m,) to the old one that it is most like, by their motion on the surface, one to one."""
     from scipy.optimize import linear_sum_assignment
 
     step = max(1, len(old.shape) // SAMPLED)
@@ -195,19 +217,19 @@ def came_from(old: ModalModel, new: ModalModel) -> Array:
 
 
 def pattern(body: Struck, model: ModalModel) -> Array:
-    """J ψ (s, m), real, of the body's strikes at the sensor; J about 1 where it is not known."""
+    """Compute J ψ (s, m), real, of the body's strikes at the sensor; J is about 1 where it is not known."""
     at = model.shape[body.surface_count(model) :].astype(float)
     row = np.einsum("sxm,sx->sm", at, body.direction)
     return np.asarray(body.level_n_s[:, None] * row[:-1] * row[-1])
 
 
 def in_band(body: Struck, model: ModalModel) -> Array:
-    """1 for modes (m,) that a recording can hold, else 0."""
+    """Return 1 for modes (m,) in the band of the recordings, else 0."""
     return np.asarray((model.freq_hz >= body.band_hz[0]) & (model.freq_hz <= body.band_hz[1]), float)
 
 
 def start(kind: str, model: ModalModel) -> Array:
-    """Complex factor (m,) of the amplitude: the phase a mode starts with; see estimator.observe."""
+    """Compute the complex factor (m,) of the amplitude: the phase at the onset; see estimator.observe."""
     if kind == "velocity":
         return np.asarray(1 + 1j * model.decay_per_s / (2 * np.pi * model.freq_hz))
     return np.full(model.mode_count, -1j if kind in ("sum", "lines") else 1.0 + 0j)

@@ -1,12 +1,12 @@
-"""How far what is played is from what was recorded, over the recording's noise: the distance that `fit` prints.
+"""Distance of a synthesis from the recording, over the recording's noise, the same as `fit` prints.
 
 D(recorded, g·played + noise's power), D of a noisy take of what is played        (estimator.fit.takes.best_gain)
     g: 1 where the impulse is known, else the best
 
-comparable(takes, made) is the one door: what has no distance stays outside, by name and with its reason, and what is
-let in has one from what any hypothesis predicts, a plain float:
+comparable(takes, made) is the only way to a comparison: what has no distance is excluded, by name and with its reason,
+and what is included has one from what any hypothesis predicts, a plain float:
 
-    neither stands above the noise   -> EDGE_DB, what noise makes of a sound that just stands above it
+    neither is above the noise       -> EDGE_DB, the effect of noise on a sound just above it
     what is played is not finite     -> ∞, farther than whatever can be played
 """
 
@@ -42,28 +42,28 @@ KEPT = 24  # takes whose spectra are kept
 
 
 class Judged(Protocol):
-    """Something measured that a hypothesis is held against, in dB."""
+    """Something measured with which a hypothesis is compared, in dB."""
 
     @property
     def name(self) -> str:
-        """What a person would call it."""
+        """Name it for people."""
         ...
 
     @property
     def body(self) -> Struck:
-        """What was struck."""
+        """Return the body that was struck."""
         ...
 
     def hindrance(self, p: Prediction) -> str:
-        """Why it has no distance from what is predicted of its body; empty where it has one."""
+        """Return the reason why it has no distance from a prediction of its body; empty where it has one."""
         ...
 
     def distance(self, p: Prediction) -> float:
-        """How far what is predicted is from it; ∞ where that plays nothing finite."""
+        """Compute its distance from a prediction; ∞ where that is not finite."""
         ...
 
     def least(self, p: Prediction) -> float:
-        """How far it would be from itself, measured again."""
+        """Compute its distance from itself, measured again."""
         ...
 
 
@@ -78,12 +78,13 @@ class LeftOut:
     why: str
 
     def __str__(self) -> str:
+        """Format it as a line."""
         return f"{self.name} {self.why}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """What a hypothesis can be held against, and what could not be compared."""
+    """What a hypothesis can be compared with, and what could not be compared."""
 
     takes: Comparable
     left_out: tuple[LeftOut, ...] = ()
@@ -97,13 +98,14 @@ class Incomparable:
 
 
 def predict_takes(h: Hypothesis, takes: Iterable[Judged]) -> Predictions:
-    """What a hypothesis says of the bodies that the takes are of, once each."""
+    """Predict the bodies that the takes are of, once each."""
     return predict_each(h, (take.body for take in takes))
 
 
 def comparable(takes: Sequence[Judged], made: Predictions) -> Compared | Incomparable:
-    """Which of the takes have a distance from what is predicted of their bodies, and from whatever else is held against
-    the same recordings.
+    """Divide takes into those with a distance from a prediction of their bodies, and those without.
+
+    Those with one have a distance from any other prediction, too.
     """
     why = [take.hindrance(made[take.body]) for take in takes]
     out = tuple(LeftOut(take.name, reason) for take, reason in zip(takes, why, strict=True) if reason)
@@ -113,10 +115,16 @@ def comparable(takes: Sequence[Judged], made: Predictions) -> Compared | Incompa
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """How far a hypothesis is from what it was held against, and how far it would be from itself, measured again: both
-    in dB, means over the strikes.
+    """Distance of a hypothesis from what it was compared with.
 
-    There is one only where there is something comparable; else `comparable` says `Incomparable`.
+    It exists only where something is comparable; else `comparable` returns `Incomparable`.
+
+    Attributes
+    ----------
+    distance_db : float
+        Mean over the strikes.
+    floor_db : float
+        Distance from itself, measured again, likewise.
     """
 
     distance_db: float
@@ -124,13 +132,27 @@ class Score:
 
     @property
     def gap_db(self) -> float:
-        """What is open: distance over noise alone."""
+        """Return distance over noise alone."""
         return self.distance_db - self.floor_db
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
-    """A recorded strike: which of which body, its samples (n,) from the onset on, and its noise."""
+    """A recorded strike.
+
+    Attributes
+    ----------
+    body : Struck
+        The body that was struck.
+    strike : int
+        Index among its strikes.
+    sample : (n,)
+        From the onset on.
+    sr : int
+        Sampling rate in Hz.
+    floor : Floor
+        The recording's noise.
+    """
 
     body: Struck
     strike: int
@@ -140,9 +162,12 @@ class Take:
 
     @property
     def place(self) -> tuple[Recorded, int]:
-        """Where it is in the evidence: among whose strikes, and which of those.
+        """Return its place in the evidence: the fitted object, and the index among its strikes.
 
-        Raises ValueError where it was not fitted.
+        Raises
+        ------
+        ValueError
+            It was not fitted.
         """
         if self.body.recorded is None:
             raise ValueError(f"{self.body.name} was not fitted")
@@ -150,20 +175,21 @@ class Take:
 
     @property
     def name(self) -> str:
-        """Its file's name, or its body's and its number."""
+        """Return its file's name, or its body's and its number."""
         file = self.body.recordings[self.strike].file
         return file.name if file is not None else f"{self.body.name}, strike {self.strike + 1}"
 
     def played(self, p: Prediction) -> Array:
-        """What is predicted of it (n,), at the best gain where the impulse is not known."""
+        """Synthesize it (n,) by a prediction, at the best gain where the impulse is not known."""
         made = self._made(p)
         return self._best(power_spectra(made)).gain * made if np.isfinite(made).all() else made
 
     def _made(self, p: Prediction) -> Array:
+        """Synthesize it by a prediction."""
         return p.sound(self.strike, len(self.sample), self.sr)
 
     def hindrance(self, p: Prediction) -> str:
-        """Why it has no distance from what is predicted; empty where it has one."""
+        """Return the reason why it has no distance from a prediction; empty where it has one."""
         if wrong := int((~np.isfinite(self.sample)).sum()):
             return f"holds {wrong} samples that are no numbers"
         if len(self.sample) < min(WINDOWS):
@@ -179,25 +205,26 @@ class Take:
         return ""
 
     def distance(self, p: Prediction) -> float:
-        """D in dB of the recording and what is predicted; see the module's head."""
+        """Compute D in dB of the recording and a prediction; see the module's head."""
         return self.apart_db(self._made(p))
 
     def apart_db(self, made: Array) -> float:
-        """D in dB of the recording and whatever is played in its place (n,)."""
+        """Compute D in dB of the recording and any synthesis (n,)."""
         return _stated(self._apart(made)) if np.isfinite(made).all() else np.inf
 
     def _apart(self, made: Array) -> float:
+        """Compute D of a finite synthesis, NaN where neither is above the noise."""
         return self._best(power_spectra(made)).distance_db
 
     def _best(self, power: tuple[Array, ...]) -> BestGain:
-        """The gain of what is played, by its powers, and D there: 1 where the strike's impulse is known."""
+        """Find the gain of a synthesis, by its powers, and D there: 1 where the strike's impulse is known."""
         recorded, floor = _spectra(self)
         if np.isfinite(self.body.impulse_n_s[self.strike]):
             return BestGain(1.0, distance_at(recorded, power, floor, 1.0))
         return find_best_gain(recorded, power, floor)
 
     def least(self, p: Prediction) -> float:
-        """D of a noisy take of what is predicted."""
+        """Compute D of a noisy take of a prediction."""
         made = self._made(p)
         power = power_spectra(made)
         gain = self._best(power).gain
@@ -207,26 +234,26 @@ class Take:
 
 @lru_cache(maxsize=KEPT)
 def _spectra(take: Take) -> tuple[tuple[Array, ...], Floor]:
-    """Powers of a take, and its noise in the band that is recorded."""
+    """Compute the powers of a take, and its noise in the band that is recorded."""
     return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)
 
 
 def take_of(body: Struck, strike: int, sample: Array, sr: int) -> Take:
-    """A recorded strike with the noise that its own end tells."""
+    """Build a recorded strike, with the noise of its own end."""
     finite = bool(np.isfinite(sample).all()) and len(sample) >= min(WINDOWS)
     return Take(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
 
 
 def _stated(db: float) -> float:
-    """A distance of finite sounds; EDGE_DB where neither stands above the noise, and no cell tells."""
+    """Return a distance of finite sounds; EDGE_DB where neither is above the noise."""
     return EDGE_DB if np.isnan(db) else db
 
 
 def mean_db(takes: Comparable, made: Predictions) -> float:
-    """Mean distance over takes."""
+    """Compute the mean distance over takes."""
     return float(np.mean([take.distance(made[take.body]) for take in takes]))
 
 
 def least_db(takes: Comparable, made: Predictions) -> float:
-    """Mean noise floor of the distance over takes."""
+    """Compute the mean noise floor of the distance over takes."""
     return float(np.mean([take.least(made[take.body]) for take in takes]))

@@ -1,11 +1,11 @@
-"""Objects as the diagnosis strikes them: the mesh's own modes at the fitted material, at the strikes and the sensor.
+"""Objects of a diagnosis: the mesh's own modes at the fitted material, at the strikes and the sensor.
 
     Family at (γ, ν) -> λ (m,), shapes on the skin and at every strike and the sensor, as last "vertices" of one
         ModalModel
 
-An effect on the modes then changes strikes and sensor along with the body. A sensor without a place (microphone, plain
-sum) is a last vertex whose x component is each mode's weight. Without a mesh, or without a place, the modes are the
-lines that `fit` plays, with their own decays and phases.
+An effect on the modes then changes strikes and sensor with the body. A sensor without a place (microphone, plain sum)
+is a last vertex whose x component is each mode's weight. Without a mesh, or without a place, the modes are the lines of
+`fit`, with their own decays and phases.
 """
 
 from __future__ import annotations
@@ -30,17 +30,44 @@ from sonic_bullet.records import Array, ModalModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Struck:
-    """One object and all its strikes. model: undamped, uncorrected; its last s + 1 vertices are the strikes and the
-    sensor.
+    """One object and all its strikes.
 
-    direction (s + 1, 3): directions there, zero for a strike of unknown place. impulse_n_s (s,): NaN where unknown.
-    kind: `Case.sensor`. family: for another elasticity, None without a mesh. correction (m,): relative, of each mode's
-    frequency, learnt on its fitted strikes, else 0. line (m,): the fitted line a mode was paired with, or -1. recorded:
-    its fitted lines and sounds, None for an object nobody fitted. elastic: for tensors, see elastic_bodies.py. band_hz:
-    nothing outside it is recorded, though its modes are in the model: a mesh may have put them there. other: ν -> the
-    model there, of as many modes. poisson: the same, cheap, for a search. own_decay_per_s (m,): in place of a law of
-    the material; own_phase (s, m): that modes start with, of magnitude 1; None where the model says both. relative
-    (s,): impulses that are not known, over the mean of those; else 1.
+    Attributes
+    ----------
+    name : str
+        The object.
+    recordings : tuple of CaseRecording
+        Its strikes.
+    model : ModalModel
+        Undamped, uncorrected; its last s + 1 vertices are the strikes and the sensor.
+    direction : (s + 1, 3)
+        Directions there, zero for a strike of unknown place.
+    impulse_n_s : (s,)
+        NaN where unknown.
+    kind : str
+        `Case.sensor`, or "lines".
+    family : Family
+        For other elasticities; None without a mesh.
+    correction : (m,)
+        Of each mode's frequency, relative, learnt on its fitted strikes, else 0.
+    line : (m,)
+        Fitted line that a mode was paired with, or -1.
+    recorded : RecordedObject
+        Its fitted lines and sounds; None for an object that was not fitted.
+    elastic : Elastic
+        Under any elasticity, see elastic_bodies.py.
+    band_hz : (2,)
+        Nothing outside it is recorded, though its modes are in the model: a mesh may have put them there.
+    other : callable
+        ν -> the model there, of as many modes.
+    poisson : Poisson
+        The same, cheap, for a search.
+    own_decay_per_s : (m,)
+        In place of a law of the material; None where the model has them.
+    own_phase : (s, m)
+        Of the modes at the onset, of magnitude 1; None where the model has them.
+    relative : (s,)
+        Impulses that are not known, over the mean of those; else 1.
     """
 
     name: str
@@ -63,31 +90,33 @@ class Struck:
 
     @property
     def level_n_s(self) -> Array:
-        """Impulses (s,); of strikes without one how they compare, about 1."""
+        """Return impulses (s,); relative ones, about 1, of strikes of unknown impulse."""
         rest = np.ones(self.strikes) if self.relative is None else self.relative
         return np.where(np.isfinite(self.impulse_n_s), self.impulse_n_s, rest)
 
     @property
     def strikes(self) -> int:
+        """Return the number of strikes."""
         return len(self.recordings)
 
     @property
     def fitted(self) -> list[int]:
-        """Which of the recordings its lines and sounds belong to, in their order: those of the split 'fit' that could
-        be read.
+        """Return the indices of the recordings that its lines and sounds belong to, in their order.
+
+        They are those of the split 'fit' that could be read.
         """
         observed = self.recorded.recordings if self.recorded is not None else ()
         return [i for one in observed for i, r in enumerate(self.recordings) if r is one or r == one]
 
     def surface_count(self, model: ModalModel | None = None) -> int:
-        """How many of the vertices of its model, or of its model under another elasticity, are the body's."""
+        """Count the vertices of its model, or of another of its models, that are the body's."""
         return len((model or self.model).vertex_m) - self.strikes - 1
 
 
 def struck_bodies(
     found: CaseFit, *, cache: Place = "default", progress: Callable[[str], None] | None = None
 ) -> tuple[Struck, ...]:
-    """Every object of the case, fitted ones first. Raises SonicBulletError."""
+    """Build every object of the case, fitted ones first. Raises SonicBulletError."""
     case = found.case
     say = progress or (lambda _: None)
     by_name = {o.evidence.thing.name: o for o in found.objects}
@@ -105,11 +134,13 @@ def struck_bodies(
 
 
 def _fitted(found: CaseFit, o: ObjectFit) -> Struck:
+    """Build a fitted object."""
     assert o.evidence.family is not None
     return _placed(found, o.evidence.thing.name, o.evidence.family, o.evidence.guess.density_kg_m3, o)
 
 
 def _placed(found: CaseFit, name: str, family: Family, density: float, o: ObjectFit | None) -> Struck:
+    """Build an object with a mesh."""
     case = found.case
     mine = tuple(r for r in case.recordings if r.object == name)
     value, vector = family.modes(found.fit.gamma_m2_s2, found.fit.poisson_ratio)
@@ -166,8 +197,27 @@ def modal_model(
     value: Array,
     vector: Array,
 ) -> tuple[ModalModel, Array]:
-    """The undamped model of modes (b, m) with λ (m,), strikes and sensor as last vertices, and the directions there (s
-    + 1, 3). Raises MeshError.
+    """Build an undamped model with strikes and sensor as last vertices. Raises MeshError.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    name : str
+        The object.
+    recordings : tuple of CaseRecording
+        Its strikes.
+    family : Family
+        Its modes' basis.
+    density : float
+        In kg/m³.
+    value, vector : (m,), (b, m)
+        λ of the modes and their coefficients.
+
+    Returns
+    -------
+    ModalModel, (s + 1, 3)
+        The model, and the directions of strikes and sensor.
     """
     scale = np.sqrt(density * family.length_m**3)
     axes = np.eye(3)
@@ -208,7 +258,7 @@ def modal_model(
 
 
 def inward(family: Family, position: tuple[float, float, float]) -> Array:
-    """Unit vector (3,) into the body at a surface point."""
+    """Compute the unit vector (3,) into the body at a surface point."""
     from sonic_bullet.geometry import outward_normals
     from sonic_bullet.geometry.nearest_point import closest_point
 
@@ -217,10 +267,10 @@ def inward(family: Family, position: tuple[float, float, float]) -> Array:
 
 
 def shapeless(found: CaseFit, recorded: Recorded) -> Struck:
-    """An object whose shape, or whose strikes' places, nobody knows: the lines that `fit` plays are its modes, as loud
-    and in the phases in which they were struck at each place on average; see `strike_lines`.
+    """Build an object of unknown shape, or of unknown places of its strikes; see `strike_lines`.
 
-    What goes with the place is then nobody's to explain. Of a list of lines all are modes, of unknown phase.
+    The lines of `fit` are its modes, with amplitudes and phases of the mean strike at each place, so that no effect can
+    explain what depends on the place. Of a list of lines all are modes, of unknown phase.
     """
     lines, listed = recorded.lines, recorded.signals is None
     mine = tuple(r for r in found.case.recordings if r.object == recorded.recordings[0].object)

@@ -1,3 +1,1 @@
-"""Which effects are accepted: stepwise and pairwise selection, cross-validation against control effects, tests by phase
-and decay.
-"""
+"""Selection of effects: stepwise and pairwise, by cross-validation with control effects, phases and decays."""

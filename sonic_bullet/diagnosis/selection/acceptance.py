@@ -1,4 +1,4 @@
-"""A candidate effect after cross-validation, and whether it is accepted.
+"""A candidate effect after cross-validation, and the decision whether it is accepted.
 
 Accepted is what gains, on strikes left out, in the mean, each by the record of thresholds (thresholds.py):
 
@@ -26,14 +26,29 @@ from sonic_bullet.effects.protocol import Effect
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A candidate effect after cross-validation. effect: fitted to all evidence. drop_db (s,): of each left-out
-    strike's distance, less what corrections learnt again would gain alone where it moves modes; of the first_strikes
-    alone where it could not be accepted any more. whole_db: mean with that in it, by which candidates are ordered.
-    control_db: mean over strikes and draws.
+    """A candidate effect after cross-validation.
 
-    Its axes of degenerate pairs, if it has any, are from all fitted strikes. spread: of each number in its parameters
-    over the folds (jackknife). lines: by how much lines left out are likelier with it (decay_test.py). impulse_n_s
-    (s,): of the strikes.
+    Attributes
+    ----------
+    id : str
+        Of the effect.
+    effect : Effect
+        Fitted to all evidence; axes of degenerate pairs are from all fitted strikes in every fold, too.
+    hypothesis : Hypothesis
+        With the effect.
+    drop_db : (s,)
+        Gain in the distance of each left-out strike, less the gain of corrections learnt again where it moves modes; of
+        the first_strikes alone where it could not be accepted any more.
+    whole_db : float
+        Mean with that gain, by which candidates are ordered.
+    control_db : float
+        Mean gain of control effects over strikes and draws.
+    spread : dict
+        Of each number in its parameters over the folds (jackknife).
+    lines : float
+        Gain in likelihood of lines left out (decay_test.py).
+    impulse_n_s : (s,)
+        Of the strikes.
     """
 
     id: str
@@ -48,16 +63,17 @@ class Candidate:
 
     @property
     def mean_db(self) -> float:
+        """Compute the mean gain."""
         return mean(self.drop_db)
 
     @property
     def certain(self) -> bool:
-        """Whether lines agreed on it before it was proposed (see needed)."""
+        """Decide whether lines agreed on it before it was proposed (see needed)."""
         return self.effect.traits.certain
 
     @property
     def loud(self) -> bool:
-        """Whether the strike that gains most is one of the loudest_strikes."""
+        """Decide whether the strike that gains most is one of the loudest_strikes."""
         return (
             len(self.impulse_n_s) == len(self.drop_db)
             and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[: RULES.loudest_strikes]
@@ -65,23 +81,29 @@ class Candidate:
 
     @property
     def sd_db(self) -> float:
-        """Standard error of the mean."""
+        """Compute the standard error of the mean gain."""
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
 
 
 def mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
-    """0 of none."""
+    """Compute the mean, 0 of none."""
     return float(np.mean(x)) if len(x) else 0.0
 
 
 def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
-    """Of a drop, in dB: least_drop_db; less where that is most of what has ever been open (first: nothing is found
-    yet), more where much is.
+    """Compute the gain in dB that a candidate needs.
 
-    certain: lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only say the
-    same.
+    It is least_drop_db; less where that is most of what has ever been open, more where much is, as the little that an
+    effect leaves of a wide gap may be its own fit's.
 
-    What little an effect leaves of a wide gap may be its own fit's.
+    Parameters
+    ----------
+    gap_db : float
+        What is open.
+    first : bool
+        No effect is found yet.
+    certain : bool
+        Lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only agree, too.
     """
     faint, share = (RULES.certain_drop_db, RULES.certain_share) if certain else (RULES.faint_drop_db, RULES.faint_share)
     return max(
@@ -91,7 +113,7 @@ def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
 
 
 def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
-    """Whether a candidate explains enough, significantly, and more than chance. first: see needed."""
+    """Decide whether a candidate explains enough, significantly, and more than chance; first: see needed."""
     if len(c.drop_db) == 0:
         return False
     need = needed(gap_db, first=first, certain=c.certain)
@@ -120,12 +142,19 @@ def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
 
 
 def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
-    """Whether a candidate could still be accepted that has been asked on the first few strikes alone.
+    """Decide whether a candidate could still be accepted that was evaluated on the first few strikes alone.
 
-    open_db (s,): the most it may gain on each; of those that it has not been asked on it may gain that, or less where
-    that suits it: alike is surer than much. Of drops at most m_i the mean over its standard error is largest at
-    min(m_i, c) for some c, so caps_tried of these are tried; loud strikes may gain most. asked.impulse_n_s (s,): of
-    all.
+    Of gains at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so caps_tried of these
+    are tried; loud strikes may gain most.
+
+    Parameters
+    ----------
+    asked : Candidate
+        Gains on the first strikes, impulses of all.
+    open_db : (s,)
+        The most it may gain on each.
+    gap_db : float
+        What is open.
     """
     first, loud = (
         len(asked.drop_db),
@@ -141,8 +170,9 @@ def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: flo
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Standard errors of every number that all folds give [Efron & Tibshirani 1993, eq. 11.5]; numbers in lists
-    of one length each their own.
+    """Compute standard errors of every number that all folds give [Efron & Tibshirani 1993, eq. 11.5].
+
+    Numbers in lists of one length each their own.
     """
     if len(rows) < 2:
         return {}
@@ -161,5 +191,6 @@ def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _spread(x: np.ndarray[Any, Any]) -> float:
+    """Compute the jackknife's standard error of values (n,)."""
     n = len(x)
     return float(np.sqrt((n - 1) / n * ((x - x.mean()) ** 2).sum()))

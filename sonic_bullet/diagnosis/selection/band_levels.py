@@ -1,15 +1,14 @@
-"""Whether what is played is as loud as what was recorded, band by band: a mean distance over all cells blurs what one
-band lacks, and what is absent has no line.
+"""Levels of recording and synthesis, band by band: a mean distance over all cells hides what one band lacks.
 
     d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first early_s and the rest apart;
         third octaves that overlap by half
     off:  |mean_s d| > band_apart_db  and  > standard_errors standard errors,
-        over the strikes s in which either stands ABOVE over the noise N
+        over the strikes s in which either is ABOVE over the noise N
 
 A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over lobe_cells cells to each
 side: recorded is more only where it is more than what is played so much beyond the band, too, and the other way round.
-Each band has the shortest window that keeps band_cells cells in it. No effect is looked for here: it only takes away
-the comfort of a verdict `none`.
+Each band has the shortest window that keeps band_cells cells in it. No effect is looked for here: it can only revoke
+a verdict `none`.
 """
 
 from __future__ import annotations
@@ -35,9 +34,20 @@ SHOWN = 4  # in words
 
 @dataclass(frozen=True, slots=True)
 class BandOff:
-    """A band, in the first early_s or after, in which the mean over strikes of recorded over played is off.
+    """A band in which the mean over strikes of recorded over played is off.
 
-    standard_error_db: of that mean.
+    Attributes
+    ----------
+    from_hz, to_hz : float
+        Edges.
+    early : bool
+        In the first early_s, not after.
+    recorded_over_played_db : float
+        The mean.
+    standard_error_db : float
+        Of the mean.
+    strikes : int
+        Number of strikes.
     """
 
     from_hz: float
@@ -48,6 +58,7 @@ class BandOff:
     strikes: int
 
     def __str__(self) -> str:
+        """Format it as a sentence."""
         less = "less" if self.recorded_over_played_db < 0 else "more"
         when = (
             f"in the first {1000 * RULES.early_s:.0f} ms"
@@ -60,10 +71,7 @@ class BandOff:
 
 
 def bands_off(takes: Sequence[Judged], made: Predictions) -> tuple[BandOff, ...]:
-    """The bands in which what is predicted is not as loud as what was recorded.
-
-    Lists of lines have no levels.
-    """
+    """Find the bands in which a prediction is not as loud as the recordings; lists of lines have no levels."""
     rows = [
         over_db(t.sample, t.played(made[t.body]), t.sr, t.floor, t.body.band_hz) for t in takes if isinstance(t, Take)
     ]
@@ -71,8 +79,23 @@ def bands_off(takes: Sequence[Judged], made: Predictions) -> tuple[BandOff, ...]
 
 
 def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
-    """Recorded over played (2, b) in dB, in the first early_s and in the rest, of the bands around CENTRE_HZ; NaN
-    where neither stands above the noise, or a band holds too few cells.
+    """Compute the level of a recording over its synthesis in the bands around CENTRE_HZ.
+
+    Parameters
+    ----------
+    recorded, played : (n,)
+        The sounds from the onset on.
+    sr : int
+        Sampling rate in Hz.
+    floor : Floor
+        The recording's noise.
+    band_hz : (2,)
+        Band of the recordings.
+
+    Returns
+    -------
+    (2, b)
+        dB in the first early_s and in the rest; NaN where neither is above the noise, or a band holds too few cells.
     """
     early = round(RULES.early_s * sr)
     parts = [(x[:early], x[early:]) for x in (recorded, played)]
@@ -80,6 +103,7 @@ def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tupl
 
 
 def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
+    """Compute the same of one part of the sounds."""
     found = np.full(len(CENTRE_HZ), np.nan)
     low, high = CENTRE_HZ / HALF, CENTRE_HZ * HALF
     inside = (low >= band_hz[0]) & (high <= min(band_hz[1], sr / 2))
@@ -100,24 +124,25 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
 
 
 def _power(x: Array, window: int) -> Array:
-    """Σ over frames |X|² (bins,) under a Hann window."""
+    """Sum |X|² (bins,) over frames under a Hann window."""
     frames = np.lib.stride_tricks.sliding_window_view(x, window)[:: window // 4]
     return np.asarray((np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)) ** 2).sum(axis=0))
 
 
 def _frames(count: int, window: int) -> int:
+    """Count the frames of a sound."""
     return (count - window) // (window // 4) + 1
 
 
 def _within(power: Array, low_hz: Array, high_hz: Array, cell_hz: float) -> Array:
-    """Sums (b,) of power (bins,) over the cells from low_hz to high_hz (b,)."""
+    """Sum power (bins,) over the cells from low_hz to high_hz (b,)."""
     total = np.concatenate([[0.0], np.cumsum(power)])
     first, last = (np.clip(np.ceil(f / cell_hz).astype(int), 0, len(power)) for f in (low_hz, high_hz))
     return np.asarray(total[last] - total[first])
 
 
 def off_in(over: Array) -> tuple[BandOff, ...]:
-    """The bands that are off in recorded over played (s, 2, b) in dB, from low to high, the first early_s first."""
+    """Find the bands that are off in recorded over played (s, 2, b) in dB, from low to high, early ones first."""
     count, usual = np.isfinite(over).sum(axis=0), _scatter_db(over)
     found = []
     for part, b in zip(*np.nonzero(count), strict=True):
@@ -139,8 +164,9 @@ def off_in(over: Array) -> tuple[BandOff, ...]:
 
 
 def _scatter_db(over: Array) -> float:
-    """How far one strike is from a band's mean, over all bands (s, 2, b); of one strike alone how far its bands are
-    from each other; ∞ of one band of one strike.
+    """Compute the scatter of strikes about a band's mean, over all bands (s, 2, b).
+
+    Of one strike alone the scatter of its bands; ∞ of one band of one strike.
     """
     seen = np.isfinite(over)
     count = seen.sum(axis=0)
@@ -152,7 +178,7 @@ def _scatter_db(over: Array) -> float:
 
 
 def in_words(bands: Sequence[BandOff]) -> str:
-    """Bands that overlap as one, with what the one says that is off most; the farthest SHOWN."""
+    """Describe the SHOWN bands that are farthest off; bands that overlap as one, with the largest value."""
     runs: list[list[BandOff]] = []
     for band in bands:
         last = runs[-1][-1] if runs else None
@@ -169,7 +195,7 @@ def in_words(bands: Sequence[BandOff]) -> str:
 
 
 def _said(run: Sequence[BandOff]) -> str:
-    """A run as one band, of which the farthest speaks."""
+    """Describe a run as one band, with the largest value."""
     far = max(run, key=lambda band: abs(band.recorded_over_played_db))
     words = str(replace(far, from_hz=run[0].from_hz, to_hz=run[-1].to_hz))
     return words if len(run) == 1 else words.replace("recorded ", "recorded up to ", 1)

@@ -1,13 +1,13 @@
-"""How much of what is open no body of real modes plays: no sum of lines whose phases are the same at every strike.
+"""Part of an open distance that no body of real modes explains: no sum of lines with one phase each at all strikes.
 
     A_ks = J_s Φ_k(x_s) |F̂_s| e^{iθ_k − 2πi f_k D_s}, but for its sign:    |Σ_s a²|/Σ_s |a|² = 1,   a = A e^{2πi f
         D_s}/|A_s|      [real modes: Ewins 2000, ch. 2]
 
-One phase a line and one delay a strike, the middle of its pulse. Whatever a mesh gets wrong, that stays so, wherever
+One phase a line and one delay a strike, the middle of its pulse. Whatever the errors of a mesh, that stays so, wherever
 and however hard a body is struck once. A level that swings, a part that rattles or an echo that moves makes lines of
-its own, side by side with the modes', that the fit identifies and that are out of phase, and a mode that goes with its
-level is no line at all. Nor do pairs too near each other to be told apart, modes that dashpots couple, and what a room
-rings at: a verdict asks here only before it puts down to a mesh what nothing explains.
+its own, near the modes', that the fit identifies and that are out of phase, and a mode that depends on its level is no
+line at all. The same holds of pairs too near each other to be separated, of modes that dashpots couple, and of a room's
+modes: a verdict uses this only before it attributes to a mesh what nothing explains.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ SWEEPS = 3
 
 
 def out_of_phase(lines: Lines) -> Array:
-    """Which lines (k,) have phases that differ between strikes by more than a sign and a delay; none where onsets are
-    not known, or of one strike.
+    """Find the lines (k,) whose phases differ between strikes by more than a sign and a delay.
+
+    None where onsets are not known, or of one strike.
     """
     loud = np.linalg.norm(lines.amplitude, axis=1, keepdims=True)
     a = lines.amplitude / np.maximum(loud, 1e-300)  # every strike has as much to say, however soft
@@ -39,9 +40,7 @@ def out_of_phase(lines: Lines) -> Array:
 
 
 def _in_time(a: Array, freq_hz: Array) -> Array:
-    """Amplitudes (s, k) without one delay a strike, found by all lines together: each against the phases of the others,
-    in turns.
-    """
+    """Remove one delay a strike from amplitudes (s, k), found by all lines: each against the others, in turns."""
     turn = np.exp(4j * np.pi * np.outer(DELAY_S, freq_hz))  # of a²
     for _ in range(SWEEPS):
         for s in range(len(a)):
@@ -52,9 +51,7 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
 
 
 def of_no_body(takes: Sequence[Judged], made: Predictions) -> float:
-    """Of the squared distance between strikes and what is predicted, over noise alone, the share that the strikes' own
-    lines leave, those that are in phase: 0 to 1.
-    """
+    """Compute the fraction, 0 to 1, of the squared distance over noise that the strikes' lines in phase leave."""
     observed = [take for take in takes if isinstance(take, Take)]
     played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
     left, gap = 0.0, 0.0
@@ -66,7 +63,7 @@ def of_no_body(takes: Sequence[Judged], made: Predictions) -> float:
 
 
 def _played(g: Recorded) -> Array:
-    """What the lines that are in phase play (s, n), identified without the others where there are others."""
+    """Synthesize the lines that are in phase (s, n), identified without the others where there are others."""
     assert g.signals is not None
     odd = out_of_phase(g.lines)
     lines = (
@@ -78,6 +75,7 @@ def _played(g: Recorded) -> Array:
 
 
 def _sum(lines: Lines, count: int, sr: int) -> Array:
+    """Sum lines (s, count) at a sampling rate."""
     made, t = np.zeros((len(lines.amplitude), count)), np.arange(count) / sr
     for a, pole in zip(lines.amplitude.T, lines.pole, strict=True):
         ring = np.exp(pole * t)
@@ -86,6 +84,6 @@ def _sum(lines: Lines, count: int, sr: int) -> Array:
 
 
 def _off(take: Take, made: Array) -> float:
-    """D of a take and what was made in its place."""
+    """Compute D of a take and a synthesis."""
     n = len(take.sample)
     return take.apart_db(np.pad(made, (0, max(n - len(made), 0)))[:n])

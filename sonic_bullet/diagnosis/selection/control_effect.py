@@ -1,5 +1,6 @@
-"""The control effect: as many numbers as a candidate effect has, spent where nothing is known to act, so what they gain
-is chance.
+"""The control effect: as many numbers as a candidate effect has, spent where nothing is known to act.
+
+What they gain is chance.
 
 ln d and ln level of every mode += Σ_i amount_i v_ik,
     v random directions of the modes, amounts by least squares on the same evidence
@@ -18,8 +19,14 @@ from sonic_bullet.records import ModalModel
 
 @dataclass(frozen=True)
 class ControlEffect:
-    """A number per direction spent at random: ln d and ln level of every mode move along random vectors of
-    the modes.
+    """Changes of ln d and ln level of every mode along random directions.
+
+    Attributes
+    ----------
+    amount : tuple of float
+        One a direction, half of them of ln d.
+    seed : int
+        Of the directions.
     """
 
     id: ClassVar[str] = "null"
@@ -32,7 +39,7 @@ class ControlEffect:
     seed: int
 
     def apply(self, x: ModalModel) -> ModalModel:
-        """The modes with the effect in them."""
+        """Change the decays and levels of a body's modes."""
         direction = directions(self.seed, len(self.amount), x.mode_count)
         half = (len(self.amount) + 1) // 2
         decay = x.decay_per_s * np.exp(np.clip(np.array(self.amount[:half]) @ direction[:half], -3, 3))
@@ -45,19 +52,31 @@ class ControlEffect:
         return replace(x, decay_per_s=decay, shape=shape)
 
     def parameters(self) -> dict[str, Any]:
-        """What it says, for people and JSON, in SI units."""
+        """Return its parameters by name, for reports and JSON."""
         return {"amount": list(self.amount)}
 
     def freedom(self) -> int:
+        """Count its numbers."""
         return len(self.amount)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit two numbers; see `fitted`."""
         return cls.fitted(evidence, 2, 0)
 
     @classmethod
     def fitted(cls, evidence: Evidence, freedom: int, seed: int) -> Self | None:
-        """The random effect of so many numbers that the first object's lines suggest most."""
+        """Fit amounts to the first object's lines; None where there are too few.
+
+        Parameters
+        ----------
+        evidence : Evidence
+            The evidence.
+        freedom : int
+            Count of numbers.
+        seed : int
+            Of the directions.
+        """
         h = evidence.observed[0]
         count = len(h.all_hz)
         direction = directions(seed, freedom, count)
@@ -78,5 +97,5 @@ class ControlEffect:
 
 
 def directions(seed: int, count: int, modes: int) -> np.ndarray[Any, Any]:
-    """Random directions (count, modes): the same for the same seed, whatever the number of modes asked for."""
+    """Draw random directions (count, modes): the same for the same seed, whatever the number of modes."""
     return np.random.default_rng([seed, 77]).standard_normal((modes, count)).T

@@ -1,5 +1,4 @@
-"""Candidate effects under cross-validation: each fitted without one strike and a part of the lines, judged on that
-strike; control effects alike.
+"""Candidate effects under cross-validation: fitted without one strike and a part of the lines, compared on that strike.
 
     for every strike s:  evidence − s − some lines (none, where an effect has numbers of single lines) -> propose ->
         refit α, β, σ -> D(s)    against the same without the effect
@@ -40,9 +39,18 @@ from sonic_bullet.parallel import parallel_map
 def cross_validated(
     h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, costly: bool = True
 ) -> list[Candidate]:
-    """Every candidate of the problem that the whole evidence suggests, cross-validated; best first.
+    """Cross-validate every candidate that the whole evidence suggests; best first.
 
-    costly: whether those that take long are asked, and that search once enough_effects have been found.
+    Parameters
+    ----------
+    h : Hypothesis
+        Without the candidates.
+    problem : DiagnosisProblem
+        Strikes, candidates, seed.
+    evidence : Evidence
+        The whole.
+    costly : bool
+        Whether to ask those that take long, and those that search once enough_effects have been found.
     """
     found: list[Candidate] = []
     if len(problem.takes) < 2:
@@ -99,7 +107,7 @@ def cross_validated(
 
 
 def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect], Effect | None]:
-    """What each makes of the evidence; one that searches side by side would only do so in turn beside others."""
+    """Let each candidate propose from the evidence; those that use all processors by themselves, one after another."""
     rest = [kind for kind in group if kind.traits.cost is not Cost.SEARCHES]
     return {kind: kind.propose(evidence) for kind in group if kind not in rest} | dict(
         zip(rest, parallel_map(lambda kind: kind.propose(evidence), rest), strict=True)
@@ -107,9 +115,7 @@ def _proposed(group: list[type[Effect]], evidence: Evidence) -> dict[type[Effect
 
 
 def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]]:
-    """Rooms, whose echoes would mislead the others; what is cheap; and what takes long, one by one; then those that
-    come last.
-    """
+    """Order candidates: rooms, which would mislead the others; cheap ones; costly ones, one by one; then late ones."""
     rooms: list[type[Effect]] = [k for k in kinds if issubclass(k, Dereverberates)]
     last = [k for k in kinds if late and mixes_neighbours(k)]
     dear = [k for k in kinds if k not in rooms + last and k.traits.cost is Cost.COSTLY]
@@ -120,11 +126,24 @@ def _groups(kinds: list[type[Effect]], *, late: bool) -> list[list[type[Effect]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fold:
-    """What is left to learn from once ``take`` is left out: bodies, evidence, the hypothesis refitted to it, and its
-    distance to the take.
+    """What is left to learn from once a take is left out.
 
-    least: the same distance, or a lesser one that corrections alone come to where they are learnt again. noise: what
-    noise alone makes.
+    Attributes
+    ----------
+    take : Judged
+        What is left out.
+    bodies : tuple of Struck
+        Without what was learnt from it.
+    evidence : Evidence
+        The rest.
+    base : Hypothesis
+        Refitted to it.
+    before : float
+        Its distance to the take.
+    least : float
+        The same, or a smaller distance by corrections alone where they are learnt again.
+    noise : float
+        Distance by noise alone.
     """
 
     take: Judged
@@ -139,8 +158,9 @@ class Fold:
 def _folds(
     h: Hypothesis, problem: DiagnosisProblem, evidence: Evidence, *, keep: float = RULES.kept_lines_share
 ) -> list[Fold]:
-    """Without one strike each, and with a part of the lines, keep of them: all for an effect with numbers of single
-    lines, which other lines do not determine and other strikes do.
+    """Leave out every strike once, and lines but for the fraction ``keep``.
+
+    All lines stay for an effect with numbers of single lines, which other lines do not determine and other strikes do.
     """
     rng = np.random.default_rng([problem.seed, 1])
     made = []
@@ -160,8 +180,9 @@ def _folds(
 
 
 def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt again as they are beside whatever moves modes: that
-    is no effect's gain. every: by all strikes.
+    """Add to folds what corrections alone gain, learnt as with effects that move modes: that is no effect's gain.
+
+    every is the hypothesis with these corrections, by all strikes.
     """
     made = predict_each(every, (f.take.body for f in folds if not isinstance(f.take, Listed)))
 
@@ -174,9 +195,7 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
 
 
 def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
-    """Folds that know what is gained by corrections alone, learnt from what modes ring down to as they are beside
-    whatever makes them depend on amplitude.
-    """
+    """Add to folds what corrections alone gain, learnt at small amplitude as with effects of amplitude."""
 
     def least(f: Fold) -> float:
         rested = at_rest(f.base, f.bodies, f.evidence.observed, every=True)
@@ -187,8 +206,9 @@ def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """On one left-out strike, of an effect fitted without it, if any came of that: as Candidate has them; control_db
-    (n,): of every draw.
+    """Gains on one left-out strike by an effect fitted without it, if there was one, as in `Candidate`.
+
+    control_db has one number a draw.
     """
 
     effect: Effect | None = None
@@ -201,6 +221,8 @@ class Gain:
 def _cross_validated(
     kind: type[Effect], whole: Effect, h: Hypothesis, bodies: tuple[Struck, ...], evidence: Evidence, folds: list[Fold]
 ) -> Candidate:
+    """Cross-validate one candidate."""
+
     def judged(i: int) -> Gain:
         fold = folds[i]
         less = fold.evidence
@@ -252,11 +274,12 @@ def _cross_validated(
 
 
 def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
+    """Return the levels of the folds' strikes."""
     return np.array([f.take.body.level_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
 
 
 def _augmented(fold: Fold, effect: Effect) -> Hypothesis:
-    """A fold's hypothesis with one more effect, fitted to what it may learn from."""
+    """Add an effect to a fold's hypothesis, fitted to its evidence."""
     h = replace(fold.base, effects=(*fold.base.effects, effect))
     if isinstance(fold.take, Listed):
         return refitted(h, fold.bodies)

@@ -1,11 +1,12 @@
-"""What lines' decays say of candidate effects where strikes say nothing: beside a room those left out, and of two that
-strikes cannot tell apart all of them.
+"""Test of candidate effects by lines' decays where strikes do not decide.
+
+With a room by lines left out, and between two effects that strikes do not separate by all lines.
 
     2 Δ ln L = Σ_k ρ(z_k without) − ρ(z_k with),   z_k = ln(d_k / d of its modes) / spread,
         ρ Cauchy's, over the lines that a fold had left out, each counted once
 
 A room's response has a tap for every sample. Identified from the strikes, it takes up what a law of damping does to
-every line, on strikes that it never saw as well: a line is as narrow as what a response can bend. But lines are
+every line, on strikes that were left out as well: a line is as narrow as what a response can bend. But lines are
 dereverberated, each by its own baseband (effects/common/reverberant_tail.py), before there is any response; a law
 fitted to three lines in four must hold for the fourth.
 """
@@ -22,24 +23,22 @@ from sonic_bullet.records import Array
 
 
 def of_decays(h: Hypothesis, effect: Effect) -> bool:
-    """Whether it changes decays, and leaves modes where they are."""
+    """Decide whether an effect changes decays, and leaves modes where they are."""
     return effect.stage is Stage.MODES and not moves_itself(h, effect)
 
 
 def numbers(effect: Effect) -> int:
-    """How many more a model has with an effect than without: a law in Rayleigh's place takes α and β away."""
+    """Count the numbers that an effect adds to a model: a law in Rayleigh's place removes α and β."""
     return effect.freedom() - 2 * effect.traits.replaces_rayleigh
 
 
 def tells(h: Hypothesis, effect: Effect) -> bool:
-    """Whether lines are asked instead of strikes: of what changes decays, beside a room."""
+    """Decide whether lines are used instead of strikes: for what changes decays, with a room."""
     return any(isinstance(e, Dereverberates) for e in h.effects) and of_decays(h, effect)
 
 
 def misfit(made: Predictions, effect: Effect, evidence: Evidence) -> float:
-    """Twice −ln likelihood of all lines' decays by a model with this effect, and its numbers at ln n each [Schwarz
-    1978].
-    """
+    """Compute twice −ln likelihood of all lines' decays by a model, plus ln n a number of its effect [Schwarz 1978]."""
     total, count = 0.0, 0
     for one in evidence.observed:
         good = _has_decay(one)
@@ -49,13 +48,19 @@ def misfit(made: Predictions, effect: Effect, evidence: Evidence) -> float:
 
 
 def _has_decay(one: ObjectEvidence) -> Array:
-    """Which lines (k,) have a decay."""
+    """Decide which lines (k,) have a decay."""
     return np.asarray(np.isfinite(one.decay_per_s) & (one.decay_per_s > 0) & ~np.isposinf(one.decay_sd_per_s))
 
 
 def likelier(without: Predictions, augmented: Predictions, every: Evidence, training: Evidence) -> float:
-    """Twice the gain in ln likelihood of the decays that are in ``every`` and not in ``training``, from which both
-    hypotheses were fitted.
+    """Compute twice the gain in ln likelihood of the decays that were left out.
+
+    Parameters
+    ----------
+    without, augmented : Predictions
+        By the hypotheses without the effect and with it.
+    every, training : Evidence
+        The whole, and that to which both were fitted.
     """
     total = 0.0
     for one in every.observed:
@@ -66,7 +71,7 @@ def likelier(without: Predictions, augmented: Predictions, every: Evidence, trai
 
 
 def _cost(made: Predictions, one: ObjectEvidence) -> Array:
-    """ρ (k,) of lines' decays (k,) against those of the modes each stands for."""
+    """Compute ρ (k,) of lines' decays (k,) against those of their modes."""
     per_s = next(p.model.decay_per_s for body, p in made.items() if body.recorded is one.source)
     model = np.array([per_s[m].mean() for m in one.mode])
     sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), RULES.decay_scatter)

@@ -1,13 +1,12 @@
-"""Several effects at once: their numbers fitted to each other, and effects that came first though another, beside the
-rest, explains more.
+"""Several effects at once: fitted to each other, and exchanged where another explains more with the rest.
 
     e_i -> propose(evidence of the model without e_i, known = e_i), in turns
         (backfitting [Buja, Hastie & Tibshirani 1989])
-    exchange: for each added effect, what was accepted in the same round and was passed over stands in its place; both
-        are judged on strikes left out
+    exchange: for each added effect, what was accepted in the same round and was passed over replaces it; both are
+        compared on strikes left out
 
-A round adds what says most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do
-together; beside the other effect it no longer does.
+A round adds what explains most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do
+together; with the other effect it no longer does.
 """
 
 from __future__ import annotations
@@ -38,14 +37,24 @@ Less = Callable[[Evidence], Evidence]
 
 
 def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
-    """Of a round's accepted candidates, those that the best may stand before by chance, or by what else the model
-    lacks.
-    """
+    """Select a round's other accepted candidates, which the best may precede by chance, or by what the model lacks."""
     return tuple(c for c in found if c is not best and c.mean_db > RULES.rival_share * best.mean_db)
 
 
 def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
-    """The hypothesis, each effect fitted again beside the others. less: the part of the evidence to fit to."""
+    """Fit each effect again with the others.
+
+    Parameters
+    ----------
+    h : Hypothesis
+        The hypothesis.
+    problem : DiagnosisProblem
+        The problem.
+    turns : int
+        How often.
+    less : callable
+        Selects the part of the evidence to fit to.
+    """
     for _ in range(turns):
         for i in range(len(h.effects)):
             h = again(h, i, problem, less=less)
@@ -55,7 +64,21 @@ def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, le
 def again(
     h: Hypothesis, i: int, problem: DiagnosisProblem, *, less: Less = lambda e: e, afresh: bool = False
 ) -> Hypothesis:
-    """The hypothesis, its i-th effect fitted again beside the others, or looked for anew."""
+    """Fit the i-th effect again with the others, or look for it anew.
+
+    Parameters
+    ----------
+    h : Hypothesis
+        The hypothesis.
+    i : int
+        Index of the effect.
+    problem : DiagnosisProblem
+        The problem.
+    less : callable
+        Selects the part of the evidence to fit to.
+    afresh : bool
+        Look for it anew.
+    """
     effect, before, after = h.effects[i], h.effects[:i], h.effects[i + 1 :]
     rest = refitted(with_effects(h, (*before, *after), problem.bodies), problem.bodies)
     evidence = less(evidence_of(rest, problem.bodies, problem.band_hz))
@@ -64,10 +87,9 @@ def again(
 
 
 def starts(h: Hypothesis, problem: DiagnosisProblem) -> list[Hypothesis]:
-    """The hypothesis, and with each effect's choices that no step from one to the other leads to, where it knows of
-    such (``others``).
+    """Return the hypothesis, and variants by the effects' discrete choices (``others``).
 
-    Beside those the rest is looked for anew: what one takes up, another had taken.
+    With each choice all other effects are looked for anew: what one takes up, another had taken.
     """
     found = [h]
     for i, effect in enumerate(h.effects):
@@ -80,13 +102,13 @@ def starts(h: Hypothesis, problem: DiagnosisProblem) -> list[Hypothesis]:
 
 
 def settled(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
-    """The best of `together` from all starts by the fitted strikes; as many numbers each."""
+    """Fit all effects together from all starts, and return the nearest to the fitted strikes; as many numbers each."""
     ends = parallel_map(lambda start: together(start, problem), starts(h, problem))
     return min(ends, key=problem.distance_db)
 
 
 def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
-    """The hypothesis, settled where that is nearer to the fitted strikes."""
+    """Return the hypothesis, settled where that is nearer to the fitted strikes."""
     if not problem.has_audio:
         return h
     best = settled(h, problem)
@@ -94,10 +116,9 @@ def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
 
 
 def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
-    """Distance (s,) of every strike from what is fitted to the others: the i-th effect, the rest as all strikes have
-    it, for one effect as for the other.
+    """Compute the distance (s,) of every strike where the i-th effect is fitted to the others, the rest to all.
 
-    No lines are left out here: each has been held against chance already, and of two effects that need as many numbers
+    No lines are left out: each effect has been compared with chance already, and of two that need as many numbers
     neither gains by it.
     """
 
@@ -118,8 +139,18 @@ def exchanged(
     passed: Sequence[Sequence[Candidate]],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]]:
-    """The effects fitted to each other, and each left for a rival of its round (passed) with which strikes left out are
-    significantly nearer.
+    """Fit the effects to each other, and replace each by a rival of its round that is significantly nearer.
+
+    Parameters
+    ----------
+    h : Hypothesis
+        With the effects.
+    added : list of Candidate
+        The effects' candidates, in order.
+    passed : sequence of sequences of Candidate
+        Rivals of each.
+    problem : DiagnosisProblem
+        The problem.
     """
     if not problem.has_audio:
         return h, added
@@ -153,8 +184,9 @@ def exchanged(
 
 
 def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, problem: DiagnosisProblem) -> bool:
-    """Whether, of two that change nothing but decays, the lines' own decays speak for the one that is there: strikes
-    hardly tell such two.
+    """Decide whether, of two effects that change only decays, the lines' own decays favour the present one.
+
+    Strikes hardly separate such two.
     """
     own = best.effects[i]
     if not (of_decays(best, own) and of_decays(other, rival)):
@@ -165,10 +197,9 @@ def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, p
 
 
 def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
-    """Whether the lines' phases (phase_test.py) speak for the effect that is there: of two that strikes hardly tell
-    apart, both must.
+    """Decide whether the lines' phases (phase_test.py) favour the present effect over one that strikes hardly separate.
 
-    Phases are held against lines as they were fitted; of several hits they say nothing, and beside a room lines are
+    Phases are compared on lines as they were fitted; of several hits they say nothing, and with a room lines are
     others.
     """
     dry = [any(isinstance(e, Dereverberates) for e in h.effects) for h in (best, other)]
@@ -179,7 +210,7 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
 
 
 def significant(gain_db: Array, least_db: float) -> bool:
-    """Whether strikes agree that there is a gain (s,), and more than least_db."""
+    """Decide whether strikes agree that there is a gain (s,), and more than least_db."""
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False
     none_loses = len(gain_db) >= RULES.many_strikes and gain_db.min() > -RULES.loss_share * gain_db.mean()

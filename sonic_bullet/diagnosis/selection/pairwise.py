@@ -1,17 +1,16 @@
-"""Two effects at once, where one after another explains too little: each alone may leave, or even open, most of what
-only both close.
+"""Two effects at once, where one after another explains too little, as only both together close the gap.
 
-    first round's candidates: A as it was found, B -> propose(evidence beside A)
+    first round's candidates: A as it was found, B -> propose(evidence with A)
         -> least D(A, B) on all strikes, if it leaves little
                             B moves no modes: what does is searched for all over a body, and that takes long
-    then each is cross-validated beside the other: fitted without one strike at a time, against control effects, as in
+    then each is cross-validated with the other: fitted without one strike at a time, against control effects, as in
         any round
-    in_a_room: B is a room that was found alone, A what moves modes; the room is identified anew beside A, and again
+    in_a_room: B is a room that was found alone, A what moves modes; the room is identified anew with A, and again
         without it
 
-What a dashpot does to decays hides what a long pulse leaves of the high modes: played with the right pulse and wrong
-decays, a body is as far from its recording as with neither. Coordinate steps stop there; a step along two coordinates
-does not [cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
+What a dashpot does to decays hides what a long pulse leaves of the high modes: with the right pulse and wrong decays, a
+body is as far from its recording as with neither. Coordinate steps stop there; a step along two coordinates does not
+[cf. forward selection of groups: Efroymson 1960; Yuan & Lin 2006].
 """
 
 from __future__ import annotations
@@ -38,9 +37,7 @@ from sonic_bullet.parallel import parallel_map
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """A hypothesis with two effects, the second fitted beside the first, and how far it is from the fitted strikes, in
-    dB.
-    """
+    """A hypothesis with two effects, the second fitted with the first, and its distance in dB."""
 
     h: Hypothesis
     db: float
@@ -51,8 +48,21 @@ def pairwise(
     first: Sequence[Candidate],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The two of a first round's candidate effects that explain nearly all together, each accepted beside the other;
-    None where no two do.
+    """Find the two of a first round's candidates that together explain nearly all, each accepted with the other.
+
+    Parameters
+    ----------
+    start : Hypothesis
+        Without effects.
+    first : sequence of Candidate
+        The first round's.
+    problem : DiagnosisProblem
+        The problem.
+
+    Returns
+    -------
+    (Hypothesis, list of Candidate) or None
+        None where no two do.
     """
     if len(first) < 2 or not problem.has_audio:
         return None
@@ -87,11 +97,10 @@ def in_a_room(
     found: Sequence[Candidate],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """A room that has been found alone, identified anew beside one of the candidate effects (found) that move modes;
-    None where no two say nearly all.
+    """Identify a room that was found alone anew with each candidate that moves modes; None where no two explain all.
 
-    Outside the room lines lie where they lie, and show masses and tensors. But a response identified from modes that
-    lie elsewhere plays what these lack, so that every other set of modes sounds worse with it: the candidate is tried
+    Outside the room lines are where they are, and show masses and tensors. But a response identified from modes that
+    lie elsewhere contains what these lack, so that every other set of modes is farther with it: the candidate is tried
     with a response of its own.
     """
     rooms = [e for e in h.effects if isinstance(e, Dereverberates)]
@@ -129,7 +138,7 @@ def in_a_room(
 
 
 def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, list[Candidate]] | None:
-    """The two, if each is accepted beside the other."""
+    """Return the two, if each is accepted with the other."""
     added: list[Candidate] = []
     for effect in h.effects[::-1]:
         rest = refitted(with_effects(h, tuple(e for e in h.effects if e is not effect), problem.bodies), problem.bodies)
@@ -148,8 +157,9 @@ def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypoth
 
 
 def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """The nearest to the strikes; or, of those that share the effect that moves modes, and say nearly as much, the
-    one for which phases speak clearly (phase_test.py).
+    """Select the pair nearest to the strikes, or one that phases favour clearly (phase_test.py).
+
+    The latter among those with the same effect that moves modes, and nearly as near.
     """
     best = min(pairs, key=lambda pair: pair.db)
     near = best.db + RULES.phases_decide_share * (before_db - best.db)
@@ -160,5 +170,5 @@ def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ..
 
 
 def _movers(h: Hypothesis) -> set[str]:
-    """Which of its effects move modes."""
+    """Return the ids of its effects that move modes."""
     return {e.id for e in h.effects if moves_itself(h, e)}

@@ -1,11 +1,11 @@
-"""Which of two effects that strikes cannot tell apart: the one whose lines agree in phase, too.
+"""Choice between two effects that strikes do not separate: the one whose lines agree in phase, too.
 
     A_sk ≈ σ E_sk e^{−iω_k t₀}
         E: onset amplitudes of the modes under a hypothesis, its pulse and sound path included; σ, t₀ free
 
-A distance of spectra in dB does not see phases, and a pulse and a low-pass filter of its width have the same magnitudes
-below its first zero. But a pulse is symmetric about its middle, so all it does to phases is a delay, and a filter's
-phase bends [Oppenheim & Schafer 2010, ch. 5.1: generalized linear phase].
+A distance of spectra in dB does not depend on phases, and a pulse and a low-pass filter of its width have the same
+magnitudes below its first zero. But a pulse is symmetric about its middle, so all it does to phases is a delay, and a
+filter's phase bends [Oppenheim & Schafer 2010, ch. 5.1: generalized linear phase].
 """
 
 from __future__ import annotations
@@ -25,13 +25,15 @@ TURNS = 15
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
-    """Twice the negative log likelihood of all objects' onset amplitudes under Cauchy's law, phases counted where they
-    are true; infinite where a strike hits more than once.
+    """Compute twice the negative log likelihood (Cauchy) of all objects' onset amplitudes, with true phases.
+
+    Infinite where a strike hits more than once.
     """
     return sum(_misfit(p) for p in predict_fitted(h, bodies).values())
 
 
 def _misfit(p: Prediction) -> float:
+    """Compute the same of one object."""
     one = object_evidence(p, sounds=False)
     expected, seen = one.expected, one.amplitude
     if any(len(p.impact(i).delay_s) > 1 for i in p.body.fitted):
@@ -56,7 +58,7 @@ def _misfit(p: Prediction) -> float:
 
 
 def _cost(expected: Array, seen: Array, sd: Array, rough: Array) -> float:
-    """At the best common gain; rough: the shapes' own error, which grows with it."""
+    """Compute the same at the best common gain; rough: the shapes' own error, which grows with it."""
     gain, weight = 1.0, np.ones(len(expected))
     for _ in range(TURNS):
         width = sd**2 + (gain * rough) ** 2

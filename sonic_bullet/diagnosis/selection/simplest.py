@@ -1,7 +1,7 @@
-"""Which of the accepted candidates is added, and which of the added ones are still needed at the end.
+"""Choice of the accepted candidate that is added, and of the added ones that are still needed at the end.
 
-able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot tell from it ->
-    phases, where two say nearly the same
+able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot separate from
+    it -> phases, where two are nearly the same
 """
 
 from __future__ import annotations
@@ -25,10 +25,12 @@ from sonic_bullet.effects.protocol import Evidence
 
 
 def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> bool:
-    """Whether all strikes together gain, and lose nothing of what a room's response, identified again without it, says
-    as well (full): that takes up echoes, and some of what stray modes leave, so what moves modes must gain on that. A
-    filter or a slow law it takes up whole: then both say the same. Without a mesh nothing tells which of a room's lines
-    are modes, and what changes decays would be fitted to all of them."""
+    """Decide whether all strikes together gain, and lose nothing of what a room's response alone explains.
+
+    A response, identified again without the candidate (full), takes up echoes, and some of what stray modes leave, so
+    what moves modes must gain on that. A filter or a slow law it takes up whole: then both are equal. Without a mesh
+    nothing distinguishes modes among a room's lines, and what changes decays would be fitted to all of them.
+    """
     if tells(c.hypothesis, c.effect) and not problem.has_meshes:
         return False
     before, after = (
@@ -43,8 +45,9 @@ def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, f
 
 
 def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
-    """Whether lines left out speak for it (decay_test.py), and a room's response, identified again beside it, says no
-    less than without it (full). Without a mesh nothing tells which of a room's lines are modes.
+    """Decide whether lines left out favour a candidate (decay_test.py), and a room's response is as near with it.
+
+    Without a mesh nothing distinguishes modes among a room's lines.
     """
     if not (problem.has_meshes and c.lines > RULES.line_gain):
         return False
@@ -54,13 +57,12 @@ def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
 
 
 def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
-    """The best, or the one with the fewest numbers of those that strikes cannot tell from it: two standard errors of
-    the difference, alike_share of what it says.
+    """Select the best, or the one with the fewest numbers of those that strikes cannot separate from it.
 
-    Where another with no more numbers says nearly as much (phases_decide_share), the lines' phases may speak for that
-    one (phase_test.py): by clear_phases, or by hint_of_phases where it is alike_share. Of two that only change decays
-    the lines' own decays tell, by BIC. Effects that move modes stand aside: corrections are learnt anew beside them,
-    and are numbers too.
+    That is by two standard errors of the difference, and alike_share of its gain. Where another with no more numbers is
+    nearly as near (phases_decide_share), the lines' phases may decide (phase_test.py): by clear_phases, or by
+    hint_of_phases where it is alike_share. Between two that only change decays the lines' own decays decide, by BIC.
+    Effects that move modes are not compared: corrections are learnt anew with them, and are numbers too.
     """
     best = able[0]
     # by lines alone one may be accepted that strikes speak against
@@ -106,7 +108,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
 def pruned(
     h: Hypothesis, added: list[Candidate], problem: DiagnosisProblem, gap_db: float
 ) -> tuple[Hypothesis, list[Candidate]]:
-    """Without the effects that those found after them have made needless."""
+    """Remove effects that later ones have made needless."""
     for candidate in added[:-1]:
         if candidate.lines > RULES.line_gain:
             continue  # strikes need not speak for it

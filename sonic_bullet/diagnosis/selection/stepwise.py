@@ -1,11 +1,10 @@
-"""Stepwise selection: try all candidate effects, add the best that is accepted, look again; fit them to each other;
-then say what is known and what is not.
+"""Stepwise selection: try all candidate effects, add the best accepted one, repeat; fit all to each other; verdict.
 
     one by one -> fitted to each other, exchanged, pruned -> verdict
     two at once (pairwise.py) where every one leaves most of the gap open, or all of them did at the end; a room
-        identified anew beside what moves modes
+        identified anew with what moves modes
 
-gap = before − floor on left-out strikes; which effect is accepted is said in acceptance.py
+gap = before − floor on left-out strikes; acceptance.py decides which effect is accepted
 """
 
 from __future__ import annotations
@@ -47,12 +46,22 @@ from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:
-    """How the selection ended. added: the candidate of each round that is still there at the end. tried: every
-    candidate effect in the last round in which it was asked and had something to say. mesh_off: of a frequency, what
-    the mesh is off by where that is why the verdict stands.
+    """End of a selection.
 
-    bands: where what is played is not as loud as what was recorded, which is why the verdict is not `none`. judged,
-    left_out: what the hypotheses were held against, and what could not be compared.
+    Attributes
+    ----------
+    before, after, added : Hypothesis, Hypothesis, tuple of Candidate
+        Without effects and with them; the candidate of each round that is still there at the end.
+    tried : tuple of Candidate
+        Every candidate in the last round in which it made a proposal.
+    verdict, before_db, after_db, floor_db : str, float, float, float
+        "explained", "none" or "unexplained", and mean distances.
+    mesh_off : float
+        Relative error of the mesh's frequencies where that decides the verdict, else 0.
+    bands : tuple of BandOff
+        Where levels are off, which is why the verdict is not `none`.
+    judged, left_out : Comparable, tuple of LeftOut
+        What the hypotheses were compared with, and what could not be compared.
     """
 
     before: Hypothesis
@@ -71,10 +80,7 @@ class Closed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NothingCompared:
-    """A selection that never began: no distance is known, so nothing is.
-
-    left_out: what could not be compared, and why; empty where nothing was measured.
-    """
+    """A selection that never began, as no distance is known; left_out is empty where nothing was measured."""
 
     before: Hypothesis
     left_out: tuple[LeftOut, ...]
@@ -84,14 +90,13 @@ class NothingCompared:
 
     @property
     def after(self) -> Hypothesis:
+        """Return the hypothesis without effects."""
         return self.before
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorseThanSilence(NothingCompared):
-    """A selection that never began, as the baseline is at least as far from the recordings as silence is: what an
-    effect brings nearer to them from there says nothing of them.
-    """
+    """A selection that never began, as the baseline is no nearer to the recordings than silence: gains mean nothing."""
 
     before_db: float
     silence_db: float
@@ -109,8 +114,20 @@ def closed(
     progress: Callable[[str], None] | None = None,
     against_silence: Sequence[Take] = (),
 ) -> Closed | NothingCompared:
-    """Select effects on fitted strikes alone, those that can be compared. against_silence: takes by which the baseline
-    is held against silence; the fitted ones where there are none.
+    """Select effects on fitted strikes alone, those that can be compared.
+
+    Parameters
+    ----------
+    base, bodies : Hypothesis, tuple of Struck
+        Without effects, and the objects.
+    takes, effects : sequence of Judged, sequence of types
+        Fitted strikes and candidates.
+    band_hz, seed : (2,), int
+        Of the recordings; of control effects and folds.
+    progress : callable
+        Called with what is being done.
+    against_silence : sequence of Take
+        Takes by which the baseline is compared with silence; the fitted ones where there are none.
     """
     start = refitted(base, bodies)
     made = predict_each(start, (take.body for take in takes))
@@ -127,9 +144,7 @@ def closed(
 def _worse_than_silence(
     start: Hypothesis, takes: Sequence[Take], left_out: tuple[LeftOut, ...]
 ) -> WorseThanSilence | None:
-    """The verdict that the start is at least as far from takes as silence is, if it is; of takes that have a
-    distance.
-    """
+    """Return the verdict that the start is no nearer to the takes with a distance than silence is, if it is."""
     made = predict_takes(start, takes)
     held = comparable(takes, made)
     if isinstance(held, Incomparable):
@@ -140,7 +155,7 @@ def _worse_than_silence(
 
 
 def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
-    """The selection over what can be compared. made: what the start says of it."""
+    """Select effects on what can be compared; made: the start's prediction."""
     scored = problem.scored(made)
     before, one = scored.distance_db, _one_by_one(start, scored, problem)
     h, added, now, last = one.h, one.added, one.now, dict(one.last)
@@ -178,10 +193,16 @@ def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, lef
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rounds:
-    """Where round after round came to.
+    """End of the rounds.
 
-    now: its distance, over the floor of the last round. first, last: all candidates of the first round, and each as it
-    was when asked last. pairwise: whether pairs were tried.
+    Attributes
+    ----------
+    h, now, added : Hypothesis, Score, list of Candidate
+        The last, its distance over the floor of the last round, and one candidate a round.
+    first, last : list of Candidate, dict of Candidate
+        All of the first round, and each as it was when asked last.
+    pairwise : bool
+        Whether pairs were tried.
     """
 
     h: Hypothesis
@@ -193,7 +214,7 @@ class Rounds:
 
 
 def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rounds:
-    """The best of every round added, until nothing is accepted; then fitted to each other."""
+    """Add the best of every round, until nothing is accepted; then fit them to each other."""
     h, before_db = start, now.distance_db
     added: list[Candidate] = []
     passed: list[tuple[Candidate, ...]] = []
@@ -257,9 +278,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
 def _acceptable(
     found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool
 ) -> list[Candidate]:
-    """Those that strikes left out speak for; or, where they speak for none, the one that lines do. full: with a
-    room's response identified again.
-    """
+    """Select the candidates that strikes left out favour, else the one that lines do; full: with a room anew."""
     able = [
         c for c in found if accepted(c, max(now.gap_db, 0.0), first=first) and helps(c, problem, now, full, first=first)
     ]
@@ -269,23 +288,19 @@ def _acceptable(
 def _room_anew(
     h: Hypothesis, acceptable: Sequence[Candidate], found: Sequence[Candidate], problem: DiagnosisProblem
 ) -> tuple[Hypothesis, list[Candidate]] | None:
-    """A room that stands alone identified anew beside what moves modes (pairwise.py), unless something else is
-    accepted.
-    """
+    """Identify a room found alone anew with what moves modes (pairwise.py), unless something else is accepted."""
     alone = len(h.effects) == 1 and all(moves_itself(h, c.effect) for c in acceptable)
     return in_a_room(h, found, problem) if alone else None
 
 
 def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[type[Effect]]) -> list[type[Effect]]:
-    """The candidates that had to wait in a room for a tensor (cross_validation.py), if that came to nothing."""
+    """Return the candidates that waited in a room for a tensor (cross_validation.py), if that came to nothing."""
     tensor = any(c.effect.stage is Stage.MATERIAL for c in found) and any(one.dry for one in evidence.observed)
     return [k for k in effects if mixes_neighbours(k) and tensor and k.id not in {c.id for c in found}]
 
 
 def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: Score, problem: DiagnosisProblem) -> str:
-    """What is known: an effect that closes less than explained_share of the gap would be a guess, unless what is left
-    is what a mesh gets wrong.
-    """
+    """Decide the verdict; effects must close explained_share of the gap, or all but a mesh's errors."""
     gap, left = before_db - now.floor_db, now.gap_db
     if not added:
         excused = gap < RULES.suffices_db or (
@@ -301,9 +316,7 @@ def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: S
 def _by_a_finer_mesh(
     start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before_db: float, problem: DiagnosisProblem
 ) -> tuple[str, float, Hypothesis]:
-    """What would be known with upper modes where their lines are, how far off the mesh has them, and with them there;
-    unexplained and 0 where that helps nobody.
-    """
+    """Decide the verdict with upper modes moved to their lines; the largest move, 0 without help; that hypothesis."""
     verdict, (far, off) = "unexplained", beyond(start, problem)
     if not off:
         return verdict, 0.0, start
@@ -320,7 +333,7 @@ def _by_a_finer_mesh(
 
 
 def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
-    """For JSON."""
+    """Return the candidates as JSON holds them."""
     return [
         {"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.control_db, "parameters": c.effect.parameters()}
         for c in candidates

@@ -1,10 +1,9 @@
-"""The numbers that decide which effect is accepted, and what the verdict is: each with its unit, its reason and where
-it came from.
+"""Numbers that decide which effect is accepted, and the verdict, each with unit, reason and provenance.
 
     RULES.least_drop_db       a float like any other, with .unit, .reason, .provenance
 
-provenance is a source, a derivation or a convention; "unknown" says that nobody wrote down which cases set it, and
-names the change that brought it. What is unknown stands first in line for removal.
+provenance is a source, a derivation or a convention; "unknown" means that nobody wrote down which cases set it, and
+names the change that brought it. What is unknown is removed first.
 """
 
 # ruff: noqa: RUF009  the defaults are frozen values
@@ -23,15 +22,17 @@ class Threshold(float):
     provenance: str
 
     def __new__(cls, value: float, unit: str, reason: str, provenance: str) -> Self:
+        """Build the number with its words."""
         made = super().__new__(cls, value)
         made.unit, made.reason, made.provenance = unit, reason, provenance
         return made
 
     def __getnewargs__(self) -> tuple[float, str, str, str]:  # type: ignore[override]
+        """Return what a copy is built of."""
         return float(self), self.unit, self.reason, self.provenance
 
     def at(self, value: float) -> Self:
-        """The same rule with another number, to see what hangs on it."""
+        """Return the same rule with another number, to measure its influence."""
         return type(self)(value, self.unit, self.reason, self.provenance)
 
 
@@ -43,20 +44,22 @@ class Count(int):
     provenance: str
 
     def __new__(cls, value: int, unit: str, reason: str, provenance: str) -> Self:
+        """Build the number with its words."""
         made = super().__new__(cls, value)
         made.unit, made.reason, made.provenance = unit, reason, provenance
         return made
 
     def __getnewargs__(self) -> tuple[int, str, str, str]:  # type: ignore[override]
+        """Return what a copy is built of."""
         return int(self), self.unit, self.reason, self.provenance
 
     def at(self, value: int) -> Self:
-        """The same rule with another number, to see what hangs on it."""
+        """Return the same rule with another number, to measure its influence."""
         return type(self)(value, self.unit, self.reason, self.provenance)
 
 
 def _since(commit: str) -> str:
-    """Of a number of which history holds the change that brought it, and no set or draw that set it."""
+    """Format the provenance of a number of which only the change that brought it is known."""
     return f"unknown; since {commit}"
 
 
@@ -206,6 +209,7 @@ class Thresholds:
     )
 
     def __post_init__(self) -> None:
+        """Check the numbers."""
         if wrong := [name for name, rule in rows(self) if not (rule.unit and rule.reason and rule.provenance)]:
             raise ValueError(f"thresholds without a unit, reason or provenance: {', '.join(wrong)}")
         if wrong := [name for name, rule in rows(self) if not rule > 0]:
@@ -221,12 +225,12 @@ class Thresholds:
 
 
 def rows(rules: Thresholds) -> list[tuple[str, Threshold | Count]]:
-    """Every name with its number, in their order."""
+    """Return every name with its number, in their order."""
     return list(zip((field.name for field in fields(rules)), astuple(rules), strict=True))
 
 
 def table(rules: Thresholds) -> str:
-    """Markdown: name, value, unit, reason, provenance."""
+    """Format a table in Markdown: name, value, unit, reason, provenance."""
     head = ["| threshold | value | unit | why | where from |", "|---|---|---|---|---|"]
     return "\n".join(
         [
