@@ -29,7 +29,7 @@ class Elastic:
     phased : bool
         Whether the signs of lines' amplitudes are comparable with those of J ψ.
     look : callable
-        C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,), slopes, J ψ (s, m) up to a factor, NaN for strikes of unknown place.
+        C/ρ (6, 6) in m²/s² -> undamped freq_hz (m,), slopes, J ψ (s, m) up to a factor, NaN for strikes without place.
         The slopes are a function from modes (k,) to ∂ ln λ/∂(C_i/ρ) (9, k), constants as in `Orthotropy`.
     solve : callable
         C/ρ (6, 6) -> undamped ModalModel, strikes and sensor as last vertices.
