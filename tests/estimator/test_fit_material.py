@@ -10,7 +10,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
-from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, strike_sound
+from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, lines_sound, strike_modes
 from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Material
@@ -60,7 +60,7 @@ def test_held_out_strike_is_predicted_to_the_noise(planted: tuple[Planted, CaseF
     _, found = planted
     held = next(r for r in found.case.recordings if r.split == "holdout")
     observed, sr = soundfile.read(str(held.file))
-    made = strike_sound(found, held, len(observed), sr)
+    made = damped_sum(*strike_modes(found, held, sr), len(observed), sr)
     o = found.objects[0].evidence
     assert o.signals is not None
     floor = floor_of(o.signals[0] - lines_sound(o.lines, 0, o.signals.shape[1], o.sr))
@@ -187,6 +187,6 @@ def test_practice_01(shared_path: Path) -> None:
     assert len(held) == 3
     for r in held:
         observed, sr = soundfile.read(str(r.file))
-        made = strike_sound(found, r, len(observed), sr)
+        made = damped_sum(*strike_modes(found, r, sr), len(observed), sr)
         assert log_spectral_db(observed, with_noise(made, floor, 5), floor) < noise_floor_db(made, floor) + 0.5
     assert np.abs(found.objects[0].correction).max() <= 0.01

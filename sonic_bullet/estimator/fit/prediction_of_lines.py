@@ -71,8 +71,3 @@ def strike_modes(
     in_range = freq < 0.5 * sr
     amplitude = found.fit.sigma * made.pattern[0] * seen.start(freq, made.decay_per_s)
     return freq[in_range], made.decay_per_s[in_range], amplitude[in_range]
-
-
-def strike_sound(found: CaseFit, recording: CaseRecording, n: int, sr: int, *, corrected: bool = True) -> Array:
-    """What the fit predicts of any strike of a case (n,). Raises FileError, MeshError as `strike_modes`."""
-    return damped_sum(*strike_modes(found, recording, sr, corrected=corrected), n, sr)

@@ -153,24 +153,6 @@ def spectra_distance_db(a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor
     return float(np.mean(found or few)) if found or few else float("nan")
 
 
-def matching_gain(recorded: Array, made: Array, floor: Floor) -> float:
-    """The gain of a sound (n,) by which its level is that of a recording (n,) on average: in dB, over cells in which
-    both stand above the noise; by energy where there are none.
-    """
-    both = power_spectra(recorded), power_spectra(made)
-    gain = np.sqrt(float((recorded**2).sum()) / max(float((made**2).sum()), 1e-300))
-    for _ in range(3):  # which cells count goes with the gain
-        off = [
-            10 * np.log10(a[seen] / (gain**2 * b[seen]))
-            for a, b, cell in zip(*both, noise_spectra(floor, both[0]), strict=True)
-            if (seen := (a > ABOVE * cell) & (gain**2 * b > cell)).any()
-        ]
-        if not off:
-            break
-        gain *= 10 ** (float(np.mean([x.mean() for x in off])) / 20)
-    return float(gain)
-
-
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
     """The sound (n,) plus Gaussian noise like ``floor``."""
     spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal(len(sound)))

@@ -87,16 +87,6 @@ def phon(level_db_spl: Array | float, freq_hz: Array | float) -> Array:
     return np.asarray(np.maximum(40 * np.log10(np.maximum(level - quiet + 0.005135, 1e-9)) + 94, 0.0))
 
 
-def level_of_phon(loudness_level_phon: Array | float, freq_hz: Array | float) -> Array:
-    """Level in dB SPL of a tone that loud: an equal-loudness contour. Source: ISO 226:2003, eq. 1."""
-    exponent, gain, threshold = _row(freq_hz)
-    force = (
-        4.47e-3 * (10 ** (0.025 * np.asarray(loudness_level_phon)) - 1.15)
-        + (0.4 * 10 ** ((threshold + gain) / 10 - 9)) ** exponent
-    )
-    return np.asarray(10 / exponent * np.log10(force) - gain + 94)
-
-
 def sone(loudness_level_phon: Array | float) -> Array:
     """Loudness in sone of a loudness level in phon."""
     level: Array = np.maximum(np.asarray(loudness_level_phon, float), 0.0)
