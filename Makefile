@@ -41,8 +41,14 @@ demo: .venv/run.stamp
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
 	@echo "made out/$(NAME).wav (sound), out/$(NAME).npz (contact log), out/$(NAME).png (picture)"
 
-test: check
-	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"
+# types are checked beside the tests: both take minutes
+test: .venv/dev.stamp
+	$(BIN)/ruff format --quiet --check .
+	$(BIN)/ruff check --quiet .
+	@echo "checking types beside the tests"
+	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
+	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"; tests=$$?; \
+	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
 test-all: check
 	$(BIN)/python -m pytest -n $(WORKERS)
