@@ -6,6 +6,7 @@
     score ANIMATION           -> a baked animation's sound and contact log
     modes MESH                -> ModalModel   -> table, JSON, npz
     bake MESH | SCENE | LOG   -> BakedModel   -> .glb .gltf .json .dsp .h .wav
+    dataset RECIPE.py         -> samples, manifest
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
     compare A B               -> Comparison   -> words, JSON, page
@@ -36,6 +37,7 @@ from sonic_bullet.cli.examples import (
     RESIDUAL_EPILOG,
 )
 from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options, uff_option
+from sonic_bullet.cli.scenes.dataset_command import dataset
 from sonic_bullet.cli.scenes.play_command import play
 from sonic_bullet.cli.scenes.render_command import render
 from sonic_bullet.cli.solids.bake_command import bake
@@ -59,6 +61,7 @@ cli.add_command(play)
 cli.add_command(film)
 cli.add_command(score)
 cli.add_command(bake)
+cli.add_command(dataset)
 
 
 @cli.command(epilog=MODES_EPILOG)

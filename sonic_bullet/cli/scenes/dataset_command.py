@@ -1,0 +1,54 @@
+"""Command `dataset`: many sounds with labels, from a recipe."""
+
+from __future__ import annotations
+
+import click
+
+from sonic_bullet.cli.parameters import json_option
+
+DATASET_EPILOG = """\b
+Examples:
+  sonic-bullet dataset impacts -o out --count 200               (a ready recipe; no code)
+  sonic-bullet dataset my_recipe.py -o out --count 5000 --seed 7 --workers 8
+The same command again makes what is missing. Exit 1: some samples could not be made; failures.jsonl has the reasons."""
+
+
+@click.command(epilog=DATASET_EPILOG)
+@click.argument("recipe", metavar="RECIPE.py|impacts")
+@click.option("-o", "--output", "folder", required=True, metavar="DIR", help="Folder of the data set.")
+@click.option("--count", type=click.IntRange(1), required=True, metavar="N", help="How many samples.")
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, metavar="S")
+@click.option(
+    "--workers", type=click.IntRange(1, 1024), metavar="N", help="Processes at once. [default: one a core]"
+)  # fmt: skip
+@click.option("--sr", type=click.IntRange(8000, 384_000), default=48_000, show_default=True, metavar="HZ")
+@click.option(
+    "--limit", "limit_s", type=click.FloatRange(0, min_open=True), default=300.0, show_default=True, metavar="S",
+    help="Wall time a sample may take.",
+)  # fmt: skip
+@json_option
+def dataset(
+    recipe: str, folder: str, count: int, seed: int, workers: int | None, sr: int, limit_s: float, json_to: str | None
+) -> None:
+    """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
+    import os
+    from dataclasses import asdict
+
+    from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
+
+    (to,) = places(json_to)
+    root = folder_place(folder)
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    with clean_stdout(to) as say, status(recipe) as tell:
+        with quiet_stderr():
+            from sonic_bullet.dataset.making import make_dataset
+            from sonic_bullet.dataset.recipes import read_recipe
+        made = make_dataset(
+            read_recipe(recipe), root, count=count, seed=seed, sr=sr, workers=workers or cores or 1, limit_s=limit_s,
+            say=tell,
+        )  # fmt: skip
+        for line in made.lines():
+            say(line)
+    write_json(to, asdict(made))
+    if made.failures:
+        raise click.exceptions.Exit(1)

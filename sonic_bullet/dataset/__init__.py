@@ -1,0 +1,15 @@
+"""Data sets: thousands of sounds with labels, from a recipe and a seed.
+
+    RECIPE.py, or `impacts` -> Recipe: its text, by value
+    recipe, seed, number (a job) -> sample(rng) -> DatasetScene -> build(client) -> listener, steps -> Sample: sound in
+        pascals, contacts as labels, parameters, provenance
+    jobs -> processes (job_processes) -> Sample, or the reason why there is none
+        -> SampleFolder: NAME.wav, then NAME.json, each renamed when whole -> manifest.jsonl, failures.jsonl
+
+A sample depends on recipe, seed and number alone, so that workers, order and interruptions change no byte, and a job
+whose NAME.json is there is never done again.
+"""
+
+from sonic_bullet.dataset.recipes import DatasetScene
+
+__all__ = ["DatasetScene"]

@@ -1,0 +1,141 @@
+"""Ready recipe: one body falls on a floor. Random shape, size, material, height and orientation, two microphones.
+
+Make it yours by a changed file: OBJECTS, MATERIALS and the ranges in `sample`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from sonic_bullet.dataset import DatasetScene
+from sonic_bullet.geometry.triangles import volume_m3
+from sonic_bullet.listener import keep_restitution
+from sonic_bullet.presets import load_material
+from sonic_bullet.records import Shape
+
+MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
+FLOOR = "concrete"
+SIZES = (0.6, 1.4)
+HEIGHTS_M = (0.05, 0.5)
+
+
+def box(*size_m: float) -> Shape:
+    """Make a box."""
+    return Shape("box", np.array(size_m))
+
+
+def cylinder(radius_m: float, height_m: float) -> Shape:
+    """Make a cylinder."""
+    return Shape("cylinder", np.array([radius_m, height_m, 0]))
+
+
+def mesh(made: trimesh.Trimesh) -> Shape:
+    """Make a shape of a mesh."""
+    return Shape("mesh", vertex_m=made.vertices - made.center_mass, face=made.faces)
+
+
+def ring(inner_m: float, outer_m: float, height_m: float) -> Shape:
+    """Make a ring."""
+    return mesh(trimesh.creation.annulus(inner_m, outer_m, height_m, sections=48))
+
+
+def bowl(radius_m: float, height_m: float, wall_m: float) -> Shape:
+    """Make a bowl: an outer and an inner parabola turned around z."""
+    x = np.linspace(0, 1, 17)
+    outer = np.column_stack([radius_m * x, height_m * x**2])
+    inner = np.column_stack([(radius_m - wall_m) * x, wall_m + (height_m - wall_m) * x**2])[::-1]
+    return mesh(trimesh.creation.revolve(np.concatenate([outer, inner]), sections=48))
+
+
+OBJECTS = {
+    "bar": box(0.2, 0.025, 0.006),
+    "beam": box(0.16, 0.02, 0.02),
+    "plate": box(0.16, 0.12, 0.004),
+    "square-plate": box(0.12, 0.12, 0.005),
+    "tile": box(0.1, 0.1, 0.01),
+    "block": box(0.08, 0.06, 0.04),
+    "strip": box(0.15, 0.04, 0.003),
+    "rod": cylinder(0.006, 0.18),
+    "disc": cylinder(0.06, 0.005),
+    "puck": cylinder(0.04, 0.02),
+    "coin": cylinder(0.03, 0.004),
+    "ring": ring(0.035, 0.05, 0.01),
+    "tube": ring(0.016, 0.02, 0.14),
+    "washer": ring(0.02, 0.05, 0.004),
+    "bowl": bowl(0.07, 0.04, 0.005),
+    "dish": bowl(0.09, 0.02, 0.005),
+    "cup": bowl(0.04, 0.07, 0.004),
+}
+"""What falls, at size 1."""
+
+
+def sample(rng: np.random.Generator) -> DatasetScene:
+    """Draw a scene."""
+    name = str(rng.choice(list(OBJECTS)))
+    drawn = {
+        "object": name,
+        "size": float(np.exp(rng.uniform(*np.log(SIZES)))),
+        "material": str(rng.choice(MATERIALS)),
+        "height_m": float(rng.uniform(*HEIGHTS_M)),
+        "quaternion_xyzw": rng.normal(size=4).tolist(),
+        "spin_rad_s": rng.normal(0, 3, 3).tolist(),
+    }
+    ears = rng.uniform((-0.5, -1.0, 0.3), (0.5, -0.6, 0.8)) + np.array([[0, 0, 0], [0.2, 0, 0]])
+    return DatasetScene(lambda client: build(client, **drawn), drawn, name, seconds=1.5, microphones=ears)
+
+
+def build(
+    client: Any,
+    *,
+    object: str,
+    size: float,
+    material: str,
+    height_m: float,
+    quaternion_xyzw: list[float],
+    spin_rad_s: list[float],
+) -> dict[int, Any]:
+    """Set up a floor and the body above it."""
+    made = load_material(material)
+    shape = OBJECTS[object]
+    shape = replace(shape, size_m=shape.size_m * size, vertex_m=shape.vertex_m * size)
+    client.setGravity(0, 0, -9.81)
+    client.setTimeStep(1 / 480)
+    floor = client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
+    body = client.createMultiBody(
+        volume_m3(*surface(shape)) * made.density_kg_m3,
+        collision_shape(client, shape),
+        basePosition=(0, 0, height_m + 0.12 * size),
+        baseOrientation=np.array(quaternion_xyzw) / np.linalg.norm(quaternion_xyzw),
+    )
+    client.resetBaseVelocity(body, angularVelocity=spin_rad_s)
+    for one, of in ((floor, load_material(FLOOR)), (body, made)):
+        client.changeDynamics(one, -1, restitution=of.restitution, lateralFriction=0.5, linearDamping=0)
+    keep_restitution(client)
+    return {floor: {"material": FLOOR, "name": "floor"}, body: {"material": made, "mesh": shape, "name": object}}
+
+
+def surface(shape: Shape) -> tuple[Any, Any]:
+    """Return vertices and faces of a shape."""
+    x, y, z = shape.size_m
+    made = (
+        trimesh.creation.box((x, y, z))
+        if shape.kind == "box"
+        else trimesh.creation.cylinder(x, y, sections=48)
+        if shape.kind == "cylinder"
+        else trimesh.Trimesh(shape.vertex_m, shape.face, process=False)
+    )
+    return made.vertices, made.faces
+
+
+def collision_shape(client: Any, shape: Shape) -> int:
+    """Make a collision shape; Bullet takes the convex hull of a mesh."""
+    x, y, z = shape.size_m.tolist()
+    if shape.kind == "box":
+        return int(client.createCollisionShape(client.GEOM_BOX, halfExtents=(x / 2, y / 2, z / 2)))
+    if shape.kind == "cylinder":
+        return int(client.createCollisionShape(client.GEOM_CYLINDER, radius=x, height=y))
+    return int(client.createCollisionShape(client.GEOM_MESH, vertices=shape.vertex_m.tolist()))

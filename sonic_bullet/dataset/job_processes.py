@@ -1,0 +1,116 @@
+"""A process a job: a job that crashes, hangs or eats its memory ends alone, and leaves nothing to the next.
+
+numbers -> up to N processes, each a fork with machine code and recipe loaded (elsewhere than on Linux: a new one)
+    -> pipe -> Sample, or the reason -> three tries -> (number, Sample or reason), as they end
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeVar
+
+from sonic_bullet.machine.progress import clear_stage
+from sonic_bullet.machine.worker import end_with
+from sonic_bullet.records.errors import SonicBulletError, exception_words
+
+Made = TypeVar("Made")
+TRIES = 3
+_CONTEXT = "fork" if sys.platform == "linux" else "spawn"
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """Why there is no sample: a line."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Running:
+    number: int
+    tries: int
+    process: Any
+    until_s: float
+
+
+def run_jobs(
+    do: Callable[[int], Made], numbers: Iterable[int], workers: int, limit_s: float
+) -> Iterator[tuple[int, Made | Failed]]:
+    """Yield (number, do(number)) as they are done, or `Failed` after three tries of at most limit_s seconds each.
+
+    ``do`` depends on its number alone.
+    """
+    context: Any = get_context(_CONTEXT)
+    todo, again = iter(numbers), deque[tuple[int, int]]()
+    running: dict[Connection, _Running] = {}
+    try:
+        while True:
+            while len(running) < workers:
+                number, tries = again.popleft() if again else (next(todo, -1), 1)
+                if number < 0:
+                    break
+                ours, theirs = context.Pipe(duplex=False)
+                process = context.Process(target=_work, args=(do, number, theirs, os.getpid()), daemon=True)
+                process.start()
+                theirs.close()
+                running[ours] = _Running(number, tries, process, time.monotonic() + limit_s)
+            if not running:
+                return
+            pause_s = max(0.0, min(job.until_s for job in running.values()) - time.monotonic())
+            ended = set(wait(list(running), pause_s))
+            late = {pipe for pipe, job in running.items() if job.until_s < time.monotonic()}
+            for pipe in ended | late:
+                assert isinstance(pipe, Connection)
+                job = running.pop(pipe)
+                found = _received(pipe, job) if pipe in ended else Failed(f"it took more than {limit_s:g} s")
+                job.process.kill()
+                job.process.join()
+                clear_stage(job.process.pid)
+                pipe.close()
+                if isinstance(found, Failed) and job.tries < TRIES:
+                    again.append((job.number, job.tries + 1))
+                else:
+                    yield job.number, found
+    finally:
+        for job in running.values():
+            job.process.kill()
+            job.process.join()
+
+
+def _received(pipe: Connection, job: _Running) -> Any:
+    try:
+        return pipe.recv()
+    except (EOFError, OSError):
+        job.process.join()
+        code = job.process.exitcode
+        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        return Failed(f"its process ended by {how}" + ("; the memory may not suffice" if code == -9 else ""))
+
+
+def _work(do: Callable[[int], Any], number: int, out: Connection, parent: int) -> None:
+    """Run one job in its process and send what it gives."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with(parent)
+    found = attempt(do, number)
+    with suppress(OSError):
+        out.send(found)
+
+
+def attempt(do: Callable[[int], Made], number: int) -> Made | Failed:
+    """Return do(number), or the reason why it fails."""
+    try:
+        return do(number)
+    except SonicBulletError as error:
+        return Failed(str(error))
+    except Exception as error:
+        return Failed(exception_words(error))

@@ -1,0 +1,117 @@
+"""A run: the jobs that are not done yet -> processes -> folder -> lists and summary."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from sonic_bullet.dataset.job_processes import Failed, run_jobs
+from sonic_bullet.dataset.recipes import Recipe
+from sonic_bullet.dataset.sample_folder import SampleFolder, open_folder
+from sonic_bullet.dataset.samples import Job, Sample, make_sample, warm_up
+from sonic_bullet.files.levels import check_sr
+from sonic_bullet.machine.progress import Say
+from sonic_bullet.parallel import one_thread
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.session.keeping import package_versions
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetSummary:
+    """What a run made. made: in this run; samples, objects: in the folder, by split; failures: reasons by number."""
+
+    made: int
+    samples: Mapping[str, int]
+    objects: Mapping[str, int]
+    failures: Mapping[int, str] = field(default_factory=dict)
+
+    def lines(self) -> list[str]:
+        """Describe it, a line a thing."""
+        total = sum(self.samples.values())
+        parts = [f"{n} {split} of {format_count(self.objects[split], 'object')}" for split, n in self.samples.items()]
+        listed = [f"sample {number}: {reason}" for number, reason in sorted(self.failures.items())[:10]]
+        rest = len(self.failures) - len(listed)
+        return [
+            f"{format_count(total, 'sample')}, {self.made} made now: {', '.join(parts) or 'none'}",
+            *listed,
+            *([f"{rest} more without sound, in failures.jsonl"] if rest > 0 else []),
+        ]
+
+
+def make_dataset(
+    recipe: Recipe,
+    folder: str | os.PathLike[str],
+    *,
+    count: int,
+    seed: int = 0,
+    sr: int = 48_000,
+    workers: int = 1,
+    limit_s: float = 300.0,
+    say: Say = lambda text: None,
+) -> DatasetSummary:
+    """Make the samples below ``count`` that the folder has not.
+
+    Parameters
+    ----------
+    workers
+        Processes at once.
+    limit_s
+        Wall time of a sample, after which its process is ended.
+    say
+        Called with how far it is.
+
+    Raises
+    ------
+    SonicBulletError
+        The folder cannot be used or written. What was finished is kept and listed, as after an interrupt.
+    """
+    made_by = {
+        "recipe": recipe.name,
+        "recipe_sha256": recipe.sha256,
+        "seed": seed,
+        "sr": check_sr(sr),
+        "versions": package_versions(),
+    }
+    job = partial(_make, recipe, seed, sr)
+    with open_folder(folder, made_by) as kept:
+        missing = [number for number in range(count) if not kept.is_done(number)]
+        made, failures = 0, dict[int, str]()
+        try:
+            if missing:
+                say("machine code")
+                with one_thread():
+                    warm_up()
+                say(f"0 of {len(missing)}")
+            for number, found in run_jobs(job, missing, workers, limit_s):
+                if isinstance(found, Failed):
+                    failures[number] = found.reason
+                else:
+                    kept.keep(found)
+                    made += 1
+                failed = f", {len(failures)} failed" if failures else ""
+                say(f"{made} of {len(missing)}{failed}")
+        except BaseException:
+            with suppress(SonicBulletError):
+                kept.write_lists(count, failures)
+            raise
+        kept.write_lists(count, failures)
+        return _summary(kept, count, made, failures)
+
+
+def _make(recipe: Recipe, seed: int, sr: int, number: int) -> Sample:
+    return make_sample(Job(recipe, seed, number, sr))
+
+
+def _summary(kept: SampleFolder, count: int, made: int, failures: Mapping[int, str]) -> DatasetSummary:
+    samples, objects = Counter[str](), dict[str, set[str]]()
+    one: dict[str, Any]
+    for one in kept.labels(count):
+        samples[one["split"]] += 1
+        objects.setdefault(one["split"], set()).add(one["object"])
+    return DatasetSummary(made, dict(samples), {split: len(names) for split, names in objects.items()}, failures)

@@ -1,0 +1,113 @@
+"""A job and what it gives: one sample, a function of recipe, seed and number alone.
+
+Job -> generator of (seed, number) -> Recipe.draw -> world, listener, steps -> Sample
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.dataset.contact_labels import contact_labels, log_digest
+from sonic_bullet.dataset.recipes import Recipe
+from sonic_bullet.listener import direct_client
+from sonic_bullet.parallel import one_thread
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import SceneError, SceneWarning
+from sonic_bullet.render import make_ready
+from sonic_bullet.session import attach
+
+SPLITS = {"train": 0.8, "validation": 0.1, "test": 0.1}
+"""Fractions of the objects."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A sample that is to be made."""
+
+    recipe: Recipe
+    seed: int
+    number: int
+    sr: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """One sample. sound: (channels, n) float32 in pascals; labels: its line of the manifest, values of JSON."""
+
+    number: int
+    sr: int
+    sound: Array
+    labels: Mapping[str, Any]
+
+
+@one_thread()
+def make_sample(job: Job) -> Sample:
+    """Make one sample; SceneError where the recipe fails or its scene makes no sound."""
+    scene = job.recipe.draw(np.random.default_rng([job.seed, job.number]))
+    client = direct_client()
+    seed = int(np.random.SeedSequence([job.seed, job.number, 1]).generate_state(1)[0])  # of the surfaces
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)
+        cast = job.recipe.call(scene.build, client)
+        if not isinstance(cast, Mapping):
+            raise SceneError(f"build(client) returned {type(cast).__name__}", "return a dict from bodies to materials")
+        with attach(client, sr=job.sr, seed=seed, microphone=scene.microphones) as listener:
+            listener.add_all(cast, progress=_silent)
+            while listener.time_s < scene.seconds - 1e-9:
+                client.stepSimulation()
+            sound, log = listener.sound(), listener.contacts
+    client.disconnect()
+    if not np.any(sound):
+        raise SceneError(
+            f"recipe '{job.recipe.name}' makes no sound", "let a body of its cast be struck, and give it a microphone"
+        )
+    labels = {
+        "number": job.number,
+        "object": scene.object,
+        "split": split_of(job.seed, scene.object),
+        "sr": job.sr,
+        "seconds": sound.shape[1] / job.sr,
+        "channels": len(sound),
+        "peak_pa": float(np.abs(sound).max()),
+        "bodies": {b.name: b.material.name for b in log.bodies if b.material is not None},
+        "contacts": contact_labels(log),
+        "parameters": dict(scene.parameters),
+        "seed": [job.seed, job.number],
+        "recipe_sha256": job.recipe.sha256,
+        "log_sha256": log_digest(log),
+        "versions": dict(log.versions),
+    }
+    return Sample(job.number, job.sr, sound.astype(np.float32), labels)
+
+
+def split_of(seed: int, name: str) -> str:
+    """Return the split of an object: by its name's hash, so that it is the same in every sample and on every machine.
+
+    Fractions are of objects, met in the mean: few objects may leave a split empty.
+    """
+    drawn = int.from_bytes(hashlib.sha256(f"{seed}:{name}".encode()).digest()[:8]) / 2**64
+    below = 0.0
+    for split, fraction in SPLITS.items():
+        below += fraction
+        if drawn < below:
+            return split
+    return split
+
+
+def warm_up() -> None:
+    """Load the machine code of run time and listener, so that processes forked from this one have it."""
+    make_ready()
+    client = direct_client()
+    with attach(client, microphone=()) as listener:
+        listener.world.make_ready()
+    client.disconnect()
+
+
+def _silent(_: str) -> None:
+    """Drop a line of progress."""

@@ -1,0 +1,184 @@
+"""From a recipe to a data set by the command line: labels, splits, the same bytes whatever interrupts, bad recipes."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sonic_bullet.dataset.job_processes import TRIES, Failed, run_jobs
+from sonic_bullet.dataset.sample_folder import open_folder
+from sonic_bullet.files import read_audio
+from sonic_bullet.records.errors import FileError
+from tests.cli.test_commands import error_of, run
+from tests.few_cases import parametrize_few
+
+MASS_KG = 1.5
+RECIPE = f"""
+SECONDS = 0.4
+
+def parameters(rng):
+    return {{"object": f"box {{rng.integers(4)}}", "height_m": rng.uniform(0.02, 0.05)}}
+
+def build(client, object, height_m):
+    client.setGravity(0, 0, -9.81)
+    floor = client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
+    box = client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.1, 0.05, 0.01])
+    body = client.createMultiBody({MASS_KG}, box, basePosition=[0, 0, 0.01 + height_m])
+    client.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
+    return {{floor: {{"material": "concrete", "name": "floor"}},
+            body: {{"material": "steel", "count": 4, "name": object}}}}
+"""
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fall.py").write_text(RECIPE)
+    return tmp_path
+
+
+def dataset(*words: object) -> int:
+    return run("dataset", *words, "--sr", 8000)
+
+
+def contents(folder: Path | str) -> dict[str, bytes]:
+    root = Path(folder)
+    return {str(one.relative_to(root)): one.read_bytes() for one in root.rglob("*") if one.is_file()}
+
+
+def manifest(folder: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in Path(folder, "manifest.jsonl").read_text().splitlines()]
+
+
+def test_every_sample_is_sound_with_its_labels_and_none_is_made_twice(
+    place: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert dataset("fall.py", "-o", "one", "--count", 4, "--seed", 3, "--workers", 1) == 0
+    samples = manifest("one")
+    assert [one["number"] for one in samples] == [0, 1, 2, 3]
+    splits: dict[str, set[str]] = {}
+    for one in samples:
+        splits.setdefault(one["object"], set()).add(one["split"])
+        sound, sr = read_audio(Path("one", one["audio"]))
+        assert sr == one["sr"] == 8000 and sound.shape == (1, 3200)
+        assert np.abs(sound).max() == pytest.approx(one["peak_pa"], rel=1e-6)
+        first = one["contacts"][0]
+        assert sorted(first["bodies"]) == sorted(["floor", one["object"]])
+        assert sorted(first["materials"]) == ["concrete", "steel"]
+        speed = np.sqrt(2 * 9.81 * one["parameters"]["height_m"])
+        assert first["start_s"] == pytest.approx(speed / 9.81, abs=2 / 240)
+        # momentum: what stops the fall and carries the weight until the end
+        rest_s = first["end_s"] - first["start_s"]
+        assert first["impulse_n_s"] == pytest.approx(MASS_KG * (speed + 9.81 * rest_s), rel=0.03)
+        assert first["place_m"][2] == pytest.approx(0, abs=speed / 240)  # the gap at the start of the step
+        assert one["seed"] == [3, one["number"]] and one["versions"]["pybullet"]
+    assert all(len(found) == 1 for found in splits.values())
+    before = contents("one")
+    capfd.readouterr()
+    assert dataset("fall.py", "-o", "one", "--count", 4, "--seed", 3) == 0
+    assert "0 made now" in capfd.readouterr().out and contents("one") == before
+    assert dataset("fall.py", "-o", "two", "--count", 2, "--seed", 3, "--workers", 2) == 0
+    assert dataset("fall.py", "-o", "two", "--count", 4, "--seed", 3, "--workers", 2) == 0
+    assert contents("two") == before
+
+
+@parametrize_few("kills", [1, 20])
+def test_kills_change_no_byte(place: Path, kills: int) -> None:
+    count = 3 if kills == 1 else 24
+    assert dataset("fall.py", "-o", "whole", "--count", count) == 0
+    words = ["dataset", "fall.py", "-o", "cut", "--count", str(count), "--sr", "8000", "--workers", "2"]
+    for number in range(kills):
+        running = subprocess.Popen([sys.executable, "-m", "sonic_bullet", *words], stderr=subprocess.DEVNULL)
+        until = time.monotonic() + 120
+        while len(list(Path("cut").rglob("*.json"))) < 2 + number and running.poll() is None:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        running.send_signal(signal.SIGKILL)
+        running.wait()
+    until = time.monotonic() + 30
+    while run(*words) and time.monotonic() < until:  # a killed run's processes may still be ending
+        time.sleep(0.1)
+    assert contents("cut") == contents("whole")
+
+
+def test_what_fails_is_listed_and_the_rest_goes_on(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text = RECIPE.replace(
+        "def build(client, object, height_m):",
+        "def build(client, object, height_m):\n"
+        "    if height_m > 0.04:\n        raise ValueError('too high')\n"
+        "    if height_m < 0.03:\n        return {}",
+    )
+    Path("some.py").write_text(text)
+    assert dataset("some.py", "-o", "out", "--count", 5) == 1
+    made = [one["number"] for one in manifest("out")]
+    failed = [json.loads(line) for line in Path("out", "failures.jsonl").read_text().splitlines()]
+    assert sorted(made + [one["number"] for one in failed]) == [0, 1, 2, 3, 4] and made
+    reasons = " ".join(one["reason"] for one in failed)
+    assert "some.py' line 9: ValueError: too high" in reasons and "makes no sound" in reasons
+    assert "ValueError: too high" in capfd.readouterr().out
+
+
+def hang_or_end(number: int) -> int:
+    """A job that ends, hangs, or ends its process."""
+    if number == 1:
+        time.sleep(60)
+    if number == 2:
+        signal.raise_signal(signal.SIGKILL)
+    return number * number
+
+
+def test_a_job_that_never_ends_or_kills_its_process_stops_no_other() -> None:
+    found = dict(run_jobs(hang_or_end, range(4), workers=2, limit_s=0.5))
+    assert found[0] == 0 and found[3] == 9
+    assert found[1] == Failed("it took more than 0.5 s")
+    assert isinstance(found[2], Failed) and "SIGKILL" in found[2].reason
+
+
+def test_a_job_is_tried_three_times(tmp_path: Path) -> None:
+    def third(number: int) -> int:
+        tried = tmp_path / f"{number}-{len(list(tmp_path.iterdir()))}"
+        tried.touch()
+        if len(list(tmp_path.iterdir())) < TRIES:
+            raise ValueError("not yet")
+        return number
+
+    assert list(run_jobs(third, [7], workers=1, limit_s=10)) == [(7, 7)]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "no recipe"),
+        ("def sample(", "SyntaxError"),
+        ("x = 1", "no function sample(rng)"),
+        ("raise RuntimeError('at once')", "line 1: RuntimeError: at once"),
+    ],
+)
+def test_what_is_no_recipe_is_one_line(
+    place: Path, text: str | None, said: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if text is not None:
+        Path("bad.py").write_text(text)
+    assert said in error_of(capfd, "dataset", "bad.py", "-o", "out", "--count", "2")
+    assert not Path("out").exists()
+
+
+def test_a_folder_is_of_one_data_set_and_one_run(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    about = {"recipe": "fall.py", "seed": 0}
+    twice = pytest.raises(FileError, match="another run writes out")
+    with open_folder("out", about), twice, open_folder("out", about):
+        pass
+    with pytest.raises(FileError, match="data set of another seed"), open_folder("out", {**about, "seed": 1}):
+        pass
+    Path("full").mkdir()
+    Path("full", "thesis.txt").write_text("words")
+    assert "full holds other files" in error_of(capfd, "dataset", "fall.py", "-o", "full", "--count", "2")
+    assert [one.name for one in Path("full").iterdir()] == ["thesis.txt"]
