@@ -6,7 +6,7 @@
     score ANIMATION           -> a baked animation's sound and contact log
     modes MESH                -> ModalModel   -> table, JSON, npz
     bake MESH | SCENE | LOG   -> BakedModel   -> .glb .gltf .json .dsp .h .wav
-    dataset RECIPE.py         -> samples, manifest
+    dataset NAME.py           -> samples, manifest
     materials, doctor SCENE   -> table, JSON
     case FOLDER               -> case.json, and whether it can be read
     compare A B               -> Comparison   -> words, JSON, page

@@ -1,6 +1,6 @@
 """Data sets: thousands of sounds with labels, from a recipe and a seed.
 
-    RECIPE.py, or `impacts` -> Recipe: its text, by value
+    NAME.py, or `impacts` -> Recipe: its text, by value
     recipe, seed, number (a job) -> sample(rng) -> DatasetScene -> build(client) -> listener, steps -> Sample: sound in
         pascals, contacts as labels, parameters, provenance
     jobs -> processes (job_processes) -> Sample, or the reason why there is none
