@@ -42,6 +42,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_new_writes_a_case_that_fit_reads(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert (
         run(

@@ -514,6 +514,7 @@ def test_version() -> None:
     assert sonic_bullet_process("--version").stdout == "sonic-bullet, version 0.1.0\n"
 
 
+@pytest.mark.slow
 def test_a_terminal_without_greek_and_a_reader_that_leaves() -> None:
     plain = sonic_bullet_process("materials", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (plain.returncode, plain.stderr) == (0, "")

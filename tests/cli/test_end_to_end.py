@@ -116,6 +116,7 @@ def refused(folder: Path, *words: str, names: str) -> None:
         assert name in lines[0]
 
 
+@pytest.mark.slow
 def test_a_scene_gives_sound_log_picture_and_json_and_its_log_gives_the_same_sound(folder: Path) -> None:
     more = "print('a scene may print'); client.changeDynamics(bar, -1, linearDamping=0.01)"
     (folder / "scene.py").write_text(scene(how='{"material": "steel", "count": 10, "name": "the bar"}', more=more))

@@ -55,6 +55,7 @@ def one_line(done: subprocess.CompletedProcess[str], *words: str) -> None:
         assert word in lines[0]
 
 
+@pytest.mark.slow
 @parametrize_few("command", COMMANDS, (0, 6))
 def test_a_scene_that_ends_the_process_is_named_with_its_line(tmp_path: Path, command: str) -> None:
     (tmp_path / "a.py").write_text(f"{HEAD}{STEPS}os._exit(0)\n")
@@ -89,6 +90,7 @@ def test_a_script_that_ends_itself_after_its_steps_has_ended(tmp_path: Path) -> 
     assert shell(tmp_path, COMMANDS["doctor"].format("a.py")).returncode == 0
 
 
+@pytest.mark.slow
 @parametrize_few(
     ("text", "line"),
     [
@@ -109,6 +111,7 @@ def test_a_script_that_never_steps_is_ended(tmp_path: Path, text: str, line: tup
     assert line[0] <= said <= line[1]
 
 
+@pytest.mark.slow
 def test_what_we_compute_for_a_script_is_not_its_idling(tmp_path: Path) -> None:
     """Modes that take longer than a script may idle, and an import that does."""
     (tmp_path / "slow.py").write_text("import time\nreal = time.monotonic() + 4\nwhile time.monotonic() < real: pass\n")
@@ -167,6 +170,7 @@ LOOP = f"{HEAD}{STEPS}while True:\n    p.stepSimulation()\n    [None for _ in ra
 STOPS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
 
 
+@pytest.mark.slow
 @parametrize_few("command", COMMANDS, 1)
 @pytest.mark.parametrize(("number", "after_s"), [(0, 1.5), (1, 4.0)])
 def test_every_command_ends_within_a_second(tmp_path: Path, command: str, number: int, after_s: float) -> None:
@@ -180,6 +184,7 @@ def test_every_command_ends_within_a_second(tmp_path: Path, command: str, number
     assert not left_behind(tmp_path)
 
 
+@pytest.mark.slow
 @parametrize_few(("word", "code"), STOPS, 1)
 @pytest.mark.parametrize("after_s", [1.5, 3.0])
 def test_meshing_and_solving_end_within_a_second(
@@ -207,6 +212,7 @@ def test_compiling_ends_within_a_second(tmp_path: Path, word: signal.Signals, co
     assert not left_behind(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_comparison_with_a_revision_that_is_stopped_leaves_no_tree(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(LOOP)
     git = ["git", "-C", str(tmp_path), "-c", "user.name=x", "-c", "user.email=x@y"]

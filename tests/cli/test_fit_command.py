@@ -49,6 +49,7 @@ def run(*words: object) -> int:
     return int(ended.value.code or 0)
 
 
+@pytest.mark.slow
 def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert (
         run(
@@ -86,6 +87,7 @@ def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: py
     assert load_material(tmp_path / "p.json").beta_s == told["beta_s"]
 
 
+@pytest.mark.slow
 def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run("fit", folder, "-o", tmp_path / "p.json") == 0
     import pybullet
@@ -112,6 +114,7 @@ def test_preset_plays_at_once(folder: Path, tmp_path: Path, capfd: pytest.Captur
     disconnect(client)  # its finaliser would end whoever has its id next
 
 
+@pytest.mark.slow
 def test_one_recording_of_undeclared_onset(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     observed, sr = soundfile.read(folder / "s0.wav")
     late = np.concatenate([3e-5 * np.random.default_rng(1).standard_normal(3000), observed])
@@ -345,6 +348,7 @@ def test_the_first_channel_unless_another_is_named(
     assert line.endswith("two.wav has no channel 2; it has 2 channels, 0 to 1")
 
 
+@pytest.mark.slow
 def test_channels_of_a_recording_alone(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     stereo(folder, tmp_path)
     words = ["--mesh", folder / "box.obj", "--strike", "0,0,0.003", "--material", "brass", "-o", tmp_path / "p.json"]

@@ -153,6 +153,7 @@ def test_a_card_that_is_pulled_ends_it_with_what_was_played(
     assert library.streams[0].closed
 
 
+@pytest.mark.slow
 @parametrize_few(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], 1)
 def test_an_interrupt_says_what_was_played(place: Path, word: signal.Signals, code: int) -> None:
     (place / "long.py").write_text(SCRIPT.replace("    p.step", "    open('stepping', 'w').close(); p.step"))

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from sonic_bullet.files import read_audio, read_log
 from tests.few_cases import parametrize_few
@@ -41,6 +42,7 @@ def process(folder: Path, *words: str, code: str = MAIN) -> subprocess.Completed
     )
 
 
+@pytest.mark.slow
 def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_path: Path) -> None:
     write_scene(tmp_path)
     done = process(
@@ -73,6 +75,7 @@ def test_a_scene_renders_and_its_log_renders_the_same_bits_without_pybullet(tmp_
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
+@pytest.mark.slow
 @parametrize_few(("word", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], 1)
 def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signal.Signals, code: int) -> None:
     write_scene(
@@ -105,6 +108,7 @@ def test_an_interrupted_render_is_a_valid_named_file(tmp_path: Path, word: signa
     assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith("a")) == ["a.partial.wav"]
 
 
+@pytest.mark.slow
 def test_an_interrupt_that_compiled_code_met_is_an_interrupt(tmp_path: Path) -> None:
     write_scene(
         tmp_path,

@@ -66,6 +66,7 @@ def left(place: Path) -> set[str]:
     return {one.name for one in place.iterdir()} - {"scene.py", "log.npz", "__pycache__"}
 
 
+@pytest.mark.slow
 def test_a_render_writes_stems_events_and_cues(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
     wavinfo = pytest.importorskip("wavinfo")
     assert run(
@@ -210,6 +211,7 @@ def test_without_the_library_the_extra_is_named(
     assert "sonic_bullet[film]" in error_of(capfd, "film", "log.npz", "-o", "x.mp4")
 
 
+@pytest.mark.slow
 def test_a_film_that_is_interrupted_is_named_and_valid(place: Path) -> None:
     words = ["film", "log.npz", "-o", "x.mkv", "--size", "96x64", "--fps", "240"]
     running = subprocess.Popen([sys.executable, "-c", WAITING + MAIN, *words], stderr=subprocess.PIPE, text=True)

@@ -123,6 +123,7 @@ def test_how_it_is_rendered_is_an_input(folder: Path, first: Side) -> None:
         assert found.same or found.exact
 
 
+@pytest.mark.slow
 def test_a_plain_script_is_compared_too(folder: Path) -> None:
     text = (
         "import pybullet as p\np.connect(p.DIRECT)\np.setGravity(0, 0, -9.81)\n"

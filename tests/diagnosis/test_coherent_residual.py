@@ -92,6 +92,7 @@ def test_phases_are_not_asked_where_no_onset_is_known() -> None:
     assert not out_of_phase(replace(turning.lines, signed=False)).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("depth", "verdict"), [(0.0, "none"), (0.8, "unexplained")])
 def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(
     monkeypatch: pytest.MonkeyPatch, depth: float, verdict: str

@@ -124,6 +124,7 @@ def test_two_processes_find_what_one_finds(monkeypatch: pytest.MonkeyPatch) -> N
     assert all(np.array_equal(a.drop_db, b.drop_db) for a, b in zip(two, one, strict=True))
 
 
+@pytest.mark.slow
 def test_softer_strikes_tell_the_linear_modes_of_a_body_that_bends() -> None:
     body = recorded(BENT)
     assert body.recorded is not None
@@ -157,6 +158,7 @@ def test_the_best_pairs_are_those_that_counting_through_finds() -> None:
     assert strength[0] == pytest.approx(nnls(column[sets[0]].T, y)[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_three_weak_dashpots_are_told_together() -> None:
     """A thirtieth of the decays, where a law is good to a two-hundredth: no one says half of it, all three do."""
     fixture = SupportDamping(WEAK, (0.15, 0.1, 0.12))

@@ -57,6 +57,7 @@ def test_a_law_in_a_room_is_told_by_lines() -> None:
     assert named
 
 
+@pytest.mark.slow
 def test_rayleighs_own_damping_in_a_room_is_no_law() -> None:
     found, named = tried()
     assert all(c.lines < RULES.line_gain for c in found)

@@ -36,6 +36,7 @@ def meshed(apart: float) -> Struck:
     return replace(body, model=model, line=line, correction=np.zeros(len(line)))
 
 
+@pytest.mark.slow
 @parametrize_few("apart", [0.005, 0.008], 1)
 def test_two_lines_part_a_group_of_three(apart: float) -> None:
     body = meshed(apart)
@@ -49,11 +50,13 @@ def test_two_lines_part_a_group_of_three(apart: float) -> None:
     assert (told.line[rest] == body.line[rest]).all()
 
 
+@pytest.mark.slow
 def test_what_no_second_line_shows_stays_one() -> None:
     body = meshed(0.0)
     assert separated(body) is body
 
 
+@pytest.mark.slow
 def test_lines_unlike_the_modes_part_nothing() -> None:
     body = meshed(0.006)
     assert body.recorded is not None

@@ -91,6 +91,7 @@ def close(found: Effect, planted: Effect, within: dict[str, float]) -> None:
         assert told[name] == pytest.approx(true[name], rel=share), name
 
 
+@pytest.mark.slow
 @parametrize_few(("effect", "within"), PLANTED, (0, 2, 6), ids=lambda e: getattr(e, "id", ""))
 def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) -> None:
     """With its own numbers, and it brings what is played nearer to the recordings than the best of the baseline."""
@@ -110,6 +111,7 @@ def test_a_planted_effect_is_proposed(effect: Effect, within: dict[str, float]) 
     assert after - floor < 0.35 * (before - floor)
 
 
+@pytest.mark.slow
 @parametrize_few("number", [1, 3], 1, ids=["support-damping", "foreign-mode"])
 def test_a_planted_effect_is_named(number: int) -> None:
     effect, within = PLANTED[number]

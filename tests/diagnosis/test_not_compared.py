@@ -40,6 +40,7 @@ from tests.made.problems import posed
 SOURCE = Path(sonic_bullet.__file__).parent
 
 
+@pytest.mark.slow
 def test_no_distance_has_a_number_to_fall_back_on() -> None:
     """No `or` with a number behind a call that gives a distance, and no `or 0.0` at all, anywhere in the package."""
     files = sorted(SOURCE.rglob("*.py"))

@@ -66,6 +66,7 @@ def test_a_law_and_a_pulse_are_found_at_once_whatever_each_says_alone() -> None:
     assert found["contact-time"]["tau_s"] == pytest.approx(3e-4, rel=0.05)
 
 
+@pytest.mark.slow
 def test_one_effect_is_not_found_as_two() -> None:
     first, two = tried(PULSE, kinds=(ContactTime, MeasurementChain, DampingLaw))
     assert first

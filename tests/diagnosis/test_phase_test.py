@@ -42,6 +42,7 @@ def identified_from(effect: Effect) -> list[Candidate]:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [PULSE, LOW], ids=lambda e: e.id)
 def test_a_pulse_and_a_low_pass_are_told_apart(effect: Effect) -> None:
     body = recorded(effect)
@@ -52,6 +53,7 @@ def test_a_pulse_and_a_low_pass_are_told_apart(effect: Effect) -> None:
     assert simplest(both[::-1], (body,), told).id == effect.id
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [ContactTime(1.2e-4, 0.016, -0.2, "half-sine"), LOW], ids=lambda e: e.id)
 def test_phases_speak_though_every_strike_says_a_little_more_for_the_other(effect: Effect) -> None:
     """A pulse in few samples, or a filter between two, has magnitudes that are off by a little at all strikes alike;
@@ -99,6 +101,7 @@ def test_what_lines_alone_have_named_needs_no_strike_to_speak_for_it() -> None:
     assert simplest([one], (recorded(LOW),), evidence_of(truth(), (recorded(LOW),), BAND)) is one
 
 
+@pytest.mark.slow
 @parametrize_few("exponent", [-0.2, 0.0], 1)
 def test_whether_a_pulse_goes_with_the_blow_is_told_by_its_middle(exponent: float) -> None:
     """Of a pulse so short that hardly anything rolls off: longer for a soft blow, or not; and files may begin a little
@@ -127,6 +130,7 @@ def test_neither_gain_nor_delay_is_a_misfit() -> None:
     assert misfit(truth(), (body,)) > misfit(h, (body,)) + 20
 
 
+@pytest.mark.slow
 def test_a_name_that_phases_speak_for_is_not_left_for_one_that_strikes_hardly_prefer() -> None:
     """Either way; of two that move modes phases say nothing."""
     for effect in (PULSE, LOW):
@@ -139,6 +143,7 @@ def test_a_name_that_phases_speak_for_is_not_left_for_one_that_strikes_hardly_pr
         assert not phases_against(split, other, (body,))
 
 
+@pytest.mark.slow
 def test_phases_speak_against_nobody_of_whom_they_say_nothing() -> None:
     """Of several hits they tell nothing, and in a room lines are other lines."""
     train = Rebound(0.0131, 0.016, 0.4, 0.0, 0.4, 3)

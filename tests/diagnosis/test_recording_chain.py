@@ -71,6 +71,7 @@ def test_chains_add_up_to_what_was_struck() -> None:
         )
 
 
+@pytest.mark.slow
 def test_no_chains_where_no_level_counts() -> None:
     """In a room the wider links find some; what they play is farther from the recordings, which is for the baseline to
     see.

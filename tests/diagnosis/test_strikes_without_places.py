@@ -32,6 +32,7 @@ def test_a_measured_list_without_places_keeps_its_mesh(tmp_path: Path) -> None:
     assert body.family is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.03, 1.0, 40.0])
 def test_a_take_without_an_impulse_has_one_floor_and_distance_at_any_gain(tmp_path: Path, gain: float) -> None:
     case = read_case(case_of(tmp_path, 0))

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
@@ -46,6 +47,7 @@ def takes_of(*bodies: Struck) -> list[Take]:
     return made
 
 
+@pytest.mark.slow
 def test_a_strike_is_left_out_of_its_own_object_alone() -> None:
     bodies = (recorded(LAW), replace(recorded(LAW, seed=6), name="other"))
     told = evidence_of(truth(), bodies, BAND)
@@ -67,6 +69,7 @@ def test_an_object_of_one_strike_is_left_out_whole() -> None:
     assert (by_rest.alpha_per_s, by_rest.beta_s, by_rest.gain) == (by_first.alpha_per_s, by_first.beta_s, by_first.gain)
 
 
+@pytest.mark.slow
 def test_objects_of_one_strike_stand_trial_with_the_others() -> None:
     bodies = (recorded(LAW), alone(recorded(LAW, seed=6), 3))
     takes = takes_of(*bodies)

@@ -143,6 +143,7 @@ def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
     assert turned(model, (123.0,), (0.6,)).shape == pytest.approx(model.shape)
 
 
+@pytest.mark.slow
 def test_a_linear_body_proposes_no_choke() -> None:
     body = recorded(model=with_twins())
     assert AmplitudeDamping.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None

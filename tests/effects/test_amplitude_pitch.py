@@ -37,6 +37,7 @@ def made(bend: float) -> Struck:
     return recorded(AmplitudePitch(bend, "velocity")) if bend else recorded()
 
 
+@pytest.mark.slow
 def test_modes_ring_down_to_where_they_are_at_rest() -> None:
     """Corrections that are off come back to the plate's own frequencies beside the true bend, of all modes that stand
     alone.
@@ -109,6 +110,7 @@ def test_a_level_falls_as_the_linear_mode_does_while_its_lines_do_not(bend: floa
     assert np.median(after) < 0.01 and after.max() < 0.1
 
 
+@pytest.mark.slow
 def test_a_gain_is_told_by_what_does_not_glide() -> None:
     body = made(1.0)
     h = replace(fitted(body), effects=(AmplitudePitch(1.0, "velocity"),))
@@ -116,6 +118,7 @@ def test_a_gain_is_told_by_what_does_not_glide() -> None:
     assert abs(refitted(fitted(body), (body,)).gain / GAIN - 1) > 0.03, "lines of what glides hold but a part of it"
 
 
+@pytest.mark.slow
 def test_gliding_twins_have_their_own_axes() -> None:
     """One of two twins may be loud, and glide away, where the other has hardly been struck; with the mesh's axes both
     would.
@@ -133,6 +136,7 @@ def test_gliding_twins_have_their_own_axes() -> None:
     assert_nearer_than_the_meshs(found, base, body, evidence)
 
 
+@pytest.mark.slow
 def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects() -> None:
     """By all fitted strikes, once; but where another effect has moved modes meanwhile, what were twins may be two
     lines, and have no axes to turn.
@@ -152,6 +156,7 @@ def test_axes_of_twins_are_held_on_trial_and_learnt_again_beside_other_effects()
     assert split is not None and split.turn_rad == ()
 
 
+@pytest.mark.slow
 @parametrize_few("off_per_s", [-5.0, 5.0], 1)
 def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float) -> None:
     """By what it is played with that is a third off, their decay is told to 5 %, and by that to 2 %; the line itself is
@@ -174,6 +179,7 @@ def test_twins_that_glide_and_beat_fall_as_what_is_played_does(off_per_s: float)
         assert told == pytest.approx(right, rel=close)
 
 
+@pytest.mark.slow
 def test_twins_that_are_played_as_two_are_not_turned() -> None:
     """Two modes that corrections have left apart are no pair of one frequency: about other axes they would be two
     others.
@@ -191,6 +197,7 @@ def test_twins_that_are_played_as_two_are_not_turned() -> None:
         assert found is not None and len(found.turn_rad) == turned
 
 
+@pytest.mark.slow
 def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     """From half as far off as twins, read as one mode, may lead."""
     model = with_twins()
@@ -268,6 +275,7 @@ def test_a_bend_that_one_lone_mode_alone_tells_is_told_by_all(monkeypatch: pytes
     assert not _slopes(e, told, AmplitudePitch(-BENT.bend)), "the other way is another bend"
 
 
+@pytest.mark.slow
 def test_a_bend_is_told_by_the_levels_that_the_pulse_leaves() -> None:
     """A long contact hardly drives high modes: it is their own velocity they bend with, not what the impulse alone
     would give them.

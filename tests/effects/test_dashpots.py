@@ -56,6 +56,7 @@ def test_a_mode_that_should_be_heard_and_is_not_costs_something() -> None:
     assert missed(model=replace(deaf.model, decay_per_s=quick)) == 0, "what dies at once is not missed"
 
 
+@pytest.mark.slow
 def test_a_faint_line_far_above_does_not_hide_a_dashpot() -> None:
     body = recorded(SupportDamping((SPOT,), (3.0,)))
     observed = evidence_of(truth(), (body,), BAND).observed[0]
@@ -166,6 +167,7 @@ def test_runs_are_cut_where_frequencies_lie_apart() -> None:
     assert max(len(run) for run in apart(np.linspace(1, 2, 57), 10)) <= 10
 
 
+@pytest.mark.slow
 @parametrize_few(
     "law",
     [DampingLaw("constant-loss", 6e-3), DampingLaw("relaxation", 5e-4, strength=0.03, tau_s=3e-5)],

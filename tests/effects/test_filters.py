@@ -48,6 +48,7 @@ def told() -> ObjectEvidence:
     return evidence_of(fitted(body), (body,), BAND).observed[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mains", [0.0, 50.0])
 def test_hum_stands_out_of_the_noise_beside_it(told: ObjectEvidence, mains: float) -> None:
     """Pink noise is strongest where mains hum."""
@@ -130,6 +131,7 @@ def test_what_hums_is_taken_out_of_every_recording(told: ObjectEvidence) -> None
     assert hum_of(told.signal, told.noise, SR) is None
 
 
+@pytest.mark.slow
 def test_loud_hum_hides_no_modes(told: ObjectEvidence) -> None:
     """Louder than the strikes: with the hum in them, recordings tell of tones that never end, and of no plate."""
     assert told.signal is not None

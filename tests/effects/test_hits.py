@@ -23,6 +23,7 @@ from tests.few_cases import parametrize_few
 from tests.made.body import SR, recorded
 
 
+@pytest.mark.slow
 @parametrize_few("hits", [2, 3, 8], (1,))
 def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     """A train cut short is not a longer one of less restitution."""
@@ -37,6 +38,7 @@ def test_restitution_gap_and_hits_are_told(hits: int) -> None:
     assert (share[hits:] < 0.14).all() and found.hits >= min(hits, 4)
 
 
+@pytest.mark.slow
 @parametrize_few("exponent", [0.0, 0.5, 1.0, -0.2], 1)
 def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     """Its gap, and how that goes with strength, whatever delays each strike alone would be as content with."""
@@ -123,6 +125,7 @@ def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: p
         assert found.decay_per_s[near] == pytest.approx(d, rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines told once a crowd is over: one that would have died long before is a late burst's, and at the onset it
     would have been louder than anything.

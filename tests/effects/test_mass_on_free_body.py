@@ -89,6 +89,7 @@ def test_a_held_body_and_an_open_surface_do_not_move_as_a_whole() -> None:
     assert FreeBody.of(plate()) is None
 
 
+@pytest.mark.slow
 def test_a_ratio_of_poisson_that_a_mass_had_bent_is_found_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every other mode goes with ν, which the fit had left 0.06 too high."""
     monkeypatch.setattr(added_mass, "POINTS", 16)

@@ -45,6 +45,7 @@ def told(body: Struck, correction: dict[int, float]) -> ModeSplitting:
     return found
 
 
+@pytest.mark.slow
 @parametrize_few("correction", [{}, {3: 0.006, 4: -0.006}, {3: -0.006, 4: 0.006, 9: 0.0045}], (2,))
 def test_the_turn_is_the_meshs_whatever_corrections_say(correction: dict[int, float]) -> None:
     found = told(recorded(split(), model=degenerate(), seconds=1.0), correction)
@@ -52,6 +53,7 @@ def test_the_turn_is_the_meshs_whatever_corrections_say(correction: dict[int, fl
     assert found.turn_rad == pytest.approx((0.5, 2.0), abs=0.03)
 
 
+@pytest.mark.slow
 def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> None:
     """All modes of the mesh 1 % high, and splits that add 0.6 %: the pairs agree on the scale between them."""
     body = recorded(split(), model=degenerate(), seconds=1.0)
@@ -61,6 +63,7 @@ def test_pairs_are_found_where_elasticity_was_fitted_to_one_line_of_each() -> No
     assert found.turn_rad == pytest.approx((0.5, 2.0), abs=0.03)
 
 
+@pytest.mark.slow
 def test_no_correction_sets_twins_apart() -> None:
     """What a mesh leaves together shares the mesh's error: corrections learnt again would else pass for the splitting
     itself, and a true one earn nothing.
@@ -133,6 +136,7 @@ def rough(body: Struck, f: float, gain: list[float]) -> Evidence:
     return replace(every, observed=(replace(one, amplitude=amplitude, foreign_amplitude=foreign),))
 
 
+@pytest.mark.slow
 @parametrize_few("plain", [1, 3], (1,))
 def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
     """The plate with two or four pairs, of which the second's patterns are its modes' but for a factor of 0.35 at one
@@ -157,6 +161,7 @@ def test_beside_three_plain_pairs_another_may_be_less_so(plain: int) -> None:
     assert (np.abs(np.array(found.freq_hz) / less - 1) < 5e-3).any() == (plain == 3)
 
 
+@pytest.mark.slow
 def test_neighbours_by_chance_that_the_mesh_has_too_near_are_no_split_pair() -> None:
     """Two modes 0.4 % apart in the mesh and 0.9 % in truth swing about the mesh's own axes; turned, or twins of the
     mesh, they are a pair.

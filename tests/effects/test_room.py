@@ -41,6 +41,7 @@ def test_the_covariance_of_a_driven_tail() -> None:
     assert np.allclose(told, drawn, rtol=0.06, atol=0.02 * drawn.max())
 
 
+@pytest.mark.slow
 def test_modes_read_through_a_room() -> None:
     """Decays and gains that a strong room hides from the lines come back within the spreads said."""
     body = recorded(Room(0.9, 0.9, 4), seconds=1.2)
@@ -157,6 +158,7 @@ def test_no_room_where_none_is(effect: object) -> None:
     assert late(object_evidence(predict(refitted(fitted(body), (body,)), body))) is None
 
 
+@pytest.mark.slow
 @parametrize_few(
     ("other", "parameter", "within"),
     [(ContactTime(4e-4, 0.016, 0.0, "half-sine"), "tau_s", 0.15), (DampingLaw("constant-loss", 8e-3), "eta", 0.2)],
@@ -267,6 +269,7 @@ def test_a_mode_that_is_hardly_struck_is_not_read_more_surely() -> None:
     assert (dry.amplitude_sd[0] > 0.09 * np.abs(dry.amplitude[0])).all()
 
 
+@pytest.mark.slow
 def test_a_snippet_has_no_tail() -> None:
     """Shorter than a few frames: no room is told, and nothing breaks."""
     observed = object_evidence(predict(truth(), recorded(Room(0.9, 0.9, 4))))

@@ -63,6 +63,7 @@ def test_a_wood_is_told_from_an_isotropic_start(seed: int, monkeypatch: pytest.M
     assert np.abs(constants(both[1].p) / constants(far(seed)) - 1)[[0, 1, 6, 7, 8]].max() < 0.1
 
 
+@pytest.mark.slow
 @parametrize_few("seed", range(3), 1)
 def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(seed: int) -> None:
     told, guess = [lines(seed)], isotropic_p(plank(seed))

@@ -75,6 +75,7 @@ def env() -> Iterator[Any]:
     made.close()
 
 
+@pytest.mark.slow
 def test_it_is_the_bare_environment_with_attach(env: Any, expected: list[np.ndarray]) -> None:
     assert env.step_s * 500 == 20
     assert set(env.observation_space) == {"observation", "achieved_goal", "desired_goal", "audio"}
@@ -94,6 +95,7 @@ def test_it_is_the_bare_environment_with_attach(env: Any, expected: list[np.ndar
     other.close()
 
 
+@pytest.mark.slow
 def test_another_seed_between_makes_other_contacts_and_says_so(env: Any, expected: list[np.ndarray]) -> None:
     """PyBullet's contact cache outlives panda-gym's reset."""
     count = 60
@@ -112,10 +114,12 @@ def test_another_seed_between_makes_other_contacts_and_says_so(env: Any, expecte
     print(f"{differ} of {count} env.steps met other contacts")
 
 
+@pytest.mark.slow
 def test_a_vector_in_one_process(expected: list[np.ndarray]) -> None:
     check_vector(gymnasium.vector.SyncVectorEnv([sounding, sounding]), expected)
 
 
+@pytest.mark.slow
 @parametrize_few("context", ["fork", "spawn"], 1)
 def test_a_vector_of_processes(context: str, expected: list[np.ndarray]) -> None:
     assert context in multiprocessing.get_all_start_methods()

@@ -356,6 +356,7 @@ def test_closing_leaves_the_client_as_it_was() -> None:
     close()
 
 
+@pytest.mark.slow
 def test_episodes_leave_no_memory_behind(opened: Any) -> None:
     """A world that is made anew each time, one step each; benchmarks/environment_steps.py counts all memory."""
     env = opened(SoundObservation(FallingBox(renew=True), materials=plates))

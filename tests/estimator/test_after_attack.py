@@ -50,6 +50,7 @@ def test_takes_share_poles_and_amplitudes_are_their_own() -> None:
         assert np.ptp(np.abs(lines.amplitude[:, k])) > 0.05 * level
 
 
+@pytest.mark.slow
 def test_spreads_are_those_of_many_draws() -> None:
     """Errors over their spreads have a variance of one, within what 5 draws of 4 modes let differ."""
     off = []
@@ -74,6 +75,7 @@ def test_beating_twins_are_two_lines_and_cancel_nothing() -> None:
     assert np.abs(lines.amplitude).max() < 0.35
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_the_bar_of_a_real_set(shared_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """E within 1 % of ASTM E1876's 214.9 GPa from f1 alone, f1 a mode, at most 10 lines."""

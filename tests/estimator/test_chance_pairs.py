@@ -34,6 +34,7 @@ def fitted(folder: Path, size_m: tuple[float, float, float]) -> CaseFit:
     return fit_case(read_case(made.folder))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size_m", [(0.1, 0.08, 0.01)])
 def test_a_mesh_of_another_object_is_said(tmp_path: Path, size_m: tuple[float, float, float]) -> None:
     found = fitted(tmp_path, size_m)
@@ -44,6 +45,7 @@ def test_a_mesh_of_another_object_is_said(tmp_path: Path, size_m: tuple[float, f
     assert np.linalg.norm(made) == pytest.approx(np.linalg.norm(found.evidence[0].signals[0]))
 
 
+@pytest.mark.slow
 def test_its_own_mesh_is_not_doubted(tmp_path: Path) -> None:
     found = fitted(tmp_path, SIZE_M)
     assert "chance" not in found.fit.verdict and np.isfinite(found.fit.covariance[2, 2])

@@ -105,6 +105,7 @@ def test_onset_to_the_sample(noise: float, phase: float | None) -> None:
         assert round(extract(x + noise * rng.standard_normal(len(x)), SR).onset_s * SR) == before
 
 
+@pytest.mark.slow
 @parametrize_few(("db", "least"), [(20.0, 0.90), (40.0, 0.98), (60.0, 0.99)], (1,))
 def test_mixtures_in_noise_near_the_bound(db: float, least: float) -> None:
     """Found, false and error against the single mode's Cramér-Rao bound √(8d³/(fs·a²/2σ²)); pairs closer than their

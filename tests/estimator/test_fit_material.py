@@ -27,6 +27,7 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Planted, CaseFit]
     return made, fit_case(read_case(made.folder))
 
 
+@pytest.mark.slow
 def test_planted_material_comes_back(planted: tuple[Planted, CaseFit]) -> None:
     _, found = planted
     fit = found.fit
@@ -68,6 +69,7 @@ def test_held_out_strike_is_predicted_to_the_noise(planted: tuple[Planted, CaseF
     assert log_spectral_db(observed, with_noise(2 * made, floor, 7), floor) > noise_floor_db(made, floor) + 3
 
 
+@pytest.mark.slow
 def test_constant_loss_is_no_rayleigh_damping(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
     made, _ = planted
     make(tmp_path, BRASS, guess=GUESS, decay=1e-3 * np.pi * made.model.freq_hz)
@@ -76,6 +78,7 @@ def test_constant_loss_is_no_rayleigh_damping(planted: tuple[Planted, CaseFit], 
     assert found.fit.poisson_ratio == pytest.approx(0.345, abs=2e-3)  # what is right stays right
 
 
+@pytest.mark.slow
 def test_foreign_line_is_named(planted: tuple[Planted, CaseFit], tmp_path: Path) -> None:
     make(tmp_path, BRASS, guess=GUESS)
     t = np.arange(int(0.8 * SR)) / SR
@@ -119,6 +122,7 @@ def test_without_a_mesh_decays_alone_are_told(planted: tuple[Planted, CaseFit], 
     assert np.isnan(found.fit.covariance[2, 2])
 
 
+@pytest.mark.slow
 def test_clamped_body_is_fitted_clamped(tmp_path: Path) -> None:
     fixed = ((-0.07, 0.0, 0.0, 0.016),)
     made = make(tmp_path, BRASS, guess=GUESS, fixed=fixed)

@@ -67,6 +67,7 @@ def case_of(folder: Path, holdouts: int, noise: float = 1e-4, *, seconds: float 
     return folder
 
 
+@pytest.mark.slow
 def test_a_take_that_was_not_fitted_is_nearer_than_silence_and_about_as_near_as_another(tmp_path: Path) -> None:
     found = fit_case(read_case(case_of(tmp_path, 2)))
     assert [t.split for t in found.takes] == ["holdout", "holdout"]
@@ -76,6 +77,7 @@ def test_a_take_that_was_not_fitted_is_nearer_than_silence_and_about_as_near_as_
     assert not found.worse_than_silence
 
 
+@pytest.mark.slow
 def test_fit_says_how_near_each_take_is_and_its_preset_holds_the_lines(tmp_path: Path) -> None:
     folder = case_of(tmp_path, 1)
     out, verdict = tmp_path / "taps_preset.json", tmp_path / "fit.json"
@@ -92,6 +94,7 @@ def test_fit_says_how_near_each_take_is_and_its_preset_holds_the_lines(tmp_path:
         assert abs(lines["decay_per_s"][nearest] - decay) < 0.05 * decay
 
 
+@pytest.mark.slow
 def test_what_is_over_in_a_few_cycles_is_no_line_of_a_preset(tmp_path: Path) -> None:
     """Lines of an attack cancel each other with their phases, which a preset does not play."""
     found = fit_case(read_case(case_of(tmp_path, 0)))
@@ -111,6 +114,7 @@ def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make(folder, brass, (0.12, 0.025, 0.006), guess=(1.1e11, 8400.0, 0.34), strikes=3).folder
 
 
+@pytest.mark.slow
 @parametrize_few(("factor", "worse"), [(1.0, False), (3e3, True), (3e4, True)], (1,))
 def test_what_is_farther_than_silence_is_said_and_ends_with_one(
     placed: Path, tmp_path: Path, factor: float, worse: bool
@@ -130,6 +134,7 @@ def test_what_is_farther_than_silence_is_said_and_ends_with_one(
     assert ("worse-than-silence" in done.output) == worse
 
 
+@pytest.mark.slow
 def test_no_effect_is_sought_from_farther_than_silence(
     placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -143,6 +148,7 @@ def test_no_effect_is_sought_from_farther_than_silence(
     assert json.loads(out.read_text())["provenance"]["verdict"] == "worse-than-silence"
 
 
+@pytest.mark.slow
 def test_what_lies_outside_the_band_is_no_part_of_a_distance(tmp_path: Path) -> None:
     """A line above the case's band that one take has and the others have not."""
     plain, loud = case_of(tmp_path, 1), tmp_path / "loud"
@@ -157,6 +163,7 @@ def test_what_lies_outside_the_band_is_no_part_of_a_distance(tmp_path: Path) -> 
     assert abs(a.predicted_db - b.predicted_db) < 0.2 and abs(a.silence_db - b.silence_db) < 0.2
 
 
+@pytest.mark.slow
 def test_the_residual_of_an_object_without_a_shape_joins_its_lines(tmp_path: Path) -> None:
     """It is what the takes have beside the lines that the preset plays; the command says how near they are with it."""
     out, told = tmp_path / "p.json", tmp_path / "residual.json"

@@ -29,6 +29,7 @@ LINES = [
 ]
 
 
+@pytest.mark.slow
 @parametrize_few("sensor", ["pressure", "velocity"], 1)
 def test_the_bar_sounds_as_recorded(tmp_path: Path, sensor: str) -> None:
     """The bar of scenes/bar.py, at a microphone and at a vibrometer."""
@@ -39,6 +40,7 @@ def test_the_bar_sounds_as_recorded(tmp_path: Path, sensor: str) -> None:
     assert every < 0.03 and every_db < 0.5  # and all modes that are played, heard or not
 
 
+@pytest.mark.slow
 def test_what_was_fitted_on_one_plate_holds_on_one_twice_as_thick(tmp_path: Path) -> None:
     assert round_trip.thicker(tmp_path, "velocity", "glass", (0.12, 0.09, 0.004)) < 0.05
 

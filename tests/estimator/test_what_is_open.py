@@ -35,6 +35,7 @@ def bar(tmp_path_factory: pytest.TempPathFactory) -> CaseFit:
     return fit_case(read_case(made.folder))
 
 
+@pytest.mark.slow
 @parametrize_few("material", [None, "steel", "glass"], 2)
 def test_no_constant_is_printed_that_nobody_gave(
     material: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -60,6 +61,7 @@ def changed(found: CaseFit, **lines: Any) -> CaseFit:
     return replace(found, evidence=(replace(e, lines=replace(e.lines, **lines)),))
 
 
+@pytest.mark.slow
 def test_of_one_take_another_is_asked_for(taps: CaseFit) -> None:
     (e,) = taps.evidence
     assert e.signals is not None
@@ -96,6 +98,7 @@ def test_an_attack_asks_for_the_force(taps: CaseFit) -> None:
     assert "record the hammer's force" in next_measurement(replace(taps, evidence=(replace(e, signals=burst),)))
 
 
+@pytest.mark.slow
 def test_the_guess_on_the_shape_is_held_beside_the_fit(bar: CaseFit, taps: CaseFit) -> None:
     for take in bar.takes:
         assert take.predicted_db < take.plausible_db <= take.silence_db

@@ -74,6 +74,7 @@ def test_a_step_holds_the_living_and_an_index_is_never_given_anew(client: Any, h
     assert again.body is passing.last.body, "who is in a step is one array while it is the same"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hooked", [True, False])
 def test_without_a_log_nothing_of_the_gone_stays(client: Any, hooked: bool) -> None:
     passing = Passing(client, hooked, logged=False)

@@ -207,6 +207,7 @@ for _ in range(240):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [BUILT, PLAIN])
 def test_the_doctor_names_what_keeps_a_bar_from_resting(scene: str, tmp_path: Path) -> None:
     from click.testing import CliRunner

@@ -31,6 +31,7 @@ def heard(name: str, *how: str) -> None:
         assert told["memory_mb"] <= BOUND_MB * min(max(told["links"], 1), 2)
 
 
+@pytest.mark.slow
 @parametrize_few("name", ONE_A_KIND, (3, 7, 11))
 def test_one_file_a_kind(name: str) -> None:
     heard(name)

@@ -92,6 +92,7 @@ def kept(folder: Path, ending: str) -> Path:
     return found
 
 
+@pytest.mark.slow
 def test_a_second_process_does_not_compile(folder: Path) -> None:
     (folder / "cache").mkdir()
     assert [hits(folder), hits(folder)] == [0, 1]
@@ -100,6 +101,7 @@ def test_a_second_process_does_not_compile(folder: Path) -> None:
     assert hits(folder) == 0
 
 
+@pytest.mark.slow
 def test_code_is_of_all_the_sources_that_it_was_made_of(folder: Path) -> None:
     """What a kernel calls, and numbers that it reads, are in its machine code: two modules further on, too."""
     (folder / "cache").mkdir()

@@ -136,6 +136,7 @@ def test_a_kernel_that_knows_nothing_of_parts_may_call_them(mean: Any) -> None:
     assert half(np.arange(4.0)) == 0.75
 
 
+@pytest.mark.slow
 def test_machine_code_is_kept_for_the_outermost_and_anew_where_what_it_imports_has_changed(folder: Path) -> None:
     assert [run(folder, KERNELS["kept.py"]) for _ in range(2)] == ["6.0 0 1", "6.0 1 0"]
     assert [path.name.split("-")[0] for path in folder.rglob("*.nbi")] == ["kernels.total"]

@@ -76,6 +76,7 @@ def test_six_multiplets_of_a_ball(steel: Material) -> None:
     assert model.volume_m3 == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=4e-3)
 
 
+@pytest.mark.slow
 def test_first_multiplets_of_a_ball_from_a_mesh(steel: Material) -> None:
     (f, n, _), (g, k, _) = exact.sphere_multiplets_hz(0.05, E, NU, RHO, 2)
     ball = trimesh.creation.icosphere(3, radius=0.05)
@@ -84,6 +85,7 @@ def test_first_multiplets_of_a_ball_from_a_mesh(steel: Material) -> None:
     assert np.abs(found.freq_hz * grown / np.concatenate([[f] * n, [g] * k]) - 1).max() < 5e-3
 
 
+@pytest.mark.slow
 def test_eigenvalues_converge_with_the_fourth_power_of_the_element(steel: Material) -> None:
     """λ_h = λ + c h^(2p), p = 2 [Strang & Fix 1973, ch. 6], fitted on the first six modes of the slender bar
     under uniform refinement.

@@ -55,19 +55,23 @@ def test_a_body_of_elements_without_a_mode_in_the_band_has_none() -> None:
     assert analyse((Shape("mesh", vertex_m=ball.vertices, face=ball.faces),), BRASS, cache=None).mode_count == 0
 
 
+@pytest.mark.slow
 @parametrize_few("path", ASSETS, 1, ids=lambda path: path.stem)
 def test_scene_and_diagnosis_agree_on_what_comes_with_the_project(path: Path) -> None:
     assert apart(read_mesh(path), 10_000.0) < AGREE
 
 
+@pytest.mark.slow
 def test_scene_and_diagnosis_agree_on_a_body_of_elements_as_far_as_is_asked() -> None:
     assert apart(wedge(), 20_000.0) < ASKED
 
 
+@pytest.mark.slow
 def test_scene_and_diagnosis_hold_a_clamped_body_at_the_same_nodes() -> None:
     assert apart(wedge(), 20_000.0, ((-0.06, 0.0, 0.0, 0.02),)) < AGREE
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_scene_and_diagnosis_agree_on_a_practice_mesh(shared_path: Path) -> None:
     assert apart(read_mesh(shared_path / "practice/practice-05/slab_porcelain.obj"), 6000.0) < AGREE
@@ -82,6 +86,7 @@ print(hashlib.sha256(model.freq_hz.tobytes() + model.shape.tobytes() + model.ver
 """
 
 
+@pytest.mark.slow
 @parametrize_few(("body", "edge_m"), [(wedge, 0.008), (crossed, 0.01)], 1)
 def test_the_same_bytes_on_one_thread_or_two_beside_other_processes(body: Callable[[], Shape], edge_m: float) -> None:
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(3)]

@@ -51,6 +51,7 @@ def test_a_slender_bar_by_polynomials_bends_as_timoshenko_says() -> None:
     )
 
 
+@pytest.mark.slow
 @parametrize_few("size", [(0.2, 0.13, 0.01), (0.1, 0.02, 0.006), (0.05, 0.05, 0.05), (0.08, 0.06, 0.025)], (0, 2))
 def test_more_polynomials_change_nothing(size: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch) -> None:
     shape, top = Shape("box", np.array(size)), 3_000 / max(size)
@@ -132,6 +133,7 @@ def test_a_tube_twists_as_a_string_swings() -> None:
         assert np.abs(near / wanted - 1).min() < 2e-6
 
 
+@pytest.mark.slow
 def test_a_turned_ring_moves_as_elements_do() -> None:
     turn = trimesh.transformations.random_rotation_matrix(np.array([0.3, 0.7, 0.1]))
     turn[:3, 3] = (0.1, 0.2, -0.3)

@@ -112,6 +112,7 @@ def drawn(path: Path, sound: np.ndarray, log: ContactLog | None = None, title: s
     return path.read_bytes()
 
 
+@pytest.mark.slow
 def test_pictures_are_pictures_and_equal_input_gives_equal_bytes(tmp_path: Path) -> None:
     sound = np.random.default_rng(0).normal(size=(2, SR // 2))
     log = log_of([[rows(1, 0, 0.1), rows(2, 0, 0.1, slip_m_s=0.1)] for _ in range(120)])

@@ -30,6 +30,7 @@ TUBES = {
 }
 
 
+@pytest.mark.slow
 @parametrize_few("material", ["glass", "plastic", "wood", "steel"], 1)
 @pytest.mark.parametrize("name", TUBES)
 def test_a_tube_radiates_in_every_material(name: str, material: str) -> None:

@@ -81,6 +81,7 @@ def recorded(
     return Problem(features, np.asarray(signal), lambda_hat, amplitude_hat)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planted", FIGURE_9)
 @parametrize_few("full_scale", [74.0, 94.0, 114.0], 1)
 def test_planted_materials(planted: tuple[float, ...], full_scale: float) -> None:

@@ -63,6 +63,7 @@ class Table:
         return {name: values[:count] for name, values in out.items()}
 
 
+@pytest.mark.slow
 def test_what_rests_has_no_drive_and_no_triangle_is_looked_up_for_it() -> None:
     table = Table()
     table.step(table.row((0.0, 0.0), 0.0, 5.0), (0.0, 5.0))

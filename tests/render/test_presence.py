@@ -115,6 +115,7 @@ def test_a_body_that_comes_again_is_refused(heard: tuple[ContactLog, np.ndarray,
         Step(1 / 240, np.zeros((2, 3)), np.zeros((2, 4)), np.zeros(2, bool), Contacts.none(), body=[1, 0])
 
 
+@pytest.mark.slow
 def test_nothing_holds_a_model_whose_bodies_are_gone(client: Any) -> None:
     """What was computed of it goes with it: tables, resonators, and what functions remember."""
     gc.collect()  # what other tests left

@@ -76,6 +76,7 @@ def test_a_microphone_hears_nothing_before_the_sound_has_travelled() -> None:
     assert abs(onset(signal) - arrival) < 12
 
 
+@pytest.mark.slow
 def test_the_level_is_the_radiation_law() -> None:
     """Peak of the ringing: |weight| · Uᵀj · pulse spectrum / r, with the weight of `radiation` per modal velocity."""
     body = box_body(EDGES_M, (1500.0,))

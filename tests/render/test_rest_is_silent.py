@@ -89,6 +89,7 @@ def test_a_body_at_rest_is_not_struck(shape: str, restitution: float, step_s: fl
     assert hits(events, 1.7) == []
 
 
+@pytest.mark.slow
 @parametrize_few(
     ("shape", "restitution", "step_hz"),
     [("bar", 0.7, 1000), ("box", 0.7, 1000), ("plate", 0.7, 1000), ("plate", 0.8, 1000), ("plate", 0.8, 500)],

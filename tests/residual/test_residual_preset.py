@@ -162,6 +162,7 @@ def clip(seconds: float = 1.0) -> np.ndarray:
     return damped(SOURCE.freq_hz, SOURCE.decay_per_s, 0.2 * SOURCE.amplitude, round(seconds * SR), SR)
 
 
+@pytest.mark.slow
 def test_a_purely_modal_clip_of_the_model_leaves_nothing() -> None:
     """Residual energy at most -40 dB of the clip's, features found, not given: 24 modes with six pairs too close to
     be told apart, noise 80 dB below the peak.
@@ -218,6 +219,7 @@ def test_what_modes_lack_is_left_and_what_they_have_is_not() -> None:
     assert noise == pytest.approx(float((burst**2).sum() / SR), rel=0.5)
 
 
+@pytest.mark.slow
 def test_a_recording_without_shape_has_its_features_for_modes(tmp_path: Path) -> None:
     sound = (
         clip()
@@ -233,6 +235,7 @@ def test_a_recording_without_shape_has_its_features_for_modes(tmp_path: Path) ->
     write_audio(str(tmp_path / "tap.wav"), sound[None], SR)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_preset_that_plays(tmp_path: Path) -> None:
     from click.testing import CliRunner
 

@@ -216,6 +216,7 @@ def bodies() -> tuple[StruckModes, StruckModes]:
     return made[0], made[1]
 
 
+@pytest.mark.slow
 def test_a_plates_residual_on_a_bunny_follows_its_modes(bodies: tuple[StruckModes, StruckModes]) -> None:
     """Other shapes: dominant modes in pairs from low to high; finite; in each neighbourhood the residual's energy is to
     the mode's as it was.

@@ -104,6 +104,7 @@ def test_a_client_id_and_the_hook_hear_the_same(client: Any) -> None:
     listener.detach()
 
 
+@pytest.mark.slow
 def test_the_raw_module_is_stepped_by_hand() -> None:
     """In a process of its own: the module's default client is number 0."""
     script = """

@@ -156,6 +156,7 @@ def replayed(log: ContactLog, quench_s: float) -> np.ndarray:
     return synth.sound()
 
 
+@pytest.mark.slow
 def test_a_settled_pile_is_silent(pile: Pile) -> None:
     """What follows a quench one second after the last strike stays 100 dB below the loudest moment."""
     last = last_strike_s(pile.log)
@@ -219,6 +220,7 @@ def parted(step: sb.Step, key: int) -> sb.Step:
     return replace(step, contacts=sb.Contacts.of(row[pair != key]))
 
 
+@pytest.mark.slow
 def test_every_impact_is_an_onset_in_the_sound(pile: Pile) -> None:
     """At the microphone: without the pair's contacts the sound is the same to the bit until an impact, and another from
     then on.

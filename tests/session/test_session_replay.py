@@ -71,6 +71,7 @@ def test_a_saved_log_sounds_the_same_bits(log_and_sound: tuple[Path, np.ndarray]
     np.testing.assert_array_equal(sb.render_log(sb.read_log(str(path))), sound)
 
 
+@pytest.mark.slow
 def test_it_sounds_the_same_bits_in_a_process_without_pybullet(log_and_sound: tuple[Path, np.ndarray]) -> None:
     path, sound = log_and_sound
     script = """

@@ -103,6 +103,7 @@ def test_a_reset_listener_gives_the_bytes_of_a_fresh_one(episode: Any, removed: 
     assert [one == two for one, two in zip(fresh, again, strict=True)] == [True] * 64
 
 
+@pytest.mark.slow
 def test_after_a_reset_there_is_no_frame_until_a_step(client: Any) -> None:
     bars = made(client)
     listener = sb.attach(client, **HOW)

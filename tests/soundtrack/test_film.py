@@ -146,6 +146,7 @@ def test_the_chosen_camera_takes_in_what_moves() -> None:
         chosen_camera(log, found, (1, 1, 1), (1, 1, 1))
 
 
+@pytest.mark.slow
 def test_a_film_has_its_sound_and_follows(tmp_path: Path) -> None:
     log = table_log()
     look = FilmLook(fps=Fraction(25), size=(160, 90), follow="marble")

@@ -154,6 +154,7 @@ def test_two_bodies_without_a_voice_are_said_to_have_none() -> None:
     assert {one.reason for one in events} == {NO_VOICE}
 
 
+@pytest.mark.slow
 def test_events_are_those_that_the_run_time_plays() -> None:
     """Every pulse is in one impact, and no impact has none."""
     log = table_log()

@@ -80,6 +80,7 @@ def fitted(sound: Array, freq_hz: float, first: int) -> complex:
     return complex(real, imag)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [0.2, 1.0, 3.4567, 51.3, 999.0])
 @pytest.mark.parametrize("freq", [200.0, 5000.0])
 def test_level_falls_as_one_over_r_and_arrives_within_a_hundredth_of_a_sample(distance: float, freq: float) -> None:
@@ -105,6 +106,7 @@ def test_the_passband_is_flat_within_a_tenth_of_a_db_to_18_khz() -> None:
             assert abs(level) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [-30.0, -3.0, 3.0, 30.0, 100.0])
 def test_doppler_shift_is_exact(speed: float) -> None:
     """Receding at v along the line of sight: f/(1 + v/c) [Pierce 1989, sec. 9-1 for a moving source]."""

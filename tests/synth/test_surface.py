@@ -67,6 +67,7 @@ def rung(force: Array) -> Array:
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_level_follows_the_measured_laws(name: str) -> None:
     """Level ∝ roughness^m speed^n with m in 0.63 … 1.16 and n in 0.5 … 0.96, each independent of the other quantity."""
