@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         MicrophonePath,
         ModalModel,
         ModalSum,
+        Room,
         Shape,
         Vibrometer,
     )
@@ -53,6 +54,7 @@ _HOME = {
     "MicrophonePath": "records",
     "ModalModel": "records",
     "ModalSum": "records",
+    "Room": "records",
     "Shape": "records",
     "SonicBulletError": "records.errors",
     "Step": "records.contacts",
@@ -83,6 +85,7 @@ __all__ = [
     "MicrophonePath",
     "ModalModel",
     "ModalSum",
+    "Room",
     "Shape",
     "SonicBulletError",
     "Step",

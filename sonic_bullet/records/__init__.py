@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         ShapeKind,
         isotropic_stiffness_pa,
     )
-    from sonic_bullet.records.receivers import Head, MicrophonePath
+    from sonic_bullet.records.receivers import Head, MicrophonePath, Room
     from sonic_bullet.records.residual import Residual
     from sonic_bullet.records.sensors import (
         Air,
@@ -50,6 +50,7 @@ __all__ = [
     "ModalModel",
     "ModalSum",
     "Residual",
+    "Room",
     "Sensor",
     "Shape",
     "ShapeKind",
@@ -74,6 +75,7 @@ _HOME = {
     "ModalSum": "sensors",
     "ORTHOTROPIC": "bodies",
     "Residual": "residual",
+    "Room": "receivers",
     "Sensor": "sensors",
     "Shape": "bodies",
     "ShapeKind": "bodies",

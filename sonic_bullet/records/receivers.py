@@ -1,4 +1,4 @@
-"""What microphones need that move, turn or have ears: a path in time, and a head's responses."""
+"""What microphones need that move, have ears or stand in a room: a path in time, a head's responses, walls."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ import numpy as np
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_text, as_whole
 
+LEAST_ROOM_M, MOST_ROOM_M = 0.1, 200.0
+"""A box for shoes, and the nave of a cathedral."""
+MOST_OCTAVES = 8
+"""125 Hz to 16 kHz."""
 AHEAD_XYZW = np.array([0.0, 0.0, 0.0, 1.0])
 """Turned nowhere: x is ahead, y left, z up, in the world as in ambiX and in SOFA files."""
 
@@ -82,3 +86,35 @@ class Head:
             sr=as_whole(self.sr, "head: sr", "give the rate in Hz", least=1000, most=1_000_000),
             name=as_text(self.name, "head: name", "give a text"),
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """A box around a scene, whose walls send sound back.
+
+    size_m (3,): along x, y and z; absorption (b,): the fraction of energy that all walls keep, above 0 and at most 1,
+    one number, or one an octave from 125 Hz on, the last for all above; corner_m (3,): its corner of least x, y and z,
+    None: round what sounds and hears, its floor beneath.
+    """
+
+    size_m: Array
+    absorption: Array = 0.2  # type: ignore[assignment]  # a number stands for all octaves
+    corner_m: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        size = frozen_array(self.size_m, float, (3,), "room: size_m")
+        remedy = "give metres along x, y and z, such as 6, 4, 3"
+        require(bool((size >= LEAST_ROOM_M).all() and (size <= MOST_ROOM_M).all()), "room: size_m is no room's", remedy)
+        alpha = frozen_array(np.ravel(_numbers(self.absorption)), float, (None,), "room: absorption")
+        octaves = f"give one number above 0 and at most 1, or up to {MOST_OCTAVES}, one an octave from 125 Hz on"
+        require(0 < len(alpha) <= MOST_OCTAVES, f"room: absorption has {len(alpha)} numbers", octaves)
+        require(bool(((alpha > 0) & (alpha <= 1)).all()), "room: absorption is not above 0 and at most 1", octaves)
+        store(self, size_m=size, absorption=alpha)
+        if self.corner_m is not None:
+            store(self, corner_m=frozen_array(self.corner_m, float, (3,), "room: corner_m"))
+
+
+def _numbers(value: object) -> object:
+    """Let one number be a list of one."""
+    return [value] if isinstance(value, (int, float)) and not isinstance(value, bool) else value

@@ -19,12 +19,14 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Microphone, channels_of
+from sonic_bullet.records import Air, Array, Microphone, Room
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import LogError, SonicBulletError
 from sonic_bullet.render.ringing_on import TAIL_DB, as_tail_db
+from sonic_bullet.render.room.room_convolution import add_room, keep_with_room
+from sonic_bullet.render.room.room_plan import RoomPlan, plan_room
 from sonic_bullet.render.silence import body_notes, render_notes, silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
@@ -54,6 +56,7 @@ def render_log(
     *,
     sr: int | None = None,
     residual: bool | None = None,
+    room: Room | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
@@ -66,6 +69,8 @@ def render_log(
     ----------
     residual
         Whether materials' residuals sound, None: as the log says.
+    room
+        A room around it; None: free air.
     progress
         Called with the fraction done.
     say
@@ -77,8 +82,10 @@ def render_log(
         The rate is impossible.
     LogError
         ``log`` is no log.
+    SceneError
+        The room is smaller than what is in it.
     """
-    blocks = [*render_blocks(log, sr=sr, residual=residual, progress=progress, say=say)]
+    blocks = [*render_blocks(log, sr=sr, residual=residual, room=room, progress=progress, say=say)]
     return np.ascontiguousarray(np.concatenate(blocks, axis=1))
 
 
@@ -87,6 +94,7 @@ def render_blocks(
     *,
     sr: int | None = None,
     residual: bool | None = None,
+    room: Room | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[Array]:
@@ -95,7 +103,11 @@ def render_blocks(
     Arguments and errors: as of `render_log`; arguments are checked at once.
     """
     log, residual = _checked(log, sr, residual, progress, say)
-    return _blocks(log, _synthesizer(log, residual), progress, say)
+    if room is None:
+        return _blocks(log, _synthesizer(log, residual), progress, say)
+    plan = plan_room(as_kind(room, Room, "room", "give a Room, such as Room([6, 4, 3])"), log)
+    log = replace(log, sensors=plan.sensors)
+    return add_room(plan, _blocks(log, _synthesizer(log, residual, plan.mixing), progress, say))
 
 
 def _checked(log: ContactLog, sr: object, residual: object, progress: Any, say: Any) -> tuple[ContactLog, bool]:
@@ -118,12 +130,13 @@ def render_kept(
     sr: int | None = None,
     residual: bool | None = None,
     tail_db: float | None = None,
+    plan: RoomPlan | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> KeptSound:
     """Render a contact log, beyond a few seconds into a nameless temporary file.
 
-    Arguments: as of `render_log`, and tail_db: ring on after the last step until that far below the peak, -60 say, at
+    Arguments: as of `render_log`, plan of the room around it (room_plan.py), and tail_db: ring on after the last step until that far below the peak, -60 say, at
     most 10 s; None, 0: end with it.
 
     Raises
@@ -134,14 +147,21 @@ def render_kept(
     """
     tail_db = as_tail_db(tail_db)
     log, residual = _checked(log, sr, residual, progress, say)
-    spool, synth = SoundSpool(channels_of(log.sensors)), _synthesizer(log, residual)
+    if plan is not None:
+        log = replace(log, sensors=plan.sensors)
+    synth = _synthesizer(log, residual, None if plan is None else plan.mixing)
+    spool = SoundSpool(synth.channels)
     try:
         for block in _blocks(log, synth, progress, say):
             if spool.tail[0]:
                 spool.add(block)
-        return synth.with_tail(spool.kept(), tail_db) if spool.tail[0] else KeptSound.of(block)
+        sound = spool.kept() if spool.tail[0] else KeptSound.of(block)
+        if plan is None:
+            return synth.with_tail(sound, tail_db) if spool.tail[0] else sound
+        longer_s = plan.ring_s(tail_db) if tail_db is not None else 0.0
+        return keep_with_room(plan, synth.with_tail(sound, tail_db, longer_s), tail_db, sound.shape[1])
     except (SonicBulletError, KeyboardInterrupt) as error:
-        error.kept = spool.kept()  # type: ignore[union-attr]
+        error.kept = spool.kept() if plan is None else keep_with_room(plan, spool.kept())  # type: ignore[union-attr]
         raise
 
 
@@ -161,10 +181,11 @@ def _blocks(
     yield synth.rest()
 
 
-def _synthesizer(log: ContactLog, residual: bool) -> Synthesizer:
+def _synthesizer(log: ContactLog, residual: bool, mixing: Array | None = None) -> Synthesizer:
     return Synthesizer(
-        sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, supports=log.supports, keep=False
-    )
+        sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, supports=log.supports,
+        mixing=mixing, keep=False,
+    )  # fmt: skip
 
 
 def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:

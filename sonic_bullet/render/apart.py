@@ -29,6 +29,7 @@ def render_apart(
     sr: int | None = None,
     frames: int | None = None,
     witness: Witness | None = None,
+    mixing: Array | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[Array, Array]]:
@@ -43,6 +44,8 @@ def render_apart(
         Number of samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end.
     witness
         Observer that is called with every step.
+    mixing
+        As of `Setup`.
     progress, say
         As of `render_log`, and so are errors.
     """
@@ -51,7 +54,9 @@ def render_apart(
 
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     make_radiation_known(log, say)
-    setup = Setup(log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports)
+    setup = Setup(
+        log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports, mixing=mixing
+    )
     state = start(setup)
     state.witness = witness
     quenches, done, looked, last = quenched_steps(log), 0, 0, None

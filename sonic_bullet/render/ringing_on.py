@@ -60,10 +60,12 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
         yield advance(setup, state, [step] * max(1, round(BLOCK_S / step.dt_s)))
 
 
-def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, tail_db: float) -> KeptSound:
+def with_tail(
+    sound: KeptSound, setup: Setup, state: State, last: Step | None, tail_db: float, longer_s: float = 0.0
+) -> KeptSound:
     """Extend the sound up to the end of ``last`` by its tail, until each channel is tail_db below its peak.
 
-    At most `MOST_S` longer.
+    At most `MOST_S` longer; longer_s: by so much more, for what a room makes of it.
     """
     if last is None or not len(setup.sensors):
         return sound
@@ -77,7 +79,7 @@ def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, t
     loud = bool((_peak(sound.read(max(0, frames - math.ceil(BLOCK_S * setup.sr)), frames)) > weakest * peak).any())
     kept: list[Array] = []
     waiting: list[Array] = []
-    room, silent = round(MOST_S * setup.sr), 0
+    room, silent = round((MOST_S + longer_s) * setup.sr), 0
     for made in ring_on(setup, state, last):
         block = made[:, :room]
         now = _peak(block)
@@ -86,9 +88,9 @@ def with_tail(sound: KeptSound, setup: Setup, state: State, last: Step | None, t
         silent += block.shape[1]
         if (now > weakest * peak).any():
             kept, waiting, silent, loud = [*kept, *waiting], [], 0, True
-        if not room or silent >= quiet_s * setup.sr:
+        if not room or silent >= (quiet_s + longer_s) * setup.sr:
             break
-    kept += waiting[:1] if loud else []
+    kept += waiting if longer_s else waiting[:1] if loud else []
     return KeptSound(sound.spool, sound.count, np.concatenate([sound.rest, *kept], axis=1))
 
 

@@ -36,7 +36,8 @@ class Setup:
     """Constants of listening.
 
     sr in Hz; sensors; residual: whether those of materials sound; supports: whether resting contacts
-    act on modes; apart: whether frames are (b·channels, n), body by body, instead of their sum.
+    act on modes; apart: whether frames are (b·channels, n), body by body, instead of their sum; mixing (channels,
+    channels of the sensors): what of them is summed to what is returned, None: each is.
     """
 
     sr: int
@@ -47,6 +48,7 @@ class Setup:
     residual: bool = True
     apart: bool = False
     supports: bool = True
+    mixing: Array | None = None
 
     @property
     def microphone_m(self) -> Array:
@@ -55,8 +57,8 @@ class Setup:
 
     @property
     def channels(self) -> int:
-        """Number of channels of the sensors."""
-        return channels_of(self.sensors)
+        """Number of channels of what is returned."""
+        return channels_of(self.sensors) if self.mixing is None else len(self.mixing)
 
     @property
     def reads(self) -> Array:

@@ -132,9 +132,11 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     state.taken += len(steps)
     state.clock, state.waiting = clock, waiting
     state.ringing.at = state.travelling.at = stop
-    if state.space is None or not hears_apart(setup.sensors):
+    if state.space is not None and hears_apart(setup.sensors):
+        out = state.space.channels(table, out, pressure, apart=setup.apart)
+    if setup.mixing is None:
         return out
-    return state.space.channels(table, out, pressure, apart=setup.apart)
+    return (setup.mixing @ out.reshape(-1, setup.mixing.shape[1], stop - begin)).reshape(-1, stop - begin)
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
@@ -220,9 +222,11 @@ class Synthesizer:
         air: Air,
         residual: bool = True,
         supports: bool = True,
+        mixing: Array | None = None,
         keep: bool = True,
     ) -> None:
-        self._setup, self._keep = Setup(sr, sensors, seed, air, residual=residual, supports=supports), keep
+        self._setup = Setup(sr, sensors, seed, air, residual=residual, supports=supports, mixing=mixing)
+        self._keep = keep
         self.reset()
 
     def reset(self) -> None:
@@ -241,6 +245,11 @@ class Synthesizer:
     def time_s(self) -> float:
         """Physics time taken in."""
         return self._clock.time_s
+
+    @property
+    def channels(self) -> int:
+        """Number of channels of a frame."""
+        return self._setup.channels
 
     @property
     def lifted(self) -> dict[str, tuple[int, int]]:
@@ -328,11 +337,14 @@ class Synthesizer:
         sound = KeptSound(self._sound, len(self._sound), rest)
         return sound if self.unkept is not None else self.with_tail(sound, tail_db)
 
-    def with_tail(self, sound: KeptSound, tail_db: float | None) -> KeptSound:
-        """Extend the whole sound so far by its tail until it is tail_db below its peak; None: nothing more."""
+    def with_tail(self, sound: KeptSound, tail_db: float | None, longer_s: float = 0.0) -> KeptSound:
+        """Extend the whole sound so far by its tail until it is tail_db below its peak; None: nothing more.
+
+        longer_s: by so much more.
+        """
         if tail_db is None or self._failed is not None:
             return sound
-        return with_tail(sound, self._setup, self._state, self._last, tail_db)
+        return with_tail(sound, self._setup, self._state, self._last, tail_db, longer_s)
 
     def quench(self) -> None:
         """Stop all ringing where the steps taken in so far end, exactly there at any rate.
