@@ -30,8 +30,8 @@ if TYPE_CHECKING:
         MicrophonePath,
         ModalModel,
         ModalSum,
-        Room,
         Shape,
+        ShoeboxRoom,
         Vibrometer,
     )
     from sonic_bullet.records.contacts import Contacts, Step
@@ -54,7 +54,7 @@ _HOME = {
     "MicrophonePath": "records",
     "ModalModel": "records",
     "ModalSum": "records",
-    "Room": "records",
+    "ShoeboxRoom": "records",
     "Shape": "records",
     "SonicBulletError": "records.errors",
     "Step": "records.contacts",
@@ -85,8 +85,8 @@ __all__ = [
     "MicrophonePath",
     "ModalModel",
     "ModalSum",
-    "Room",
     "Shape",
+    "ShoeboxRoom",
     "SonicBulletError",
     "Step",
     "Vibrometer",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         ShapeKind,
         isotropic_stiffness_pa,
     )
-    from sonic_bullet.records.receivers import Head, MicrophonePath, Room
+    from sonic_bullet.records.receivers import Head, MicrophonePath, ShoeboxRoom
     from sonic_bullet.records.residual import Residual
     from sonic_bullet.records.sensors import (
         Air,
@@ -50,10 +50,10 @@ __all__ = [
     "ModalModel",
     "ModalSum",
     "Residual",
-    "Room",
     "Sensor",
     "Shape",
     "ShapeKind",
+    "ShoeboxRoom",
     "Vibrometer",
     "channel_sensors",
     "channels_of",
@@ -75,7 +75,7 @@ _HOME = {
     "ModalSum": "sensors",
     "ORTHOTROPIC": "bodies",
     "Residual": "residual",
-    "Room": "receivers",
+    "ShoeboxRoom": "receivers",
     "Sensor": "sensors",
     "Shape": "bodies",
     "ShapeKind": "bodies",

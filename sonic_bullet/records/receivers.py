@@ -89,7 +89,7 @@ class Head:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Room:
+class ShoeboxRoom:
     """A box around a scene, whose walls send sound back.
 
     size_m (3,): along x, y and z; absorption (b,): the fraction of energy that all walls keep, above 0 and at most 1,
@@ -106,7 +106,7 @@ class Room:
         size = frozen_array(self.size_m, float, (3,), "room: size_m")
         remedy = "give metres along x, y and z, such as 6, 4, 3"
         require(bool((size >= LEAST_ROOM_M).all() and (size <= MOST_ROOM_M).all()), "room: size_m is no room's", remedy)
-        alpha = frozen_array(np.ravel(_numbers(self.absorption)), float, (None,), "room: absorption")
+        alpha = frozen_array(_numbers(self.absorption), float, (None,), "room: absorption")
         octaves = f"give one number above 0 and at most 1, or up to {MOST_OCTAVES}, one an octave from 125 Hz on"
         require(0 < len(alpha) <= MOST_OCTAVES, f"room: absorption has {len(alpha)} numbers", octaves)
         require(bool(((alpha > 0) & (alpha <= 1)).all()), "room: absorption is not above 0 and at most 1", octaves)

@@ -19,7 +19,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Microphone, Room
+from sonic_bullet.records import Air, Array, Microphone, ShoeboxRoom, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.counts import format_count
@@ -56,7 +56,7 @@ def render_log(
     *,
     sr: int | None = None,
     residual: bool | None = None,
-    room: Room | None = None,
+    room: ShoeboxRoom | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
@@ -94,7 +94,7 @@ def render_blocks(
     *,
     sr: int | None = None,
     residual: bool | None = None,
-    room: Room | None = None,
+    room: ShoeboxRoom | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[Array]:
@@ -105,7 +105,7 @@ def render_blocks(
     log, residual = _checked(log, sr, residual, progress, say)
     if room is None:
         return _blocks(log, _synthesizer(log, residual), progress, say)
-    plan = plan_room(as_kind(room, Room, "room", "give a Room, such as Room([6, 4, 3])"), log)
+    plan = plan_room(as_kind(room, ShoeboxRoom, "room", "give a ShoeboxRoom, such as ShoeboxRoom([6, 4, 3])"), log)
     log = replace(log, sensors=plan.sensors)
     return add_room(plan, _blocks(log, _synthesizer(log, residual, plan.mixing), progress, say))
 
@@ -136,8 +136,8 @@ def render_kept(
 ) -> KeptSound:
     """Render a contact log, beyond a few seconds into a nameless temporary file.
 
-    Arguments: as of `render_log`, plan of the room around it (room_plan.py), and tail_db: ring on after the last step until that far below the peak, -60 say, at
-    most 10 s; None, 0: end with it.
+    Arguments: as of `render_log`, and plan: of the room around it (room_plan.py), and tail_db: ring on after the last
+    step until that far below the peak, -60 say, at most 10 s; None, 0: end with it.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def render_kept(
     if plan is not None:
         log = replace(log, sensors=plan.sensors)
     synth = _synthesizer(log, residual, None if plan is None else plan.mixing)
-    spool = SoundSpool(synth.channels)
+    spool = SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing))
     try:
         for block in _blocks(log, synth, progress, say):
             if spool.tail[0]:

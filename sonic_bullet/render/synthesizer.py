@@ -247,11 +247,6 @@ class Synthesizer:
         return self._clock.time_s
 
     @property
-    def channels(self) -> int:
-        """Number of channels of a frame."""
-        return self._setup.channels
-
-    @property
     def lifted(self) -> dict[str, tuple[int, int]]:
         """Steps with contact separation, see `presence.lifted`."""
         return lifted(self._state)

@@ -25,6 +25,8 @@ from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records import channels_of
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.apart import render_apart
+from sonic_bullet.render.room.room_convolution import keep_with_room
+from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.synthesis_state import Witness
 
 NAME_LENGTH = 60
@@ -46,24 +48,33 @@ def render_stems(
     sr: int | None = None,
     frames: int | None = None,
     witness: Witness | None = None,
+    plan: RoomPlan | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> tuple[Stem, ...]:
     """Render the sound of every body with a model, all in one run; the sum is `render_log`'s.
 
-    Beyond a few seconds it lies in nameless temporary files. Arguments, errors: as of `render_apart`; AudioError where
-    there is no microphone.
+    Beyond a few seconds it lies in nameless temporary files. Arguments, errors: as of `render_apart`, and plan of the
+    room around it; AudioError where there is no microphone.
     """
     if not log.sensors:
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
     who = [index for index, body in enumerate(log.bodies) if body.model is not None]
-    spools = {index: SoundSpool(channels_of(log.sensors)) for index in who}
-    for body, frame in render_apart(log, sr=sr, frames=frames, witness=witness, progress=progress, say=say):
+    mixing, sounding = None, log
+    if plan is not None:
+        mixing, sounding = plan.mixing, replace(log, sensors=plan.sensors)
+    spools = {index: SoundSpool(channels_of(log.sensors) if mixing is None else len(mixing)) for index in who}
+    for body, frame in render_apart(
+        sounding, sr=sr, frames=frames, witness=witness, mixing=mixing, progress=progress, say=say
+    ):
         there = dict(zip(body.tolist(), frame, strict=True))
         nothing = np.zeros(frame.shape[1:])
         for index, spool in spools.items():
             spool.add(there.get(index, nothing))
-    return tuple(Stem(index, stem_name(index, log.bodies[index].name), spools[index].kept()) for index in who)
+    sounds = {index: spool.kept() for index, spool in spools.items()}
+    if plan is not None:
+        sounds = {index: keep_with_room(plan, sound) for index, sound in sounds.items()}
+    return tuple(Stem(index, stem_name(index, log.bodies[index].name), sounds[index]) for index in who)
 
 
 def stem_name(index: int, name: str) -> str:

@@ -254,6 +254,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "MicrophonePath": lambda *_: (sb.MicrophonePath, ALONG),
     "ModalModel": lambda *_: (sb.ModalModel, MODEL),
     "ModalSum": lambda *_: (sb.ModalSum, {"scale": 1}),
+    "ShoeboxRoom": lambda *_: (sb.ShoeboxRoom, {"size_m": [6, 4, 3], "absorption": 0.2, "corner_m": None}),
     "Shape": lambda *_: (sb.Shape, SHAPE),
     "Step": lambda *_: (sb.Step, STEP),
     "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
@@ -270,7 +271,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "read_log": reading_log,
     "render_log": lambda *_: (
         sb.render_log,
-        {"log": sb.ContactLog(**LOG), "sr": None, "residual": True, "progress": None, "say": None},
+        {"log": sb.ContactLog(**LOG), "sr": None, "residual": True, "room": None, "progress": None, "say": None},
     ),
     "render_scene": scene_file,
     "write_audio": lambda _, folder: (
@@ -471,10 +472,16 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "read_baked": {"path": PATH},
     "read_head": {"path": PATH},
     "read_log": {"path": PATH},
+    "ShoeboxRoom": {
+        "size_m": [*ARRAY, [6, 4], [6, 4, 0]],
+        "absorption": [*ARRAY, 0, 1.1, [0.1] * 9],
+        "corner_m": [value for value in ARRAY if value is not None],
+    },
     "render_log": {
         "log": [*RECORD, None],
         "sr": [*OPTIONAL, 0],
         "residual": ["no", 0, 1.0],
+        "room": RECORD,
         "progress": CALL,
         "say": CALL,
     },

@@ -8,6 +8,7 @@ import click
 
 from sonic_bullet.cli.examples import RENDER_EPILOG
 from sonic_bullet.cli.parameters import json_option, scene_options
+from sonic_bullet.cli.scenes.room_options import room_options
 from sonic_bullet.cli.scenes.space_options import space_options
 from sonic_bullet.cli.scenes.take_options import take_options
 from sonic_bullet.cli.sound_level import level_options
@@ -55,6 +56,7 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 @session_options
 @take_options
 @space_options
+@room_options
 def render(**options: Any) -> None:
     """Run a PyBullet scene, or replay a contact log, to a sound file."""
     from sonic_bullet.cli.scenes.scene_commands import run_render

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, write_json
 from sonic_bullet.cli.scenes.render_outputs import RenderOutputs, with_partial
+from sonic_bullet.cli.scenes.room_options import OPTIONS as ROOM_OPTIONS
+from sonic_bullet.cli.scenes.room_options import read_room
 from sonic_bullet.cli.scenes.scene_runs import (
     Replay,
     WantedMaterials,
@@ -67,6 +69,7 @@ def run_render(
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
     space = SpaceWish.read(**{name: others.pop(name) for name in SPACE_OPTIONS})
+    room = read_room(**{name: others.pop(name) for name in ROOM_OPTIONS})
     takes = TakesWish.read(**{name: others.pop(name) for name in TAKE_OPTIONS})
     session = SessionWish(**{name: others.pop(name) for name in SESSION_OPTIONS}).checked(others["stems"])
     if output is None and session.folder is None:
@@ -89,10 +92,10 @@ def run_render(
                 wish = Wish(
                     seconds, rate, microphones, seed, materials, residual, supports, progress, tell,
                     at_end=standing_collector(standing) if session.film_fps is not None else None,
-                    tail_db=level.tail_db,
+                    tail_db=level.tail_db, room=room,
                 )  # fmt: skip
                 result: RenderResult | Replay
-                if not takes and not space:
+                if not takes and not space and room is None:
                     result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
                 else:
                     log, said = _log_of(scene, wish, space)
@@ -115,7 +118,7 @@ def _log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple
     if is_log(scene):
         log, _, said = prepared(scene, wish)
     else:
-        result = simulated(scene, replace(wish, tail_db=0.0))
+        result = simulated(scene, replace(wish, tail_db=0.0, room=None))
         log, said = result.log, result.notes
     if not space:
         return log, said

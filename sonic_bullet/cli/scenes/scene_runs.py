@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.files.rows.spool import KeptSound
     from sonic_bullet.listener.pictures import Standing
+    from sonic_bullet.records import ShoeboxRoom
+    from sonic_bullet.render.room.room_plan import RoomPlan
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
     from sonic_bullet.session.material_choice import MaterialChoice
@@ -80,6 +82,7 @@ class Wish:
     say: Callable[[str], None]
     at_end: Callable[[Listener], object] | None = None
     tail_db: float | None = None
+    room: ShoeboxRoom | None = None
 
 
 def is_log(scene: str) -> bool:
@@ -138,6 +141,7 @@ class Replay:
     log: ContactLog
     sr: int
     notes: tuple[str, ...] = ()
+    plan: RoomPlan | None = None
 
 
 def replayed(path: str, wish: Wish) -> Replay:
@@ -176,11 +180,15 @@ def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
 def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
     """Render a log as it is."""
     from sonic_bullet.render import render_kept, render_notes
+    from sonic_bullet.render.room.room_plan import plan_room
 
-    rate = wish.rate or log.sr
+    rate, plan = wish.rate or log.sr, None
+    if wish.room is not None:
+        plan = plan_room(wish.room, replace(log, sr=rate))
+        said = (*said, plan.note)
     try:
-        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, progress=wish.progress, say=wish.say)
+        sound = render_kept(log, sr=rate, tail_db=wish.tail_db, plan=plan, progress=wish.progress, say=wish.say)
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise
-    return Replay(sound, log, rate, (*said, *render_notes(sound, log)))
+    return Replay(sound, log, rate, (*said, *render_notes(sound, log)), plan)

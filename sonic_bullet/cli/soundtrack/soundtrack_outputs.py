@@ -122,7 +122,10 @@ class SoundtrackWish:
             events = find_sound_events(log, sr=sr, progress=progress, say=say)
             return Soundtrack(self, log, sr, (), events, events_to)
         witness = EventWitness(log) if wanted else None
-        stems = render_stems(log, sr=sr, frames=result.sound.shape[1], witness=witness, progress=progress, say=say)
+        stems = render_stems(
+            log, sr=sr, frames=result.sound.shape[1], witness=witness, plan=getattr(result, "plan", None),
+            progress=progress, say=say,
+        )  # fmt: skip
         return Soundtrack(self, log, sr, stems, witness.events() if witness is not None else (), events_to)
 
 

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sonic_bullet.machine.while_alive import WhileAlive
-from sonic_bullet.records import Ambisonics, Array, Binaural, Head, Microphone, Room
+from sonic_bullet.records import Ambisonics, Array, Binaural, Head, Microphone, ShoeboxRoom
 from sonic_bullet.records.errors import AudioError
 
 EXTRA = "pip install 'sonic_bullet[room]'"
@@ -34,7 +34,7 @@ class Images(NamedTuple):
     order: Array
 
 
-def find_images(room: Room, corner_m: Array, centre_m: Array, radius_m: float) -> Images:
+def find_images(room: ShoeboxRoom, corner_m: Array, centre_m: Array, radius_m: float) -> Images:
     """Find images of points of a room at which ``centre_m`` (3,) lies within radius_m of its own image.
 
     Raises AudioError where pyroomacoustics is missing.
@@ -70,7 +70,7 @@ def mirrored(microphone: Microphone, sign: Array, offset_m: Array) -> tuple[Micr
     if path is not None:
         also = None if path.quaternion_xyzw is None else _turn(path.quaternion_xyzw, sign, odd)
         path = replace(path, position_m=place(path.position_m), quaternion_xyzw=also)
-    at = None if path is not None else place(microphone.position_m)
+    at: Any = None if path is not None else place(microphone.position_m)
     made = replace(microphone, path=path, position_m=at, quaternion_xyzw=_turn(turned, sign, odd))
     signs = np.ones(microphone.channels)
     if odd and isinstance(made, Binaural):

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Microphone, Room
+from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Microphone, ShoeboxRoom
 from sonic_bullet.render.space.ambisonic_encoding import harmonics
 from sonic_bullet.render.space.ear_filters import MARGIN, ear_filters
 
@@ -33,12 +33,12 @@ LONGEST_S = 30.0
 EARLY_TAPS = 512
 
 
-def reverberation_time_s(room: Room, air: Air) -> Array:
+def reverberation_time_s(room: ShoeboxRoom, air: Air) -> Array:
     """Compute Eyring's T60 (bands,) of a room, 0 where its walls keep all."""
     return np.asarray(3 * np.log(10) / np.maximum(_decay(room, air), 1e-12)) * (room.absorption < 1)
 
 
-def _decay(room: Room, air: Air) -> Array:
+def _decay(room: ShoeboxRoom, air: Air) -> Array:
     """Compute δ (bands,) in 1/s."""
     x, y, z = room.size_m
     surface, volume = 2 * (x * y + y * z + z * x), x * y * z
@@ -49,10 +49,10 @@ def _decay(room: Room, air: Air) -> Array:
 def band_weights(frequency_hz: Array, bands: int) -> Array:
     """Compute how much of each band is in frequencies: (bands, f), 1 in sum."""
     place = np.clip(np.log2(np.maximum(frequency_hz, 1e-3) / LOWEST_HZ), 0, bands - 1)
-    return np.maximum(0, 1 - np.abs(place - np.arange(bands)[:, None]))
+    return np.asarray(np.maximum(0, 1 - np.abs(place - np.arange(bands)[:, None])))
 
 
-def early_filters(room: Room, orders: Array, sr: int) -> Array:
+def early_filters(room: ShoeboxRoom, orders: Array, sr: int) -> Array:
     """Make filters (g, t) of so many reflections each: of least phase, for a wall sends nothing back ahead of time."""
     size = 4 * EARLY_TAPS
     alpha = room.absorption @ band_weights(np.fft.rfftfreq(size, 1 / sr), len(room.absorption))
@@ -64,7 +64,7 @@ def early_filters(room: Room, orders: Array, sr: int) -> Array:
 
 
 def late_filters(
-    room: Room, air: Air, receivers: Sequence[tuple[Microphone, int]], channels: int, sr: int, begin_s: float
+    room: ShoeboxRoom, air: Air, receivers: Sequence[tuple[Microphone, int]], channels: int, sr: int, begin_s: float
 ) -> Array:
     """Make filters (channels, 4, t) from the four far microphones, times their distance, to channels of receivers."""
     longest_s = min(float(reverberation_time_s(room, air).max()) * DECAY_DB / 60, LONGEST_S)
@@ -87,7 +87,9 @@ def late_filters(
             for microphone, first in receivers:
                 early_s = direction @ (microphone.position_m - middle) / air.sound_speed_m_s
                 here = wave if early_s == 0 else wave * np.exp(2j * np.pi * early_s * frequency_hz)
-                spectrum[first : first + microphone.channels] += here * _heard(microphone, direction, frequency_hz, sr)
+                spectrum[first : first + microphone.channels] += here * _response_of(
+                    microphone, direction, frequency_hz, sr
+                )
         for band, rate in enumerate(decay):
             if np.isfinite(rate):
                 noise = np.fft.irfft(spectrum * weights[band], size)[:, :taps]
@@ -95,7 +97,7 @@ def late_filters(
     return made
 
 
-def _heard(microphone: Microphone, direction: Array, frequency_hz: Array, sr: int) -> Array:
+def _response_of(microphone: Microphone, direction: Array, frequency_hz: Array, sr: int) -> Array:
     """Compute what each channel hears of a plane wave from a direction (3,): (channels, f), or (channels, 1)."""
     from scipy.spatial.transform import Rotation
 
@@ -106,8 +108,8 @@ def _heard(microphone: Microphone, direction: Array, frequency_hz: Array, sr: in
         return weight[: microphone.channels, None]
     if isinstance(microphone, Binaural):
         response = ear_filters(microphone.head, sr).at(away[None])[0]
-        turn = np.exp(-2j * np.pi / sr * frequency_hz * (np.arange(response.shape[1])[:, None] - MARGIN))
-        return np.asarray(response @ turn)
+        size = 2 * (len(frequency_hz) - 1)
+        return np.asarray(np.fft.rfft(response, size) * np.exp(2j * np.pi * MARGIN / sr * frequency_hz))
     return np.ones((1, 1))
 
 

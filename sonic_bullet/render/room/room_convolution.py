@@ -1,6 +1,6 @@
 """Rows of a `RoomPlan` through its filters: overlap-add in pieces of one length, however the sound comes in.
 
-    out_c = own_c + Σ_g early_g * row_gc + Σ_f late_cf * far_f        [Oppenheim & Schafer 1989, sec. 8.9.3]
+out_c = own_c + Σ_g early_g * row_gc + Σ_f late_cf * far_f        [Oppenheim & Schafer 1989, sec. 8.9.3]
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def add_room(plan: RoomPlan, blocks: Iterable[Array]) -> Iterator[Array]:
         n = piece.shape[1]
         rows = rfft(piece[own:], size)
         groups = rows[: len(early) * own].reshape(len(early), own, rows.shape[1])
-        heard = np.einsum("cfk,fk->ck", late, rows[len(early) * own :]) + np.einsum("gk,gck->ck", early, groups)
-        made = irfft(heard, size)[:, : n + taps - 1]
+        spectrum = np.einsum("cfk,fk->ck", late, rows[len(early) * own :]) + np.einsum("gk,gck->ck", early, groups)
+        made = irfft(spectrum, size)[:, : n + taps - 1]
         made[:, : taps - 1] += carried
         carried = made[:, n:]
         yield piece[:own] + made[:, :n]
@@ -53,8 +53,13 @@ def in_pieces(blocks: Iterable[Array], length: int) -> Iterator[Array]:
         yield np.concatenate(held, axis=1)
 
 
-def keep_with_room(plan: RoomPlan, sound: KeptSound, tail_db: float | None = None, frames: int | None = None) -> KeptSound:
-    """Filter a sound of rows; with tail_db what follows its first ``frames`` ends that far below each channel's peak."""
+def keep_with_room(
+    plan: RoomPlan, sound: KeptSound, tail_db: float | None = None, frames: int | None = None
+) -> KeptSound:
+    """Filter a sound of rows.
+
+    With tail_db what follows its first ``frames`` ends that far below each channel's peak.
+    """
     spool = SoundSpool(plan.channels)
     for block in add_room(plan, sound.blocks()):
         spool.add(np.ascontiguousarray(block))

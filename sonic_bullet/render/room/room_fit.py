@@ -1,8 +1,8 @@
 """Where a room lies, and whether all that sounds and hears is in it.
 
-    poses of the log, at most `MOMENTS` of them, and hulls of bodies -> box of each body over the run
-        -> no corner given: middle of all boxes and microphones above the middle of the floor, the lowest on it
-        -> each box within the walls, or an error that names what is not
+poses of the log, at most `MOMENTS` of them, and hulls of bodies -> box of each body over the run
+    -> no corner given: middle of all boxes and microphones above the middle of the floor, the lowest on it
+    -> each box within the walls, or an error that names what is not
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.records import Array, Microphone, Room
+from sonic_bullet.records import Array, Microphone, ShoeboxRoom
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import with_body_id
 
@@ -30,7 +30,7 @@ class RoomPlace(NamedTuple):
     reach_m: float
 
 
-def place_room(room: Room, log: ContactLog, microphones: Sequence[Microphone]) -> RoomPlace:
+def place_room(room: ShoeboxRoom, log: ContactLog, microphones: Sequence[Microphone]) -> RoomPlace:
     """Place a room round a log. Raises SceneError where it is smaller than what is in it."""
     named: list[tuple[str, Array]] = []
     for index, box in sorted(body_boxes(log).items()):

@@ -1,8 +1,8 @@
 """What a log is rendered with so that a room is heard: more sensors, what of them is summed, and filters of the sums.
 
-    sensors: own | images of each microphone | four far ones
-    rows = mixing @ channels: own, with images whose walls are the same at all frequencies | early: those of g reflections
-        for each own channel | far
+sensors: own | images of each microphone | four far ones
+rows = mixing @ channels: own, with images whose walls are the same at all frequencies | early: those of g reflections
+    for each own channel | far
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.records import Array, Microphone, Room, Sensor, channels_of
+from sonic_bullet.records import Array, Microphone, Sensor, ShoeboxRoom, channels_of
 from sonic_bullet.render.room.image_microphones import find_images, mirrored, own_channels
 from sonic_bullet.render.room.late_field import TETRAHEDRON, early_filters, late_filters, reverberation_time_s
 from sonic_bullet.render.room.room_fit import place_room
@@ -42,14 +42,14 @@ class RoomPlan:
     @property
     def taps(self) -> int:
         """Length of the longest filter."""
-        return max(1, self.early.shape[-1] * bool(len(self.early)), self.late.shape[-1])
+        return int(max(1, self.early.shape[-1] * bool(len(self.early)), self.late.shape[-1]))
 
     def ring_s(self, tail_db: float) -> float:
         """Compute how long the room rings on until it is tail_db lower."""
         return self.begin_s + self.t60_s * -tail_db / 60
 
 
-def plan_room(room: Room, log: ContactLog) -> RoomPlan:
+def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
     """Plan a room for a log. Raises SceneError where it is too small, AudioError where pyroomacoustics is missing."""
     own = own_channels(log.sensors)
     place = place_room(room, log, [one for one, _ in own])
@@ -82,4 +82,6 @@ def plan_room(room: Room, log: ContactLog) -> RoomPlan:
     t60 = ", ".join(f"{one:.2f}" for one in t60_s)
     size, corner = (" x ".join(f"{x:g}" for x in one) for one in (room.size_m, np.round(place.corner_m, 3) + 0.0))
     note = f"room of {size} m from {corner.replace(' x ', ', ')}: T60 {t60} s by Eyring"
-    return RoomPlan(tuple(sensors), np.concatenate(parts, axis=1), channels, early, late, begin_s, float(t60_s.max()), note)
+    return RoomPlan(
+        tuple(sensors), np.concatenate(parts, axis=1), channels, early, late, begin_s, float(t60_s.max()), note
+    )
