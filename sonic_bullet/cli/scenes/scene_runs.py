@@ -187,7 +187,7 @@ def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
         plan = plan_room(wish.room, replace(log, sr=rate))
         said = (*said, plan.note)
     try:
-        sound = render_kept(log, sr=rate, tail_db=wish.tail_db, plan=plan, progress=wish.progress, say=wish.say)
+        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, plan=plan, progress=wish.progress, say=wish.say)
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise
