@@ -145,14 +145,14 @@ def rendered(model: ModalModel, material: Material, sensor: str, at: Places) -> 
     hit = Contacts(
         np.array([0]),
         np.array([1]),
-        place[None],
-        place[None],
-        -out[None],
-        -IMPULSE_N_S * out[None],
-        still,
-        np.zeros((1, 2)),
-        np.ones(1),
-        touching,
+        point_a_m=place[None],
+        point_b_m=place[None],
+        normal=-out[None],
+        impulse_n_s=-IMPULSE_N_S * out[None],
+        slip_m_s=still,
+        sweep_m_s=np.zeros((1, 2)),
+        approach_m_s=np.ones(1),
+        gap_m=touching,
     )
     steps = [
         Step(STEP_S, poses, upright, np.zeros(2, bool), hit if i == 4 else Contacts.none())

@@ -99,8 +99,7 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     """
     points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
     wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
-    face, found = np.empty(len(points), np.int64), np.empty((len(points), 4))
-    _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted, face, found)
+    face, found = _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted)
     return index.order[face], found[:, :3], found[:, 3]
 
 
@@ -193,12 +192,13 @@ def _box_gap(px, py, pz, node):
 
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, ny, nz):
+def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, p, n):
     """Find face, barycentric coordinates (three numbers) and distance in m of the point nearest to p on one body.
 
-    Its faces and nodes begin at face_at and node_at; the face is counted from there. n: the outward normal that the
-    surface should have, 0 for any.
+    Its faces and nodes begin at face_at and node_at; the face is counted from there. p, n: tuples of three numbers, n
+    the outward normal that the surface should have, 0 for any.
     """
+    (px, py, pz), (nx, ny, nz) = p, n
     stack, gaps = np.empty(_DEEPEST, np.int64), np.empty(_DEEPEST)
     any_face, any2, any_u, any_v, any_w = 0, np.inf, 1.0, 0.0, 0.0  # nearest of all
     # of those that look along n: the chosen one, its distance, its place; its n·normal, the least distance
@@ -247,13 +247,15 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, px, py, pz, nx, 
 
 
 @njit(nogil=True, error_model="numpy")
-def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted, face, found):
-    """Write `nearest_face` of points (k, 3) with normals (k, 3) to face (k,) and found (k, 4), the distance last.
+def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted):
+    """Return `nearest_face` of points (k, 3) with normals (k, 3): face (k,) and found (k, 4), the distance last.
 
     first: 0, as an argument: numba compiles a kernel anew for a literal number.
     """
+    face, found = np.empty(len(point_m), np.int64), np.empty((len(point_m), 4))
     for k in range(len(point_m)):
         p, n = point_m[k], wanted[k]
         face[k], found[k, 0], found[k, 1], found[k, 2], found[k, 3] = nearest_face(
-            faces, first, nodes, first, wall_m, tie_m, p[0], p[1], p[2], n[0], n[1], n[2]
+            faces, first, nodes, first, wall_m, tie_m, (p[0], p[1], p[2]), (n[0], n[1], n[2])
         )
+    return face, found

@@ -13,7 +13,7 @@ from sonic_bullet.listener.known_bodies import KnownBodies
 from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
 from sonic_bullet.listener.rows import STRANGERS, UNKNOWN, contact_rows, place_bodies, take_step
 from sonic_bullet.listener.start import NOBODY, hooked_start
-from sonic_bullet.listener.sweep import Traces
+from sonic_bullet.listener.sweep import Traces, TraceTables
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
@@ -124,10 +124,7 @@ class Memory:
             start,
             dt_s,
             self.time_s,
-            traces.table,
-            traces.count,
-            traces.newest,
-            traces.work,
+            TraceTables(traces.table, traces.count, traces.newest, traces.work),
             row,
         )
         if count == UNKNOWN:

@@ -13,7 +13,7 @@ import numpy as np
 from sonic_bullet.listener.kinematics import relative_motion
 from sonic_bullet.listener.polling import all_usable, load
 from sonic_bullet.listener.start import LEFT_OUT, begin
-from sonic_bullet.listener.sweep import sort_pairs, sweep
+from sonic_bullet.listener.sweep import TraceTables, sort_pairs, sweep
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records.arrays import LARGEST
 
@@ -97,7 +97,7 @@ def fill(row, touch, fresh, slip, approach):
 
 
 @njit(nogil=True, error_model="numpy")
-def contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row):
+def contact_rows(touch, count, past, start, dt, time, traces, row):
     """Fill row (k,) of CONTACT and the newest trace.
 
     Parameters
@@ -109,15 +109,16 @@ def contact_rows(touch, count, past, start, dt, time, table, counted, newest, sc
     start : Array of START, shape (n,)
     dt, time
         Length and start of the step in s.
-    table, counted, newest, scratch
-        `Traces` with space for `count`.
+    traces : TraceTables
+        With space for `count`.
 
     Returns
     -------
     int
         Number of rows, or UNKNOWN, STRANGERS or ABSURD.
     """
-    made, strangers, fine, work = np.int64(0), False, True, scratch[0]  # a literal 0 would compile sort_pairs twice
+    made, strangers, fine, work = np.int64(0), False, True, traces.work[0]  # a literal 0 would compile sort_pairs twice
+    trace = traces.table[traces.newest]
     for i in range(count):
         one = touch[i]
         at_a, at_b = find(start, one.code_a), find(start, one.code_b)
@@ -131,18 +132,18 @@ def contact_rows(touch, count, past, start, dt, time, table, counted, newest, sc
             if min(a.index, b.index) > LEFT_OUT:
                 a.met, b.met, strangers = a.index < 0, b.index < 0, True
             continue
-        fresh, out = table[newest, made], row[made]
+        fresh, out = trace[made], row[made]
         fresh.time_s = time + one.elapsed_s
         out.a, out.b = a.index, b.index
-        sweep(one, a, b, a.index << 32 | b.index, table, counted, newest, work, fresh, out.sweep_m_s)
+        sweep(one, a, b, a.index << 32 | b.index, traces, work, fresh, out.sweep_m_s)
         fine = fill(out, one, fresh, work.slip, approach) and fine
         made += 1
     if strangers:
         return STRANGERS
     if not fine:
         return ABSURD
-    sort_pairs(row, made, table[newest])
-    counted[newest] = made
+    sort_pairs(row, made, trace)
+    traces.contacts[traces.newest] = made
     return made
 
 
@@ -179,7 +180,7 @@ def unmoved(earlier, later):
 
 
 @njit(nogil=True, error_model="numpy")
-def take_step(
+def take_step(  # noqa: PLR0917  called from Python, where groups would cost more than the step
     raw,
     before,
     touch,
@@ -213,7 +214,7 @@ def take_step(
     moved = begin(earlier, later, dt, by_hand, hooked, start)
     if moved and not hooked:
         return count, UNUSUAL
-    made = contact_rows(touch, count, past, start, dt, time, table, counted, newest, scratch, row)
+    made = contact_rows(touch, count, past, start, dt, time, TraceTables(table, counted, newest, scratch), row)
     if made >= 0:
         place_bodies(start, position, quaternion, teleported)
     return count, made

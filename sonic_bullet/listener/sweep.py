@@ -14,6 +14,8 @@ once. Without a match the pair keeps its last velocity; a new pair's contact sta
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.listener.kinematics import pose_after, turn
@@ -39,6 +41,15 @@ TRACE = np.dtype(
 
 SCRATCH = np.dtype([("x", "f8", (2, 3)), ("q", "f8", (2, 4)), ("slip", "f8", (3,))], align=True)
 """Work space of a contact: poses of both bodies at its sub-step, and its slip."""
+
+
+class TraceTables(NamedTuple):
+    """`Traces` as kernels take them."""
+
+    table: Array
+    contacts: Array
+    newest: int
+    work: Array
 
 
 class Traces:
@@ -114,12 +125,13 @@ def first_of(table, count, pair):
 
 
 @njit(nogil=True, error_model="numpy")
-def recognise(fresh, pair, table, count, newest, work, normal, limit):
+def recognise(fresh, pair, traces, work, normal, limit):
     """Fill u_a of a TRACE row whose time and points are set; False where no earlier contact of the pair matches.
 
-    table, count, newest: `Traces`. limit: largest speed of the slower sweep, m/s.
+    limit: largest speed of the slower sweep, m/s.
     """
     best, held = np.inf, False
+    table, count, newest = traces.table, traces.contacts, traces.newest
     slip, u = work.slip, fresh.u_a_m_s
     for step in range(1, MEMORY_STEPS + 1):
         trace, known = table[(newest + step) % (MEMORY_STEPS + 1)], count[(newest + step) % (MEMORY_STEPS + 1)]
@@ -165,11 +177,11 @@ def place(touch, a, b, work, fresh):
 
 
 @njit(nogil=True, error_model="numpy")
-def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
+def sweep(touch, a, b, pair, traces, work, fresh, speed):
     """Write the speeds (2,) in m/s of a contact over the bodies a and b (START rows), and its TRACE row `fresh`.
 
-    work: SCRATCH, with the slip; the time of `fresh` is set. The distant centre of a static body says nothing of its
-    size.
+    traces: TraceTables. work: SCRATCH, with the slip; the time of `fresh` is set. The distant centre of a static body
+    says nothing of its size.
     """
     far_a, far_b = place(touch, a, b, work, fresh)
     v, w, slip, u = a.spin_rad_s, b.spin_rad_s, work.slip, fresh.u_a_m_s
@@ -178,7 +190,7 @@ def sweep(touch, a, b, pair, table, count, newest, work, fresh, speed):
     limit = ROLL_MARGIN * rolled * reach + SLIP_MARGIN * np.sqrt(
         slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
     )
-    if not recognise(fresh, pair, table, count, newest, work, touch.normal, limit):
+    if not recognise(fresh, pair, traces, work, touch.normal, limit):
         share = 0.0 if not a.static and (b.static or far_a <= far_b) else -1.0
         for x in range(3):
             u[x] = share * slip[x]

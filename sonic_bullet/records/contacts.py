@@ -85,6 +85,7 @@ class Contacts:
         self,
         a: Any,
         b: Any,
+        *,
         point_a_m: Any,
         point_b_m: Any,
         normal: Any,
@@ -173,7 +174,7 @@ class Contacts:
         number = row.view(np.float64).reshape(len(row), CONTACT.itemsize // 8)[:, 1:]
         # False for NaN too
         if not (number.max(initial=0) <= LARGEST and number.min(initial=0) >= -LARGEST):
-            return cls(*(row[name] for name in ROW_FIELDS))  # which names the field
+            return cls(**{name: row[name] for name in ROW_FIELDS})  # which names the field
         row.setflags(write=False)
         return cls.trusted(row)
 

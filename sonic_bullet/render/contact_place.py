@@ -47,12 +47,8 @@ def touch(rows, r, bodies, faces, nodes):
                 body.node_at,
                 body.wall_m,
                 body.tie_m,
-                p[0],
-                p[1],
-                p[2],
-                n[0],
-                n[1],
-                n[2],
+                (p[0], p[1], p[2]),
+                (n[0], n[1], n[2]),
             )
             if not np.isfinite(bent):
                 here = faces[body.face_at + face]

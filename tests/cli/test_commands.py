@@ -54,7 +54,16 @@ def model() -> ModalModel:
 def log(steps: int = 10) -> ContactLog:
     bodies = (Body(3, 1, 0, "cup", 0.1, np.eye(3), model=model()), Body(0, -1, 0, "floor", 0.0, np.zeros((3, 3))))
     one = Contacts(
-        [0], [1], *[np.zeros((1, 3))] * 2, [[0, 0, 1]], [[0, 0, 0.1]], np.zeros((1, 3)), np.zeros((1, 2)), [1.0], [0.0]
+        [0],
+        [1],
+        point_a_m=np.zeros((1, 3)),
+        point_b_m=np.zeros((1, 3)),
+        normal=[[0, 0, 1]],
+        impulse_n_s=[[0, 0, 0.1]],
+        slip_m_s=np.zeros((1, 3)),
+        sweep_m_s=np.zeros((1, 2)),
+        approach_m_s=[1.0],
+        gap_m=[0.0],
     )
     still = (np.zeros((2, 3)), np.tile([0, 0, 0, 1.0], (2, 1)), np.zeros(2, bool))
     return ContactLog(

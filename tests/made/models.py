@@ -102,8 +102,17 @@ def row(
     gap: float = 0.0,
 ) -> Contacts:
     """One contact; join several with `Contacts.joined`."""
-    one = [np.array([value], float) for value in (point_a, point_b, normal, impulse_n_s, slip, sweep, approach, gap)]
-    return Contacts(np.array([a]), np.array([b]), *one)
+    one = {
+        "point_a_m": point_a,
+        "point_b_m": point_b,
+        "normal": normal,
+        "impulse_n_s": impulse_n_s,
+        "slip_m_s": slip,
+        "sweep_m_s": sweep,
+        "approach_m_s": approach,
+        "gap_m": gap,
+    }
+    return Contacts(np.array([a]), np.array([b]), **{name: np.array([value], float) for name, value in one.items()})
 
 
 def step(

@@ -29,14 +29,14 @@ def rows(
     return Contacts(
         [a] * k,
         [b] * k,
-        zero,
-        zero,
-        up,
-        impulse,
-        np.tile([slip_m_s, 0, 0], (k, 1)),
-        np.full((k, 2), sweep_m_s),
-        np.zeros(k),
-        np.zeros(k),
+        point_a_m=zero,
+        point_b_m=zero,
+        normal=up,
+        impulse_n_s=impulse,
+        slip_m_s=np.tile([slip_m_s, 0, 0], (k, 1)),
+        sweep_m_s=np.full((k, 2), sweep_m_s),
+        approach_m_s=np.zeros(k),
+        gap_m=np.zeros(k),
     )
 
 

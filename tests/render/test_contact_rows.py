@@ -23,14 +23,14 @@ def some(rng: np.random.Generator, count: int, bodies: int = 7) -> Contacts:
     return Contacts(
         a,
         b,
-        point,
-        other,
-        normal,
-        impulse,
-        slip,
-        rng.random((count, 2)),
-        rng.normal(size=count),
-        rng.normal(size=count),
+        point_a_m=point,
+        point_b_m=other,
+        normal=normal,
+        impulse_n_s=impulse,
+        slip_m_s=slip,
+        sweep_m_s=rng.random((count, 2)),
+        approach_m_s=rng.normal(size=count),
+        gap_m=rng.normal(size=count),
     )
 
 
@@ -39,14 +39,14 @@ def swapped(c: Contacts) -> Contacts:
     return Contacts(
         c.b,
         c.a,
-        c.point_b_m,
-        c.point_a_m,
-        -c.normal,
-        -c.impulse_n_s,
-        -c.slip_m_s,
-        c.sweep_m_s[:, ::-1],
-        c.approach_m_s,
-        c.gap_m,
+        point_a_m=c.point_b_m,
+        point_b_m=c.point_a_m,
+        normal=-c.normal,
+        impulse_n_s=-c.impulse_n_s,
+        slip_m_s=-c.slip_m_s,
+        sweep_m_s=c.sweep_m_s[:, ::-1],
+        approach_m_s=c.approach_m_s,
+        gap_m=c.gap_m,
     )
 
 

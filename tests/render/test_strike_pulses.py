@@ -45,7 +45,16 @@ def contacts(load_n: dict[tuple[int, int], float], *, points: int = 1) -> Contac
     zero = np.zeros((k, 3))
     a, b = np.array(pairs, np.int32).reshape(k, 2).T
     return Contacts(
-        a, b, zero, zero, normal, normal * force.reshape(k, 1) * DT, zero, np.zeros((k, 2)), np.zeros(k), np.zeros(k)
+        a,
+        b,
+        point_a_m=zero,
+        point_b_m=zero,
+        normal=normal,
+        impulse_n_s=normal * force.reshape(k, 1) * DT,
+        slip_m_s=zero,
+        sweep_m_s=np.zeros((k, 2)),
+        approach_m_s=np.zeros(k),
+        gap_m=np.zeros(k),
     )
 
 

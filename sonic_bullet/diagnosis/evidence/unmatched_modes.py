@@ -95,7 +95,9 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
         for j in loud:
             decay, push = float(model.decay_per_s[rank[j]]), observed.push[:, rank[j]]
             most = np.inf if alone is None or alone[j] else PURE
-            ratio = _best(left, push, decay, own[j], correction[j], n, observed.sr, most, body.band_hz)
+            ratio = _best(
+                left, push, decay, own[j], correction[j], n=n, sr=observed.sr, most=most, band_hz=body.band_hz
+            )
             if ratio != correction[j]:
                 half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + observed.sr / n)
                 bins = _bins(own[j], half, n, observed.sr)
@@ -115,6 +117,7 @@ def _best(
     decay: float,
     own: float,
     now: float,
+    *,
     n: int,
     sr: int,
     most: float,

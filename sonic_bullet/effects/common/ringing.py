@@ -14,6 +14,8 @@ u = e^{dt}, k = c/(1 + c):
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
@@ -22,6 +24,21 @@ from sonic_bullet.records import Array
 
 FAINT = 40.0  # nepers after which a mode is over
 STEP = 1024  # samples between two exact phasors
+
+
+class _Modes(NamedTuple):
+    """Modes (m,) that depend on their level.
+
+    bend, damping_growth: relative changes at the level the mode starts with, bend·level² and
+    (damping_growth·level)^power.
+    """
+
+    omega: Array
+    decay: Array
+    amplitude: Array
+    bend: Array
+    damping_growth: Array
+    power: float
 
 
 @njit(nogil=True)
@@ -39,11 +56,9 @@ def _linear(out, start, pole, amplitude, length):
 
 
 @njit(nogil=True)
-def _level(out, start, sr, omega, decay, amplitude, bend, damping_growth, power, length):
-    """Add modes with ω(t) and d(t) that depend on the mode's level.
-
-    Bend and damping growth are those at the level the mode starts with, (damping_growth·level)^power.
-    """
+def _level(out, start, sr, modes, length):
+    """Add modes with ω(t) and d(t) that depend on the mode's level."""
+    omega, decay, amplitude, bend, damping_growth, power = modes
     for k in range(len(omega)):
         first = int(np.ceil(start))
         last = min(len(out), first + length[k])
@@ -111,18 +126,15 @@ def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
                 ring.bend[use][bent] * level**2,
                 (ring.damping_growth[use][bent] * level) ** ring.damping_growth_power,
             )
-            _level(
-                out,
-                delay * sr,
-                float(sr),
+            modes = _Modes(
                 2 * np.pi * f[bent],
                 np.maximum(d[bent], 1e-6),
                 (share * a)[bent].astype(complex),
                 bend,
                 damping_growth,
-                ring.damping_growth_power,
-                length[bent],
+                float(ring.damping_growth_power),
             )
+            _level(out, delay * sr, float(sr), modes, length[bent])
     return out
 
 

@@ -161,23 +161,17 @@ def distance(
     for level in target.levels:
         cells = level.loud.size if differences is not None else 0
         reach = kernel.reach(freq_hz, decay_per_s, amplitude, float(target.sr), level.window, floor)
-        slot, used = kernel.slots(reach, level.band)
-        shapes, state, turn = kernel.frame(
+        bins = kernel.slots(reach, level.band)
+        spirals = kernel.frame(
             freq_hz, decay_per_s, amplitude * unit, reach, float(target.sr), target.late_s, level.window, level.hop
         )
         out = np.empty(0) if differences is None else differences[at : at + cells]
         total += kernel.compare(
             reach,
-            slot,
-            used,
-            shapes,
-            state,
-            turn,
+            bins,
+            spirals,
             floor * unit,
-            level.band,
-            level.share,
-            level.scale,
-            level.loud,
+            (level.band, level.share, level.scale, level.loud),
             target.table,
             out,
             level.hop / target.norm,

@@ -125,10 +125,11 @@ def runs_of(used, band):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, fastmath={"reassoc", "contract"}, error_model="numpy")
-def compare(  # type: ignore[no-untyped-def]
-    reach, slot, used, shapes, state, turn, floor, band, share, scale, loud, table, out, weight
-):
-    """Σ weight·ΔT² of one level; state is used up."""
+def compare(reach, bins, spirals, floor, level, table, out, weight):  # type: ignore[no-untyped-def]
+    """Σ weight·ΔT² of one level: (band, share, scale, loud); bins of `slots`; spirals of `frame`, whose state is used
+    up.
+    """
+    (slot, used), (shapes, state, turn), (band, share, scale, loud) = bins, spirals, level
     frames, bands = loud.shape
     sum_re, sum_im, power = np.zeros(len(used)), np.zeros(len(used)), np.zeros(bands + 2)
     bits = power.view(np.int64)

@@ -15,7 +15,7 @@ units of the recording's own energy-weighted median decay rate: one unit of Y is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ from sonic_bullet.records import Array
 AUDIBLE_HZ = (20.0, 20000.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Points:
+class Points(NamedTuple):
     """The recording's side. x, y, weight (k,); per_bark c_z; per_s c_d; near δ; power p."""
 
     x: Array
@@ -62,26 +61,13 @@ def match_ratio_product(reference: Points, freq_hz: Array, decay_per_s: Array, a
 
     Source: eq. 26.
     """
-    return float(
-        _product(
-            reference.x,
-            reference.y,
-            reference.weight,
-            reference.per_bark,
-            reference.per_s,
-            reference.near**2,
-            reference.power,
-            freq_hz,
-            decay_per_s,
-            amplitude,
-        )
-    )
+    return float(_product(reference, freq_hz, decay_per_s, amplitude))
 
 
 @njit(nogil=True, error_model="numpy")
-def _product(  # type: ignore[no-untyped-def]
-    x, y, weight, per_bark, per_s, near_square, power, freq_hz, decay_per_s, amplitude
-):
+def _product(reference, freq_hz, decay_per_s, amplitude):  # type: ignore[no-untyped-def]
+    x, y, weight, per_bark, per_s, near, power = reference
+    near_square = near * near
     known, modes = len(x), len(freq_hz)
     top, bottom = np.zeros(known), np.zeros(known)
     there_sum, there_weight = 0.0, 0.0
@@ -95,11 +81,11 @@ def _product(  # type: ignore[no-untyped-def]
         for i in range(known):
             apart = (x[i] - at_x) ** 2 + (y[i] - at_y) ** 2
             score = 1 / (1 + apart)
-            near = 1 / (apart + near_square) ** 2
-            top[i] += own * near * score
-            bottom[i] += own * near
-            own_top += weight[i] * near * score
-            own_bottom += weight[i] * near
+            nearness = 1 / (apart + near_square) ** 2
+            top[i] += own * nearness * score
+            bottom[i] += own * nearness
+            own_top += weight[i] * nearness * score
+            own_bottom += weight[i] * nearness
         there_sum += own * own_top / own_bottom
         there_weight += own
     if there_weight == 0:
