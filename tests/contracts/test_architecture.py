@@ -227,6 +227,9 @@ def missing_modules(text: str) -> list[str]:
     missing = [name for name in paths if not any(path.endswith(f"/{name}") for path in SOURCES)]
     for name in re.findall(r"\bsonic_bullet(?:\.\w+)+|(?<=`)[a-z]\w*(?:\.\w+)+(?=`)", text):
         first, *rest = name.removeprefix("sonic_bullet.").split(".")
+        known = (PACKAGE / first).exists() or (PACKAGE / f"{first}.py").exists() or first in exported_words(PACKAGE)
+        if name.startswith("sonic_bullet.") and not known:
+            missing.append(name)
         module = PACKAGE / first / (rest[0] if rest else "__init__")
         exported = rest and (PACKAGE / first).is_dir() and rest[0] in exported_words(PACKAGE / first)
         if (PACKAGE / first).is_dir() and not (module.is_dir() or module.with_suffix(".py").exists() or exported):
@@ -238,6 +241,9 @@ def test_docstrings_name_modules_that_exist() -> None:
     assert missing_modules("pour.py, synth/pulse.py, `sonic_bullet.synth.bank`, `files.write_audio`") == []
     assert missing_modules("synth/tally.py `synth.tally` sonic_bullet.synth.tally") == [
         "synth/tally.py", "synth.tally", "sonic_bullet.synth.tally"
+    ]  # fmt: skip
+    assert missing_modules("sonic_bullet.gone.tally, `sonic_bullet.attach`, `sonic_bullet.scene`") == [
+        "sonic_bullet.gone.tally"
     ]  # fmt: skip
     found, looked_at = [], 0
     for path in MODULES:
