@@ -24,6 +24,7 @@ from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.ringing_on import with_tail
+from sonic_bullet.render.room.room_convolution import sum_rows
 from sonic_bullet.render.space.space_state import hears_apart
 from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
@@ -134,9 +135,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     state.ringing.at = state.travelling.at = stop
     if state.space is not None and hears_apart(setup.sensors):
         out = state.space.channels(table, out, pressure, apart=setup.apart)
-    if setup.mixing is None:
-        return out
-    return (setup.mixing @ out.reshape(-1, setup.mixing.shape[1], stop - begin)).reshape(-1, stop - begin)
+    return out if setup.mixing is None else sum_rows(setup.mixing, out)
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:

@@ -87,3 +87,16 @@ def test_what_cannot_be_is_one_line(words: tuple[str, ...], said: str, capfd: py
 def test_a_missing_library_names_its_extra(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(sys.modules, "pyroomacoustics", None)
     assert "sonic_bullet[room]" in error_of(capfd, "render", "log.npz", "-o", "no.wav", *ROOM)
+
+
+def test_a_film_has_the_rooms_sound(capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("av")
+    from tests.made.films import decoded
+
+    small = ("--fps", "10", "--size", "64x48")
+    assert run("render", "log.npz", "-o", "film.wav", *ROOM) == 0
+    assert run("film", "log.npz", "-o", "film.mov", *small, *ROOM) == 0
+    mix, film = soundfile.read("film.wav")[0], decoded(Path("film.mov"))
+    assert np.abs(film.sound[: len(mix)] - mix).max() < 2**-22
+    capfd.readouterr()
+    assert "one channel or two" in error_of(capfd, "film", "log.npz", "-o", "no.mov", "--ambisonics", "2", *small)

@@ -95,10 +95,10 @@ def run_render(
                     tail_db=level.tail_db, room=room,
                 )  # fmt: skip
                 result: RenderResult | Replay
-                if not takes and not space and room is None:
-                    result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
+                if not takes:
+                    result = rendered_in_space(scene, wish, space)
                 else:
-                    log, said = _log_of(scene, wish, space)
+                    log, said = log_of(scene, wish, space)
                     if takes.takes is None:
                         log, more = takes.changed(log, scene)
                         result = rendered(log, wish, (*said, *more))
@@ -113,7 +113,7 @@ def run_render(
     write_json(json_to, described)
 
 
-def _log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple[str, ...]]:
+def log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
     if is_log(scene):
         log, _, said = prepared(scene, wish)
@@ -124,6 +124,14 @@ def _log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple
         return log, said
     log, more = space.applied(log if wish.rate is None else replace(log, sr=wish.rate), scene)
     return log, (*said, *more)
+
+
+def rendered_in_space(scene: str, wish: Wish, space: SpaceWish) -> RenderResult | Replay:
+    """Run a scene or replay a log; with other microphones, or in a room, from the scene's log."""
+    if space or wish.room is not None:
+        log, said = log_of(scene, wish, space)
+        return rendered(log, wish, said)
+    return replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
 
 
 def _check_takes_alone(outputs_given: dict[str, Any], others: dict[str, Any], session: SessionWish) -> None:

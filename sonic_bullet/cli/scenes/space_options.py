@@ -100,6 +100,11 @@ class SpaceWish:
         """Return whether anything is asked for."""
         return bool(self.ambisonics or self.head or self.facing or self.paths or self.on)
 
+    @property
+    def channels(self) -> int:
+        """Number of channels that each microphone has."""
+        return (self.ambisonics + 1) ** 2 if self.ambisonics is not None else 1 + (self.head is not None)
+
     def applied(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
         """Give the log such sensors, and what a user should read of them. Raises SceneError."""
         from sonic_bullet.records import Ambisonics, Binaural, Microphone

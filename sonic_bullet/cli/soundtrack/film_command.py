@@ -10,6 +10,10 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option, scene_options
+from sonic_bullet.cli.scenes.room_options import OPTIONS as ROOM_OPTIONS
+from sonic_bullet.cli.scenes.room_options import read_room, room_options
+from sonic_bullet.cli.scenes.space_options import OPTIONS as SPACE_OPTIONS
+from sonic_bullet.cli.scenes.space_options import SpaceWish, space_options
 from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
@@ -57,20 +61,14 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @click.option("--sr", type=float, metavar="HZ", help="Sample rate. [default: 48000; a log's own]")
 @level_options
 @scene_options
+@space_options
+@room_options
 @json_option
 def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     """Film a PyBullet scene, or a contact log, with its sound: pictures and samples on one clock."""
     from sonic_bullet.cli.scenes.render_outputs import with_partial
-    from sonic_bullet.cli.scenes.scene_commands import check_request
-    from sonic_bullet.cli.scenes.scene_runs import (
-        DEFAULT_SR,
-        WantedMaterials,
-        Wish,
-        is_log,
-        replayed,
-        simulated,
-        standing_collector,
-    )
+    from sonic_bullet.cli.scenes.scene_commands import check_request, rendered_in_space
+    from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, Wish, standing_collector
     from sonic_bullet.files import check_sr
     from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
     from sonic_bullet.soundtrack.film_writer import as_fps, check_film_output, check_size
@@ -79,6 +77,8 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     level = LevelWish(**{name: options[name] for name in OPTIONS})
     check_request(scene, options["seconds"], level)
     materials = WantedMaterials.read(options["material"], options["silent"])
+    space = SpaceWish.read(**{name: options[name] for name in SPACE_OPTIONS})
+    room = read_room(**{name: options[name] for name in ROOM_OPTIONS})
     look = FilmLook(
         as_fps(options["fps"]),
         check_size(options["size"]),
@@ -87,7 +87,8 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         options["follow"],
         options["shadows"],
     )
-    check_film_output(output, rate or DEFAULT_SR, max(len(options["microphones"]), 1), options["codec"])
+    count = max(len(options["microphones"]), len(space.paths) + len(space.on), 1) * space.channels
+    check_film_output(output, rate or DEFAULT_SR, count, options["codec"])
     to, json_to, _ = places(output, json_to, level.json_path(output))
     standing: list[Standing] = []
 
@@ -96,10 +97,10 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         with progress_bar(Path(scene).name) as (progress, tell):
             wish = Wish(
                 options["seconds"], rate, options["microphones"], options["seed"], materials, None, None,
-                progress, tell, standing_collector(standing), level.tail_db,
+                progress, tell, standing_collector(standing), level.tail_db, room,
             )  # fmt: skip
             try:
-                result = replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
+                result = rendered_in_space(scene, wish, space)
             except (SonicBulletError, KeyboardInterrupt) as error:
                 raise with_partial(error, sound_to, sound_to, level) from error
         if not result.log.sensors:
