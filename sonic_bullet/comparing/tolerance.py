@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from sonic_bullet.comparing.ensemble import Audibility
     from sonic_bullet.comparing.sides import Side
 
-RANGE_DB = 60.0
 MOST_NAMES = 6
 
 
@@ -58,13 +57,14 @@ def measure_sound(x: Array, sr: int) -> SoundMeasures:
 
 def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closeness:
     """Check whether b is within that tolerance of a."""
+    range_db = 60.0
     faults = []
     if abs(a.seconds - b.seconds) > 1e-6 or a.channels != b.channels:
         faults.append(f"length {a.seconds:.4g} → {b.seconds:.4g} s, channels {a.channels} → {b.channels}")
     if a.onset_count != b.onset_count:
         faults.append(f"onsets {a.onset_count} → {b.onset_count}")
     heights = [one for one in (*a.band_db, *b.band_db) if one is not None]
-    floor = max(heights, default=0.0) - RANGE_DB
+    floor = max(heights, default=0.0) - range_db
     change, most_hz = 0.0, 0.0
     for f, one, other in zip(OCTAVES_HZ, a.band_db, b.band_db, strict=False):
         old, new = (floor if level is None else max(level, floor) for level in (one, other))

@@ -25,7 +25,6 @@ HERTZ = -0.2
 AGAIN = 1.29
 ROUGH = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
 FEWEST_LINES, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
-NEAR = 0.01  # of ln f: a line that near may be that mode
 COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
 STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is observed to what is expected: gains to begin with
 DELAYS_S, FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
@@ -145,10 +144,11 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
 
     Hidden is what lies in the noise, where an amplitude's spread is σ √(4d/sr), or under louder lines.
     """
+    near = 0.01  # of ln f: a line that near may be that mode
     assert h.model is not None
     observed = np.concatenate([h.freq_hz, h.foreign_hz])
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
-    alone = alone[np.abs(np.log(h.all_hz[alone, None] / observed)).min(axis=1) > NEAR]
+    alone = alone[np.abs(np.log(h.all_hz[alone, None] / observed)).min(axis=1) > near]
     hidden = (
         SILENT * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
         + HIDDEN * np.abs(h.amplitude).max(axis=1)[:, None]

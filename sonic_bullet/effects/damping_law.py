@@ -23,7 +23,6 @@ from sonic_bullet.records import Array, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
 OMEGA_1 = 2000 * np.pi
-SCATTER = 0.02  # of a decay about its law, relative, that no law is asked to explain
 BETTER = 6.0  # in BIC, than Rayleigh's law
 TAKEN, MOST = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
 FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
@@ -95,6 +94,7 @@ class DampingLaw:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Fit each law to the decays of all lines; None where no law is better than Rayleigh's."""
+        scatter = 0.02  # of a decay about its law, relative, that no law is asked to explain
         omega = np.concatenate([h.omega for h in evidence.observed])
         decay = np.concatenate([h.decay_per_s for h in evidence.observed])
         spread = np.concatenate([h.decay_sd_per_s for h in evidence.observed])
@@ -108,7 +108,7 @@ class DampingLaw:
         if good.sum() < (FEWEST_LINES if evidence.known is None else AGAIN):
             return None
         omega, decay = omega[good], decay[good]
-        sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), SCATTER)
+        sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), scatter)
         y = np.log(decay)
 
         def cost(model: Array) -> Array:

@@ -28,9 +28,7 @@ from sonic_bullet.effects.protocol import (
 )
 from sonic_bullet.records import Array
 
-STEADY = 0.12  # relative scatter of |A|/J over the strikes, rms
 LOUD = 0.02  # of the strongest line's amplitude
-MOST = 8
 APART = 0.004  # from a mode of the body
 
 
@@ -83,16 +81,18 @@ class ForeignMode(RingsAlong):
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Take the strongest lines that are no modes and follow the impulse; None where there are none."""
+        most = 8
         rows = [row for h in evidence.observed for row in _steady(h)]
         rows.sort(key=lambda r: -r[2])
         if not rows:
             return None
-        kept = sorted(rows[:MOST])
+        kept = sorted(rows[:most])
         return cls(*(tuple(float(r[i]) for r in kept) for i in range(4)))
 
 
 def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     """Find the lines (f, d, a, φ) that follow the impulse alone."""
+    steady = 0.12  # relative scatter of |A|/J over the strikes, rms
     if len(h.foreign_hz) == 0 or len(h.impulse_n_s) < 2 or h.signal is None:
         return []
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
@@ -115,7 +115,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     apart = np.ones(len(mean), bool)
     if h.model is not None and len(h.freq_hz):
         apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
-    good = loud & apart & (loose < STEADY) & (coherent > 0.9) & (np.abs(lean) < 0.25)
+    good = loud & apart & (loose < steady) & (coherent > 0.9) & (np.abs(lean) < 0.25)
     if h.dry:  # a room makes several lines of one, and read outside it, in short frames, each is that one
         good &= _alone(h.foreign_hz, np.where(good, mean, 0.0))
     phase = np.angle((weight * per).sum(axis=0))

@@ -24,12 +24,10 @@ SPLIT = (1e-4, 3e-2)
 OBSERVED = 0.12  # of a line's own width: pairs nearer than that sound as one
 REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
-MOST = 7
 ALIKE = 0.9
 # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or
 # too far
 SAME, TURNED = 1e-4, 0.3
-MOSTLY = 0.5  # of the pairs must be more than that
 PLAINLY, ALSO, STRIKES = (
     3,
     0.8,
@@ -137,6 +135,8 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     A line represents one mode; the most certain pairs choose first. An imperfection splits many pairs: where some are
     plain, others may be less so.
     """
+    mostly = 0.5  # of the pairs must be more than that
+    most = 7
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
     every, decay, amplitude, strike, sensor = _lines(h)
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
@@ -150,7 +150,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
         middle = scale * (model_hz[a] + model_hz[a + 1]) / 2
         near = np.flatnonzero((np.abs(every / middle - 1) < REACH) & clear)
-        near = np.sort(near[np.argsort(-size[near])][:MOST])
+        near = np.sort(near[np.argsort(-size[near])][:most])
         for i, j in combinations(near.tolist(), 2):
             low, high = (int(i), int(j)) if every[i] < every[j] else (int(j), int(i))
             split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
@@ -179,7 +179,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
         middle = float((every[low] + every[high]) / 2)
         found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
         split_off.append(bool(model_hz[mode + 1] / model_hz[mode] - 1 < SAME or abs(np.sin(2 * turn)) > TURNED))
-    return sorted(found) if split_off and np.mean(split_off) >= MOSTLY else []
+    return sorted(found) if split_off and np.mean(split_off) >= mostly else []
 
 
 def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:

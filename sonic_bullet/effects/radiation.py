@@ -24,10 +24,8 @@ from sonic_bullet.records import Array, ModalModel
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
 SOUND = 343.0
 SCATTER = 0.03
-BETTER = 14.0
 FEWEST_LINES, FEWEST_LINES_AGAIN = 6, 4  # lines: to look for it, and to fit it again to a part of them
 AGAIN = 2.0  # times smaller or larger, where it is fitted again
-CLEARER = 0.45  # twice the ln likelihood, a line, that a tilt must be worth
 ORDERS: tuple[int, ...] = (2, 4)
 
 
@@ -89,6 +87,8 @@ class Radiation(Alternatives):
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Fit radius, order and strength to the decays and the tilt to the levels; None where none is identified."""
+        clearer = 0.45  # twice the ln likelihood, a line, that a tilt must be worth
+        better = 14.0
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
         with_decay = int((~np.isposinf(observed.decay_sd_per_s)).sum())  # in a room some lines tell no decay
         if (
@@ -124,12 +124,12 @@ class Radiation(Alternatives):
         if not found:
             return None
         left, best = min(found, key=lambda one: one[0])
-        if evidence.known is None and (not plain - left > BETTER + 2 * np.log(len(w2)) or left > 0.5 * plain):
+        if evidence.known is None and (not plain - left > better + 2 * np.log(len(w2)) or left > 0.5 * plain):
             return None
         # what radiates is observed: levels tell the knee, too
         tilted = [(left + _level_cost(observed, one, 0.5), one) for left, one in found]
         least, observed_so = min(tilted, key=lambda one: one[0])
-        plain_so = left + _level_cost(observed, best, 0.0) - CLEARER * len(w2)
+        plain_so = left + _level_cost(observed, best, 0.0) - clearer * len(w2)
         return replace(observed_so, tilt=0.5) if least < plain_so else best
 
 

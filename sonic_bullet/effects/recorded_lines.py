@@ -22,7 +22,6 @@ from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import RecordError
 
-SOUND_SPEED_M_S = 343.0
 MOST_LINES = 512
 
 
@@ -131,8 +130,9 @@ def _loudness(freq_hz: Array, normal_motion: Array, area_m2: Array, radius_m: fl
 
     It is the rms normal motion (v, m) where the body is struck times √(σ ∮(φ·n)²dS) of the radiation.
     """
+    sound_speed_m_s = 343.0
     square = (normal_motion**2 * area_m2[:, None]).sum(axis=0)
-    ka = 2 * np.pi * freq_hz / SOUND_SPEED_M_S * radius_m
+    ka = 2 * np.pi * freq_hz / sound_speed_m_s * radius_m
     return np.asarray(square / np.sqrt(area_m2.sum()) * np.sqrt(ka**2 / (1 + ka**2)))
 
 

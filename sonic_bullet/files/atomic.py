@@ -20,8 +20,6 @@ from typing import BinaryIO
 from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
-NAME_BYTES_MAX = 255  # NAME_MAX of POSIX file systems
-
 
 def check_output(path: str | os.PathLike[str]) -> Path:
     """Return the real, absolute path (links followed) of an output file, after a trial file in its folder.
@@ -90,8 +88,9 @@ def cannot(verb: str, path: object, error: OSError) -> FileError:
 
 def kept_name(target: Path) -> Path:
     """Return NAME.partial.EXT for NAME.EXT, the file of an interrupted run; a stem that is too long is cut."""
+    name_bytes_max = 255  # NAME_MAX of POSIX file systems
     ending = f".partial{target.suffix}"
-    stem = os.fsencode(target.stem)[: NAME_BYTES_MAX - len(os.fsencode(ending))]
+    stem = os.fsencode(target.stem)[: name_bytes_max - len(os.fsencode(ending))]
     return target.with_name(stem.decode("utf-8", "ignore") + ending)
 
 

@@ -28,7 +28,6 @@ MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
 BLOCK_SAMPLES = 1 << 18
 DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
-SHORTEST = 64  # samples: a millisecond at a usual rate
 # a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
 SILENT, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
 UNBROKEN = "give an unbroken audio file"
@@ -168,11 +167,12 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
     AudioError
         It is silent, too short or not finite.
     """
+    shortest = 64  # samples: a millisecond at a usual rate
     count, frames = samples.shape
     if channel is not None and not 0 <= channel < count:
         known = f"{format_count(count, 'channel')}, 0" + f" to {count - 1}" * (count > 1)
         raise FileError(f"{name} has no channel {channel}", f"it has {known}")
-    if frames < SHORTEST:
+    if frames < shortest:
         raise AudioError(f"{name} holds {frames} samples", "give a recording of an impact, from before it to its decay")
     level = np.ptp(np.nan_to_num(samples), axis=1)
     live = level > DEAD * level.max()

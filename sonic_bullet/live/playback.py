@@ -45,7 +45,6 @@ step sounds after 48 ms.
 """
 LONGEST_AHEAD_S = 2.0
 QUEUE_S = 3.0  # room for that and a step of a second
-SHORTEST_WAIT_S = 2e-4
 STALLED_S = 2.0
 """Time without a call after which a card is gone: Bluetooth takes up to a second to wake."""
 
@@ -156,6 +155,7 @@ class Playback:
 
     def _wait(self, most: int) -> None:
         """Wait until at most so many samples are queued, or the card is gone."""
+        shortest_wait_s = 2e-4
         while self.failure is None:
             now = time.perf_counter()
             when, taken, block = self._last
@@ -166,7 +166,7 @@ class Playback:
             if now - when > STALLED_S:
                 self._fail()
             else:
-                self._wake.wait(max(early / self._sr, SHORTEST_WAIT_S))
+                self._wake.wait(max(early / self._sr, shortest_wait_s))
 
     def _fill(self, out: Array, sounds_s: float, late: bool) -> None:
         """Fill a block for the card; see `Fill`."""

@@ -55,7 +55,6 @@ CLOSE_S = 20.0
 """For what was made before the interrupt to be written."""
 LEAVE_S = 0.2
 """For the interpreter of an interrupted command to end after its last message."""
-POLL_S = 0.05
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
 STAND_INS = f"{PACKAGE}/listener/pybullet/"
 """Functions that a script calls in place of PyBullet's: their time is the script's own."""
@@ -219,11 +218,12 @@ def _idle_words(name: str, line: int) -> tuple[str, str]:
 
 
 def _wait(child: _Worker, stops: list[int]) -> Ending:
+    poll_s = 0.05
     sent, stopped_at, seen_at = 0, 0.0, time.monotonic()
     own_since = asked_at = seen_at
     ended_idle: tuple[str, str] | None = None
     while child.code is None and not child.has_ended():
-        child.listen(POLL_S)
+        child.listen(poll_s)
         now = time.monotonic()
         if child.lines is not None and not stops and child.code is None and (line := child.lines.due(now)):
             progress.write_line(line)

@@ -29,7 +29,6 @@ from sonic_bullet.machine.progress import open_sink
 LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
 ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)
 STOPS = {signal.SIGINT: "stopped", signal.SIGTERM: "terminated"}
-DEATH_SIGNAL = 1  # prctl(2)
 Handler = Callable[[int, FrameType | None], Any]
 
 
@@ -175,7 +174,8 @@ def temporary_folder() -> Iterator[Path]:
 
 def end_with(parent: int) -> None:
     """Let this process, a fork, end with its parent (Linux), or now where that has ended."""
-    process_control(DEATH_SIGNAL, signal.SIGKILL)
+    death_signal = 1  # prctl(2)
+    process_control(death_signal, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 

@@ -23,8 +23,6 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
 
 BLOCK = 8
-TOLERANCE = 1e-7  # of the residual bound, relative to θ
-RIGID_TOLERANCE = 1e-4  # of the first elastic λ: 1e-5 is round-off in a sheet of thickness length/700
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +78,7 @@ def solve(
     ModalError
         The body has another number of rigid modes, or the iteration does not converge.
     """
+    tolerance = 1e-7  # of the residual bound, relative to θ
     size = stiffness.shape[0]
     factor = factorise(stiffness - shift * mass)
     block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(BLOCK, size))), mass)
@@ -105,7 +104,7 @@ def solve(
         theta, ritz = np.linalg.eigh(projected[:used, :used], UPLO="U")
         theta, ritz = theta[::-1], ritz[:, ::-1]
         residual = np.linalg.norm(coupling @ ritz[used - width :], axis=0)
-        converged = int(np.argmax(np.append(residual > TOLERANCE * np.abs(theta), True)))
+        converged = int(np.argmax(np.append(residual > tolerance * np.abs(theta), True)))
         value = shift + 1 / theta[:converged]
         elastic = value[rigid:]
         if say:
@@ -116,8 +115,9 @@ def solve(
 
 
 def _checked(value: Array, vector: Array, rigid: int) -> Modes:
+    rigid_tolerance = 1e-4  # of the first elastic λ: 1e-5 is round-off in a sheet of thickness length/700
     elastic = value[rigid:]
-    if elastic[0] <= 0 or (rigid and np.abs(value[:rigid]).max() > RIGID_TOLERANCE * elastic[0]):
+    if elastic[0] <= 0 or (rigid and np.abs(value[:rigid]).max() > rigid_tolerance * elastic[0]):
         shown = ", ".join(f"{v:.3g}" for v in value[: rigid + 2])
         raise ModalError(
             f"body has not {rigid} rigid modes: eigenvalues start {shown}",

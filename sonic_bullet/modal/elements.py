@@ -46,7 +46,6 @@ TRIES = 2
 WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
 OVER = 1.4  # × MOST_UNKNOWNS: a surface with more detail than its volume and area predict takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
-TOGETHER = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,8 +195,9 @@ class Elements:
 
         NaN where the user gave the size, or no coarser body can be made.
         """
+        together = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
         left = sectors[0].place[2]
-        return float(np.abs(left[max(0, top[1] + 1 - TOGETHER) : top[1] + 1]).mean())
+        return float(np.abs(left[max(0, top[1] + 1 - together) : top[1] + 1]).mean())
 
     def within(self, most: float) -> Elements:
         """Return the body with larger elements where there are too many unknowns.

@@ -23,7 +23,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
 CHUNK = 1000  # elements at a time: keeps their (k, k) blocks out of memory
-STRAIGHT = 1e-12  # of the body: a middle no farther off its chord lies on it
 VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
@@ -47,9 +46,10 @@ def _geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
 
 def _bent(solid: Solid) -> Array:
     """Return which elements (t,) have a curved edge."""
+    straight = 1e-12  # of the body: a middle no farther off its chord lies on it
     chord = solid.node_m[solid.tet[:, TET_EDGE]].mean(axis=2)
     off = np.abs(solid.node_m[solid.tet[:, 4:]] - chord).max(axis=(1, 2))
-    return np.asarray(off > STRAIGHT * np.abs(solid.node_m).max())
+    return np.asarray(off > straight * np.abs(solid.node_m).max())
 
 
 def assemble(

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 PER_WAVE = 0.2
 """First edge over the shortest wave."""
-WIDE = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
-LARGEST = 0.2  # edge over the diagonal, at most
 
 
 def filled(
@@ -56,6 +54,7 @@ def filled(
     MeshError, ModalError
         The body cannot be filled, or its clamps do not fit it.
     """
+    wide = 2.2  # given elements over 2V/A, which is half as thick as a bar: wider ones take degree 3
     given, thickness_m = sizes
 
     def at_size(edge_m: float, filler: Filler) -> Filled:
@@ -68,7 +67,7 @@ def filled(
     wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first, say)
     edge = given or edge_m
     thin = edge > wall_m
-    degree = 2 if given and given < WIDE * wall_m else 3
+    degree = 2 if given and given < wide * wall_m else 3
     anew = None if given else at_size
     made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
     if given is None:
@@ -92,6 +91,7 @@ def _first(
     The edge follows the shortest wave of a plate as thick as the body, at the highest λ wanted or at the wave number of
     as many modes as are wanted, with no more unknowns than their work allows.
     """
+    largest = 0.2  # edge over the diagonal, at most
     skin = prepared(*soup(shapes), thickness_m)
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
     wall = skin.thickness_m / length_m
@@ -99,7 +99,7 @@ def _first(
     bulk = (3 * np.pi**2 * (wanted.most + 8) / (area * wall / 2)) ** (1 / 3)  # two shear waves fill a lump
     number = float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor))
     modes = cost.modes_below(number, area, wall, wanted)
-    edge = min(PER_WAVE * 2 * np.pi / min(number, max(flat, bulk)), LARGEST)
+    edge = min(PER_WAVE * 2 * np.pi / min(number, max(flat, bulk)), largest)
     thin = edge > wall
     most = min(MOST_UNKNOWNS[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin))))
     least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_PER_TET[3])

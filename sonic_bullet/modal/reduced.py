@@ -26,8 +26,6 @@ from sonic_bullet.records.errors import ModalError
 
 APART = 0.05  # of ν₁ and ν₂ from the guess
 POISSON = (-0.5, 0.485)
-ACCURACY = 0.01  # of the highest mode's frequency: as `analyse` has it by default
-BEYOND = 1.1  # × the limit on λ: a mode above it at one ν may lie below it at the other
 
 
 @one_thread()
@@ -46,6 +44,7 @@ def family(
 
     fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
     """
+    beyond = 1.1  # × the limit on λ: a mode above it at one ν may lie below it at the other
     say = progress or (lambda _: None)
     length = diagonal_m((shape,))
     limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
@@ -70,7 +69,7 @@ def family(
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
-    wanted = Wanted(limit, MOST_MODES, BEYOND)
+    wanted = Wanted(limit, MOST_MODES, beyond)
     method = chosen(
         (shape,),
         length,
@@ -123,11 +122,12 @@ def _reduced(
     method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[float, float], say: Callable[[str], None]
 ) -> Family:
     """Build the family that the modes at two Poisson's ratios span, sector by sector."""
+    accuracy = 0.01  # of the highest mode's frequency: as `analyse` has it by default
     from scipy.linalg import block_diag
 
     tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
     while True:  # until there is a mode
-        method, sectors, _, _, error = converged(method, tensors, wanted, ACCURACY, say)
+        method, sectors, _, _, error = converged(method, tensors, wanted, accuracy, say)
         sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
         if sectors:
             break

@@ -45,8 +45,6 @@ ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ..
 """E along x, y, z over the largest; G_yz, G_xz, G_xy over those that go with it, √(E_i E_j)/2(1+ν)."""
 FEWER = (0, 4, 5, 6, 11, 12, 13)  # anchors used where each costs a solution by elements
 SPARE = 1.3  # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
-SPANNED = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
-SHORTER = 1.0  # factor on the wave number of an isotropic body with as many modes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,8 +192,9 @@ def _joined(
 
 def _spanning(vector: Array, gram: Array) -> Array:
     """Combine k unit vectors with Gram matrix (k, k) into (k, b) orthonormal ones that span all that has weight."""
+    spanned = 1e-4  # weight (λ of the Gram matrix of unit modes) below which a direction adds nothing
     value, turn = np.linalg.eigh((gram + gram.T) / 2)
-    good = value > SPANNED
+    good = value > spanned
     return np.asarray(vector @ (turn[:, good] / np.sqrt(value[good])))
 
 
@@ -204,6 +203,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
 
     None where the shape is no such box, or takes too many unknowns.
     """
+    shorter = 1.0  # factor on the wave number of an isotropic body with as many modes
     from sonic_bullet.modal import polynomials
     from sonic_bullet.modal.meshing import structured
     from sonic_bullet.modal.meshing.solid import surface
@@ -217,7 +217,7 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
     tensors = unit_tensors()[:, voigt][:, :, voigt]
     # shear waves in a volume [Weyl 1912]; bending ones are fewer where it is thick
     bulk = (3 * np.pi**2 * count / np.prod(size)) ** (1 / 3)
-    wave = SHORTER * min(polynomials.wave_number_of(count, size), float(bulk))
+    wave = shorter * min(polynomials.wave_number_of(count, size), float(bulk))
     x, y, z = np.ceil(wave * size / 2 + 3 + 2 * np.minimum(1, wave * size / 8)).astype(int)
     terms = (int(x), int(y), int(z))
     if polynomials.unknowns(terms) > polynomials.MOST_UNKNOWNS:

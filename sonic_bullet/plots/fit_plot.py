@@ -23,12 +23,12 @@ from sonic_bullet.records.errors import FileError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DYNAMICS_DB = 80.0
 WINDOW = 1024
 
 
 def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
     """Draw a fit to .png, .pdf or .svg. Raises FileError."""
+    dynamics_db = 80.0
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -51,7 +51,7 @@ def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
                 origin="lower",
                 aspect="auto",
                 extent=extent,
-                vmin=-DYNAMICS_DB,
+                vmin=-dynamics_db,
                 vmax=0,
                 cmap="magma",
             )

@@ -18,7 +18,6 @@ from sonic_bullet.records.errors import FileError
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.spectrogram import Power, power
 
-DYNAMICS_DB = 80.0
 WINDOW = 1024
 
 
@@ -54,9 +53,10 @@ def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> No
 
 
 def _spectrogram(axes: Any, one: Power, top: float) -> None:
+    dynamics_db = 80.0
     level = 10 * np.log10(one.per_hz + 1e-30) - top
     extent = (0, one.time_s[-1], 0, one.freq_hz[-1] / 1000)
-    axes.imshow(level, origin="lower", aspect="auto", extent=extent, vmin=-DYNAMICS_DB, vmax=0, cmap="magma")
+    axes.imshow(level, origin="lower", aspect="auto", extent=extent, vmin=-dynamics_db, vmax=0, cmap="magma")
 
 
 def _plane(axes: Any, strikes: Strikes, amplitude: Array, share: Array) -> None:

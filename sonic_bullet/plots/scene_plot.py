@@ -29,11 +29,7 @@ from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, S
 
 EXTENSIONS = (".png", ".pdf", ".svg")
 BARS = {SUPPORT: "rests", ROLL: "rolls", SLIDE: "slides"}
-WINDOW_S = 0.010
-COLUMNS_MAX = 1600
-DYNAMICS_DB = 90.0
 LANES_MAX = 24
-STRIKES_MAX = 400  # of a lane, the strongest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,11 +73,13 @@ def spectrogram_db(samples: Array | KeptSound, sr: int) -> tuple[Array, Array, A
     Returns frequencies (f,) Hz, times (t,) s, levels (f, t) dB re 20 µPa. A Hann window of 10 ms, scaled so that a sine
     of amplitude a reads 20 log10(a/√2/20 µPa) whatever the rate.
     """
+    columns_max = 1600
+    window_s = 0.010
     from scipy.signal.windows import hann
 
     sound = as_sound(samples)
-    size, frames = max(16, round(WINDOW_S * sr)), sound.shape[1]
-    hop = max(size // 4, int(np.ceil(frames / COLUMNS_MAX)))
+    size, frames = max(16, round(window_s * sr)), sound.shape[1]
+    hop = max(size // 4, int(np.ceil(frames / columns_max)))
     window, length = hann(size, sym=False), 2 ** int(np.ceil(np.log2(size)) + 1)
     middle = np.arange(0, frames + hop, hop)
     amplitude = np.zeros((length // 2 + 1, len(middle)))
@@ -205,6 +203,7 @@ def _draw_samples(axis: Any, sound: KeptSound, sr: int, what: str, unit: str) ->
 
 
 def _draw_spectrogram(axis: Any, sound: KeptSound, sr: int) -> Any:
+    dynamics_db = 90.0
     frequency, time_s, level = spectrogram_db(sound, sr)
     shown = frequency <= 20_000
     frequency, level = frequency[shown], level[shown]
@@ -214,7 +213,7 @@ def _draw_spectrogram(axis: Any, sound: KeptSound, sr: int) -> Any:
     if not np.isfinite(loudest):
         axis.text(0.5, 0.5, "silence", transform=axis.transAxes, ha="center", color="#777777")
         return None
-    floor = loudest - DYNAMICS_DB
+    floor = loudest - dynamics_db
     image = axis.imshow(
         np.maximum(level, floor),
         origin="lower",
@@ -236,6 +235,7 @@ def _lanes(log: ContactLog, events: Events) -> list[int]:
 
 
 def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -> None:
+    strikes_max = 400  # of a lane, the strongest
     from matplotlib import colormaps
     from matplotlib.lines import Line2D
 
@@ -261,7 +261,7 @@ def _draw_events(axis: Any, log: ContactLog, events: Events, lanes: list[int]) -
                 alpha=alpha,
             )
         mine = np.flatnonzero(events.strike_body == body)
-        mine = mine[np.argsort(-events.strike_n_s[mine], kind="stable")[:STRIKES_MAX]]
+        mine = mine[np.argsort(-events.strike_n_s[mine], kind="stable")[:strikes_max]]
         axis.scatter(
             events.strike_s[mine],
             np.full(len(mine), lane),

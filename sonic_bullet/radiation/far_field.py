@@ -31,7 +31,6 @@ from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weigh
 from sonic_bullet.radiation.entrained_mass import Moved, moved_air
 from sonic_bullet.records import Air, Array, ModalModel
 
-MOST_PATCHES = 1800
 MOST_TRIANGLES = (700, 850, 1000, 1200, 1400)
 """Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
 its triangles' chords would cross. The last takes 2 s of processor."""
@@ -53,6 +52,7 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
 
 def radiation_and_note(model: ModalModel, air: Air) -> tuple[Array, Array, str]:
     """Compute `radiation`, and a note: `COMPACT` where the compact law replaces the near field, else ""."""
+    most_patches = 1800
     m = model.mode_count
     corner, face = sound_faces(model)
     if m == 0 or len(face) == 0:
@@ -63,7 +63,7 @@ def radiation_and_note(model: ModalModel, air: Air) -> tuple[Array, Array, str]:
     area = np.linalg.norm(twice, axis=1) / 2
     normal = twice / (2 * area[:, None])
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
-    patch, place = _patches(corner, area, normal, MOST_PATCHES)
+    patch, place = _patches(corner, area, normal, most_patches)
     near = _near(corner, area, normal)
     if near is None:
         weight = compact_weight(model, face, area, normal @ turn, k, air)

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 TEXT_BYTES = 990  # of a whole message: names and files may hold megabytes, a terminal does not
-REMEDY_BYTES = 350  # of those, where both parts are long
 
 
 class SonicBulletError(Exception):
@@ -21,9 +20,10 @@ class SonicBulletError(Exception):
     """
 
     def __init__(self, what: str, remedy: str = "") -> None:
+        remedy_bytes = 350  # of those, where both parts are long
         what, remedy = " ".join(what.split()), " ".join(remedy.split())
         spare = TEXT_BYTES - 2 - len(_encoded(what))
-        self.remedy = _within(remedy, max(spare, REMEDY_BYTES))
+        self.remedy = _within(remedy, max(spare, remedy_bytes))
         self.what = _within(what, TEXT_BYTES - 2 - len(_encoded(self.remedy)))
         super().__init__(f"{self.what}; {self.remedy}" if self.remedy else self.what)
 

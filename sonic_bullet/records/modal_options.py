@@ -10,8 +10,6 @@ from sonic_bullet.records.coerce import as_number, as_rows, as_whole
 from sonic_bullet.records.errors import MeshError, ModalError
 
 MOST_ASKED = 2000
-HIGHEST_HZ = 1e9
-THICKEST_M = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +43,8 @@ class ModalOptions:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        thickest_m = 1e4
+        highest_hz = 1e9
         remedy = "give clamps as [(x, y, z, radius), …] in metres, body frame"
         fixed = as_rows(self.fixed, "fixed", 4, remedy, error=ModalError)
         for number, row in enumerate(fixed):
@@ -52,7 +52,7 @@ class ModalOptions:
         store(
             self,
             to_hz=as_number(
-                self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=HIGHEST_HZ, error=ModalError
+                self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=highest_hz, error=ModalError
             ),
             fixed=fixed,
             accuracy=as_number(
@@ -77,7 +77,7 @@ class ModalOptions:
                 "thickness_m",
                 "give a wall thickness above zero, in m",
                 above=0,
-                most=THICKEST_M,
+                most=thickest_m,
                 error=MeshError,
             )
             store(self, thickness_m=wall)

@@ -23,7 +23,6 @@ from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
-SHOWN = 2  # strikes with players
 PEAK = 0.9
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
@@ -105,8 +104,9 @@ def _why_none(d: Diagnosis, split: str) -> str:
 
 
 def _players(d: Diagnosis) -> str:
+    shown = 2  # strikes with players
     parts = []
-    takes = [t for t in d.takes if np.isfinite(t.sample).all()][:SHOWN]
+    takes = [t for t in d.takes if np.isfinite(t.sample).all()][:shown]
     both = [predict_takes(h, takes) for h in (d.closed.before, d.closed.after)]
     for take in takes:
         before, after = (take.played(made[take.body]) for made in both)

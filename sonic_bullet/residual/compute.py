@@ -23,13 +23,10 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, transform
 from sonic_bullet.residual.transfer import StruckModes
 
-LONGEST_S = 1.0
 FINE_WINDOW = 4096
-LINES_MOST = 128
 LINE_FLOOR = 1e-4
 """Lines with less than this fraction of the loudest line's energy (40 dB) and of the clip's are left out."""
 BAND_OCTAVES = 1 / 6
-GROWTH = 1.12
 ABOVE = 2.0
 """Cells whose mean is less than this times the floor are the floor."""
 LOWEST_BINS = 1.5
@@ -87,17 +84,19 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
 
     Bands of a sixth of an octave or a bin, frames of 1, 1, … then ever more.
     """
+    growth = 1.12
+    longest_s = 1.0
     width = left.freq_hz[1]
     edge = [0.0]
     while edge[-1] < left.freq_hz[-1]:
         edge.append(max(edge[-1] + width, edge[-1] * 2**BAND_OCTAVES))
     band = np.searchsorted(edge[1:-1], left.freq_hz, "right")
-    last = int(np.searchsorted(left.time_s, min(LONGEST_S, left.time_s[-1]), "right"))
+    last = int(np.searchsorted(left.time_s, min(longest_s, left.time_s[-1]), "right"))
     ends: list[int] = []
     step = 1.0
     while sum(ends) < last:
         ends.append(int(step))
-        step = step * GROWTH if len(ends) > 8 else 1.0
+        step = step * growth if len(ends) > 8 else 1.0
     frame = np.minimum(np.repeat(np.arange(len(ends)), ends), len(ends) - 1)[:last]
     count = np.bincount(band)[:, None] * np.bincount(frame)[None]
     kept = count[:, 0] > 0
@@ -186,6 +185,7 @@ def residual_record(
     rest : (s, n) recording without the modes as the model plays them
     lines : frequency, decay, amplitude (l,), mean square over the strikes, of the rest of the features
     """
+    lines_most = 128
     if not len(recorded) or recorded.shape != left.shape or recorded.shape != rest.shape:
         raise AudioError(
             f"recordings of shape {recorded.shape}, of which {left.shape} is left", "give strikes of one length"
@@ -202,7 +202,7 @@ def residual_record(
         fine = [[power(x, sr, FINE_WINDOW) for x in sounds] for sounds in (recorded, rest, recorded - rest)]
         line_amplitude = line_amplitude * np.sqrt(line_room(fine[0], fine[1], fine[2], lines, recorded.shape[1] / sr))
     energy = line_amplitude**2 / (4 * np.maximum(line_decay, 0.1))
-    order = np.argsort(-energy, kind="stable")[:LINES_MOST]
+    order = np.argsort(-energy, kind="stable")[:lines_most]
     order = np.sort(order[energy[order] > LINE_FLOOR * min(float(energy.max(initial=0.0)), clip)])
     whole = float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq))
     if whole < 1e-8 * clip:

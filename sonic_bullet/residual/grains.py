@@ -39,11 +39,7 @@ from sonic_bullet.residual.transfer import (
 )
 
 LONGEST_S = 0.5
-FADE_IN_S = 1e-3
-FADE_OUT = 0.15
 STEP_DB = 2.0
-LEAST_DB = -60.0
-CACHED = 256
 KNOTS = 33
 SEEDS = (0x5EED, 0xF00D)
 
@@ -112,8 +108,10 @@ def duration(residual: Residual, pairs: ModePairs, sr: int, longest_s: float) ->
 @lru_cache(maxsize=16)
 def faded(n: int, sr: int) -> Array:
     """Return a window (n,) float32 that rises within a millisecond and falls over the last 15 %, without corners."""
+    fade_out = 0.15
+    fade_in_s = 1e-3
     shape = np.ones(n, np.float32)
-    rise, fall = max(2, round(FADE_IN_S * sr)), max(2, int(FADE_OUT * n))
+    rise, fall = max(2, round(fade_in_s * sr)), max(2, int(fade_out * n))
     shape[:rise] = np.sin(np.pi / 2 * (np.arange(rise) + 0.5) / rise) ** 2
     shape[n - fall :] *= np.cos(np.pi / 2 * (np.arange(fall) + 0.5) / fall) ** 2
     shape.setflags(write=False)
@@ -145,6 +143,7 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
     struck_power (p,): a² of the pairs. pulse: |F̂| (k,) of a force pulse at products fτ (k,), flat or not, relative to
     0 Hz.
     """
+    cached = 256
     most = float(struck_power.max(initial=0.0))
     if most <= 0 or voice.silent:
         return np.zeros((2, 0), np.float32), 0.0
@@ -157,7 +156,7 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
     if found is None:
         gain = response(voice, 10 ** (step[:-2] * STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat))
         found = filtered(voice, gain)
-        while len(voice.cache) >= CACHED:
+        while len(voice.cache) >= cached:
             voice.cache.pop(next(iter(voice.cache)))
         voice.cache[key] = found
     return found, float(np.sqrt(most))
@@ -189,7 +188,8 @@ def fraction(number: int) -> float:
 @njit(nogil=True)
 def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover - compiled
     """Write levels of power (p,) below the most, in whole steps, to step (p + 2,)."""
-    least = most * 10.0 ** (LEAST_DB / 10.0)
+    least_db = -60.0
+    least = most * 10.0 ** (least_db / 10.0)
     for p in range(len(power)):
         step[p] = round(10.0 * np.log10(max(power[p], least) / most) / STEP_DB)
 

@@ -20,7 +20,6 @@ from sonic_bullet.residual.invert import MOST_ITERATIONS, invert, magnitude_of
 from sonic_bullet.residual.spectrogram import WINDOW, axes
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
 
-LONGEST_S = 1.0
 LOOKING = 4
 """Frames a quarter of a window apart, as in `clip_residual`."""
 
@@ -58,12 +57,13 @@ def residual_sound(
     residual: Residual, freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int, seed: int = 0
 ) -> Array:
     """Synthesise the residual (n,) of modes (m,) of complex amplitude at the onset, in their unit."""
+    longest_s = 1.0
     order = np.argsort(freq_hz, kind="stable")
     freq, decay, start = freq_hz[order], decay_per_s[order], np.asarray(amplitude, complex)[order]
     if not len(freq) or not np.abs(start).max() > 0:
         return np.zeros(n)
     target = StruckModes(freq, decay, np.abs(start))
-    voice = make_voice(residual, target, sr, LONGEST_S)
+    voice = make_voice(residual, target, sr, longest_s)
     power = paired_power(voice.pairs, target)
     lead = np.zeros(len(power), complex)
     for k in np.argsort(np.abs(start), kind="stable"):

@@ -31,7 +31,6 @@ DOMINANT = 24
 """Most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1."""
 ALIKE = 0.02
 """Frequencies that agree so well after scaling are of the same mode of a scaled body."""
-ALIKE_COUNT = 12
 ONE_MODE = 1e-3
 """Modes closer than this, relative, count as one: an analysis finds one line."""
 SKIRT = 0.07
@@ -147,7 +146,8 @@ def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
 
     The scale is searched among ratios of the lowest.
     """
-    count = min(ALIKE_COUNT, len(a.freq_hz), len(b.freq_hz))
+    alike_count = 12
+    count = min(alike_count, len(a.freq_hz), len(b.freq_hz))
     none = np.zeros(0, np.int64)
     if count < min(3, len(a.freq_hz)):
         return none, none

@@ -60,7 +60,6 @@ CODECS = {
 }
 CONTAINERS = {".mp4": ("aac", "mp3"), ".mov": ("pcm", "aac"), ".mkv": ("flac", "opus", "pcm", "aac", "mp3")}
 """Extension -> codecs that players know there, the usual one first."""
-FPS_MOST = 1000
 SIDE_MOST = 8192
 SOUND_BLOCK_S = 0.5
 """How far sound is ahead of the pictures in the file, at most: players read both without jumping."""
@@ -68,6 +67,7 @@ SOUND_BLOCK_S = 0.5
 
 def as_fps(text: object) -> Fraction:
     """Parse pictures a second, as a fraction: 30, "30000/1001", "29.97". Raises FileError."""
+    fps_most = 1000
     remedy = "give pictures a second, 24, 25, 30000/1001 or 60 say"
     try:
         fps = fraction_of(str(text))
@@ -78,7 +78,7 @@ def as_fps(text: object) -> Fraction:
         exact = Fraction(whole * 1000, 1001)
         if fps != exact and any(float(fps) == round(float(exact), digits) for digits in (2, 3)):
             fps = exact
-    if not 1 <= fps <= FPS_MOST or fps.denominator > 100_000:
+    if not 1 <= fps <= fps_most or fps.denominator > 100_000:
         raise FileError(f"fps is {shown(text)}", remedy)
     return fps
 

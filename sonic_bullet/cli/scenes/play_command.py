@@ -30,7 +30,6 @@ The physics runs as fast as the card takes its sound. The last line says what wa
 and how often there was nothing to play: then the scene is too much for this machine in real time; render it."""
 
 CARD_OPTIONS = ("device", "full_scale_pa", "ahead_s")
-REFRESH_S = 0.25  # of the line on a terminal
 
 
 @click.command(epilog=EPILOG)
@@ -91,10 +90,11 @@ class _Show:
 
     def __call__(self, share: float) -> None:
         """Show the fraction done, seldom, as that takes time from the physics; raise the failure of the card."""
+        refresh_s = 0.25  # of the line on a terminal
         if self.playback is not None and self.playback.failure is not None:
             failure = self.playback.failure
             raise AudioError(failure.what, f"{failure.remedy}; {self.report}")
-        if time.perf_counter() - self._drawn_s > REFRESH_S:
+        if time.perf_counter() - self._drawn_s > refresh_s:
             self._progress(share)
             if self.playback is not None:
                 self.tell(str(self.report))

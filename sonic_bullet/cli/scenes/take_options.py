@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from sonic_bullet.session.variation import LogTake, Variation
 
 VARIED = ("surfaces", "places", "materials")
-MOST_TAKES = 999
 OPTIONS = ("takes", "take", "vary", "footprint_mm", "roughness", "gain", "page")
 
 
 def take_options(command: Any) -> Any:
     """Add the options of `TakesWish`."""
+    most_takes = 999
     for option in reversed(
         (
             click.option(
                 "--takes",
-                type=click.IntRange(1, MOST_TAKES),
+                type=click.IntRange(1, most_takes),
                 metavar="N",
                 help="Write N takes, NAME-01.wav …, of other surfaces, contact places and materials; the first is the "
                 "render itself. Motion stays.",

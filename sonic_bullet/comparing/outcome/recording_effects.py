@@ -20,7 +20,6 @@ from sonic_bullet.comparing.outcome.sound_effects import level_words
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-DELAY_MOST_S = 0.5
 GROUP_DELAY = 16
 """Largest group delay of a filter in samples."""
 FILTER_DB = 0.1
@@ -29,13 +28,10 @@ LEFT_DB = -90.0
 """A residual below this, re the recording, is rounding of 16 bits."""
 CLIPPED_RUN = 4
 """Samples in a row at one extreme value: a sine at 1 kHz has two at 48 kHz."""
-GAP_S = 0.002
 CHANCE, COMMON_SHARE = 0.01, 0.25
 """α; and the fraction of B's power that A explains beyond chance in any case: a tone correlates with any other."""
-ENVELOPE_S = 0.02
 OFFSET_ERRORS = 4
 """Standard errors of a mean that noise exceeds in 6 of 100 000 cases."""
-GAIN_DB = 0.005
 
 
 def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
@@ -103,15 +99,17 @@ def _delay(a: Array, b: Array, sr: int) -> tuple[int, int, float, float]:
 
     Also returns the fraction of B's power that it explains, and that explained by chance.
     """
+    envelope_s = 0.02
+    delay_most_s = 0.5
     n = 1 << int(np.ceil(np.log2(a.shape[1] + b.shape[1])))
     one, other = np.fft.rfft(a, n, axis=1), np.fft.rfft(b, n, axis=1)
-    most = min(round(DELAY_MOST_S * sr), a.shape[1] - 1, b.shape[1] - 1)
+    most = min(round(delay_most_s * sr), a.shape[1] - 1, b.shape[1] - 1)
     lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
     near = np.fft.irfft((np.conj(one) * other).sum(axis=0), n)[lags]
     k = int(np.argmax(np.abs(near)))
     whole = float(np.square(a).sum() * np.square(b).sum())
     spread = sum(
-        np.sqrt(_meeting(x, y, n, round(ENVELOPE_S * sr))[lags].max() * np.fft.irfft(p * q, n)[0] / (p_0 * q_0))
+        np.sqrt(_meeting(x, y, n, round(envelope_s * sr))[lags].max() * np.fft.irfft(p * q, n)[0] / (p_0 * q_0))
         for x, y, p, q in zip(a, b, np.abs(one) ** 2, np.abs(other) ** 2, strict=True)
         if (p_0 := np.square(x).sum()) and (q_0 := np.square(y).sum())
     )
@@ -154,9 +152,10 @@ def _flat_tops(x: Array) -> tuple[int, float]:
 
 def _gaps(x: Array, y: Array, sr: int) -> list[Consequence]:
     """Find where B is exactly zero and A is not."""
+    gap_s = 0.002
     silent = (y == 0).all(axis=0) & (np.abs(x).max(axis=0) > 1e-6 * np.abs(x).max())
     edges = np.flatnonzero(np.diff(np.concatenate([[0], silent.astype(np.int8), [0]])))
-    runs = [(start, stop) for start, stop in zip(edges[::2], edges[1::2], strict=True) if stop - start >= GAP_S * sr]
+    runs = [(start, stop) for start, stop in zip(edges[::2], edges[1::2], strict=True) if stop - start >= gap_s * sr]
     if not runs:
         return []
     start, stop = runs[0]
@@ -166,6 +165,7 @@ def _gaps(x: Array, y: Array, sr: int) -> list[Consequence]:
 
 def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
     """Find a gain or filter, and the residual of both."""
+    gain_db = 0.005
     gain = float((x * y).sum() / np.square(x).sum())
     left = y - gain * x
     level = _db(left, y)
@@ -182,7 +182,7 @@ def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
             )
             values = {"freq_hz": [float(f) for f in freq], "db": [round(float(v), 3) for v in response]}
             return [Consequence("filter", words, None, values)]
-    if abs(20 * np.log10(max(abs(gain), 1e-12))) > GAIN_DB and level < -20:
+    if abs(20 * np.log10(max(abs(gain), 1e-12))) > gain_db and level < -20:
         words = f"B is A, {level_words(float(20 * np.log10(abs(gain))), digits=3)}"
         found.append(Consequence("gain", words, None, {"gain_db": float(20 * np.log10(abs(gain)))}))
     if level > LEFT_DB and clean:

@@ -18,8 +18,6 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to count as amplitude-dependent
-SPREAD = 0.02  # of a level's own fall
-LEAST_FRAMES = 8  # frames
 LACKS = 0.5  # of a decay, at most
 
 
@@ -43,6 +41,7 @@ def amplitude_dependent(p: Prediction, one: ObjectEvidence) -> Array:
 
 def fallen(p: Prediction, one: ObjectEvidence) -> ObjectEvidence:
     """Identify the decays of isolated, amplitude-dependent lines by the fall of their own levels."""
+    spread = 0.02  # of a level's own fall
     if not bends(p.hypothesis) or one.signal is None or one.dry or not len(one.freq_hz):
         return one  # in a room no line is one mode's alone
     dependent = amplitude_dependent(p, one)
@@ -61,7 +60,7 @@ def fallen(p: Prediction, one: ObjectEvidence) -> ObjectEvidence:
             decay[k] = falls(e, q, float(decay[k]))
         elif made is not None and one.mode[k].max() < len(mode):
             decay[k] = beats(e, made, q, float(mode[one.mode[k]].mean()))
-        sd[k] = SPREAD * decay[k]
+        sd[k] = spread * decay[k]
     return replace(one, decay_per_s=decay, decay_sd_per_s=sd)
 
 
@@ -77,10 +76,11 @@ def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
     decay_per_s : float
         Decay in the synthesis, returned where too little is clear in both.
     """
+    least_frames = 8  # frames
     top = bottom = 0.0
     for s in range(len(e.z)):
         use = e.good[s, q] & made.good[s, q]
-        if use.sum() < LEAST_FRAMES:
+        if use.sum() < least_frames:
             continue
         t, w = e.time_s[q, use], e.worth(s, q)[use]
         left = np.log(np.abs(e.z[s, q, use]) / np.abs(made.z[s, q, use]))

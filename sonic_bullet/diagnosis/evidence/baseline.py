@@ -34,9 +34,6 @@ from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
-LEAST_LINES = 4  # of some strikes: fewer are no list
-NEARER = 0.9  # of the distance, where chains are one line each
-SOFTER = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to differ from it
 BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
 # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
 OFTEN, MOSTLY = 0.4, 1.05
@@ -84,6 +81,7 @@ def baseline(
     progress : callable
         Called with what is being done.
     """
+    nearer = 0.9  # of the distance, where chains are one line each
     plain = _of(case, recorded, cache, progress)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
     directions += (
@@ -100,7 +98,7 @@ def baseline(
         )
     best = min((_of(case, faint, cache, None) for faint in directions), key=_off_db)
     changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
-    most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else NEARER
+    most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else nearer
     return best if _off_db(best) < most * _off_db(plain) else plain
 
 
@@ -115,11 +113,12 @@ def _soft(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
 
     Unchanged where chains are few or no strikes are much softer than the others.
     """
+    softer = 0.6  # of the middle strike's impulse at most, of half the strikes: soft enough to differ from it
     if one.signals is None or unchained(one.lines, LINKS[0]) is None:
         return one
     level = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in one.recordings])
     order = np.argsort(level)[: len(level) // 2]
-    if not (len(order) > 1 and np.isfinite(level).all() and level[order].max() < SOFTER * np.median(level)):
+    if not (len(order) > 1 and np.isfinite(level).all() and level[order].max() < softer * np.median(level)):
         return one
     lines = _lines_by(one, np.sort(order), band_hz)
     return one if lines is None else replace(one, lines=unchained(lines, LINKS[0]) or lines)
@@ -144,6 +143,7 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
 
     None where those are too soft, or the lines are those after the attack.
     """
+    least_lines = 4  # of some strikes: fewer are no list
     if one.signals is None or one.ringing:
         return None
     still = without_hum(one.signals, noise_rms(one.signals, one.sr), one.sr)
@@ -152,7 +152,7 @@ def _lines_by(one: Recorded, strikes: Array, band_hz: tuple[float, float]) -> Li
         lines = lines_of(still, noise_rms(still, one.sr), some.pole, one.sr, some.signed)
     except (AudioError, np.linalg.LinAlgError):
         return None
-    return lines if len(lines.freq_hz) >= LEAST_LINES else None
+    return lines if len(lines.freq_hz) >= least_lines else None
 
 
 def _off_db(b: Baseline) -> float:

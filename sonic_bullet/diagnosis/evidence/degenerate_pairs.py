@@ -20,19 +20,19 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
 LIKE = 0.97  # cosine of a line's amplitudes over the strikes and its modes' pattern
-LEAST_MEMBERS = 3  # modes of such a group
 LEAST_STRIKES = 3  # by which a pattern is known
 
 
 def separated(body: Struck) -> Struck:
     """Divide a body's groups of modes that two lines show to be two."""
+    least_members = 3  # modes of such a group
     if body.recorded is None or body.family is None or len(body.fitted) < LEAST_STRIKES:
         return body
     lines, row = body.recorded.lines, pattern(body, body.model)[body.fitted]
     line, correction, freq = body.line.copy(), body.correction.copy(), body.model.freq_hz
     for one in np.unique(line[line >= 0]):
         group = np.flatnonzero(line == one)
-        if len(group) < LEAST_MEMBERS:
+        if len(group) < least_members:
             continue
         cut = 1 + int(np.diff(freq[group]).argmax())
         free = [

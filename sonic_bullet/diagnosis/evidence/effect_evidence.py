@@ -22,11 +22,9 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
 
-REACH = 0.012  # of a line from its mode where effects have moved it
 LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
 # of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
 OWN, ALIKE = 1e-4, 2.0
-DIRECT_S = 0.008  # of the sound path: what comes later is an echo
 
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
@@ -178,6 +176,7 @@ def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ..
 
 def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     """Pair lines and modes by frequency, pattern and decay."""
+    reach = 0.012  # of a line from its mode where effects have moved it
     from scipy.optimize import linear_sum_assignment
 
     assert p.body.recorded is not None
@@ -192,7 +191,7 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
-    price = np.minimum((gap / REACH) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
+    price = np.minimum((gap / reach) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
     price[known] = 0.0
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
@@ -213,11 +212,12 @@ def path_response(h: Hypothesis, freq_hz: Array, sr: int) -> Array:
 
     Its effects are applied to a weak impulse, less what they add to silence.
     """
+    direct_s = 0.008  # of the sound path: what comes later is an echo
     # lines are dereverberated already
     effects = [e for e in h.at(Stage.SOUND) if not isinstance(e, Dereverberates)]
     if not effects:
         return np.ones(len(freq_hz), complex)
-    n = round(DIRECT_S * sr)
+    n = round(direct_s * sr)
     weak, silent = Sound(1e-6 * np.eye(1, n)[0], sr, 1.0), Sound(np.zeros(n), sr, 1.0)
     for effect in effects:
         weak, silent = effect.apply(weak), effect.apply(silent)

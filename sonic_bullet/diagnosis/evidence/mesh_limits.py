@@ -30,7 +30,6 @@ from sonic_bullet.records import Array
 
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 FAR = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
-NEARER_DB = 0.05  # without a mode, that ought to be silent
 
 
 def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
@@ -63,6 +62,7 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
 
 def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
     """Move a body's modes near the band's upper edge outside it, from the top, where strikes are nearer so."""
+    nearer_db = 0.05  # without a mode, that ought to be silent
     p = predict(h, body)
     model, order = p.model, p.order
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
@@ -79,7 +79,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
         other[order[who]] = (1 + other[order[who]]) * (1 + step) - 1
         silent = replace(h, correction={**(h.correction or {}), body.name: other})
         far = problem.distance_db(silent)
-        if far < now - NEARER_DB:
+        if far < now - nearer_db:
             h, now, most = silent, far, max(most, step)
     return h, most
 

@@ -26,9 +26,6 @@ LINKS = (
     # a chain's next line is so much shorter at least, and as near as that many times its decay;
     # whether modes are only bent
 )
-SHORTER = 5.0  # at most
-NEAR = 0.012  # of a frequency
-ONE = 2.0  # decays: slow lines that lie nearer are one mode's
 LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
 LEAST_CHAINS, LEAST_SHARE_OF_CHAINS = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
 # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
@@ -100,6 +97,9 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     A line follows the nearest one that it may; two that follow none are two modes though others lie between, unless
     they are at one frequency.
     """
+    one = 2.0  # decays: slow lines that lie nearer are one mode's
+    near = 0.012  # of a frequency
+    shorter = 5.0  # at most
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -108,9 +108,9 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     gap = np.abs(omega[:, None] - omega[None, :])
     linked = (
         (ratio > link[0])
-        & (ratio < SHORTER)
+        & (ratio < shorter)
         & (gap < link[1] * decay[None, :])
-        & (gap < NEAR * omega[:, None])
+        & (gap < near * omega[:, None])
         & (decay[:, None] > 0)
     )
     first = ~linked.any(axis=0)
@@ -118,7 +118,7 @@ def chains(lines: Lines, link: tuple[float, float, bool]) -> list[Array]:
     follows = np.zeros_like(linked)
     follows[parent[~first], np.flatnonzero(~first)] = True
     shared = linked[first].astype(int) @ linked[first].T.astype(int) > 0
-    same = shared & (gap < ONE * np.maximum(decay[:, None], decay[None, :]))[np.ix_(first, first)]
+    same = shared & (gap < one * np.maximum(decay[:, None], decay[None, :]))[np.ix_(first, first)]
     follows[np.ix_(first, first)] |= same
     group = connected_components(csr_array(follows), directed=False)[1]
     return [

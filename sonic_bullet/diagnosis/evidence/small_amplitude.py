@@ -24,8 +24,6 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 STEP = 0.1  # of 1/duration: steps of δ
-LEAST_FRAMES = 8  # frames
-HALFWAY = 0.5  # to the next mode
 AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
@@ -55,6 +53,7 @@ def at_rest(
 
 def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
     """Compute the corrections (m,) of a body."""
+    halfway = 0.5  # to the next mode
     body, modes, count = p.body, p.model, p.base.mode_count
     assert body.recorded is not None and body.recorded.signals is not None
     correction = np.array((p.hypothesis.correction or {}).get(body.name, np.zeros(count)), float)
@@ -74,7 +73,7 @@ def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
         # or it would be taken for its neighbour
         next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)
         ratio = 1 + _off_hz(
-            recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), HALFWAY * float(next_hz))
+            recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), halfway * float(next_hz))
         ) / float(one.freq_hz[k])
         who = p.order[one.mode[k]]
         correction[who] = np.clip((1 + correction[who]) * ratio - 1, -CORRECTION, CORRECTION)
@@ -83,10 +82,11 @@ def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
 
 def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> float:
     """Compute δ of a line in Hz."""
+    least_frames = 8  # frames
     rows = []
     for s in range(len(recorded.z)):
         use = recorded.good[s, q] & (np.abs(model.z[s, q]) > 0)
-        if use.sum() < LEAST_FRAMES:
+        if use.sum() < least_frames:
             continue
         both = recorded.z[s, q, use] * np.conj(model.z[s, q, use])
         rows.append((recorded.time_s[q, use], recorded.worth(s, q)[use] * both / np.abs(both)))

@@ -22,11 +22,8 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
 CORRECTION = 0.01
-TURNS = 3
-BETTER = 0.25  # of a mode's own energy must go from what is left
 PURE = 0.1  # of its energy near its line may be something else
 SKIRT, WIDE = 4.0, 40.0  # half widths to both sides: where a mode is looked for, and taken out
-FINE = 0.25  # of a mode's half width, or of a bin: steps of the search
 
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
@@ -76,6 +73,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
         Modes without a line; all where None. Another moves only if nothing but itself, as the mesh has it, is at its
         line: degenerate modes that an imperfection has turned are not the mesh's.
     """
+    turns = 3
     body, known, model, plain = p.body, p.hypothesis.correction, p.model, p.uncorrected()
     assert body.recorded is not None and body.recorded.signals is not None
     observed, count = object_evidence(p, plain=plain), p.base.mode_count
@@ -90,7 +88,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
     ]
     loud.sort(key=lambda j: -energy[rank[j]])
     left, n = np.fft.rfft(observed.residual, axis=1), body.recorded.signals.shape[1]
-    for _ in range(TURNS):
+    for _ in range(turns):
         before = correction.copy()
         for j in loud:
             decay, push = float(model.decay_per_s[rank[j]]), observed.push[:, rank[j]]
@@ -127,7 +125,9 @@ def _best(
 
     The old one stays unless the new one is clearly better and leaves no more than ``most``.
     """
-    step = FINE * max(decay / (2 * np.pi), sr / n) / own
+    fine = 0.25  # of a mode's half width, or of a bin: steps of the search
+    better = 0.25  # of a mode's own energy must go from what is left
+    step = fine * max(decay / (2 * np.pi), sr / n) / own
     grid = np.concatenate([[now], np.linspace(-CORRECTION, CORRECTION, 2 * int(np.ceil(CORRECTION / step)) + 1)])
     bins = _bins(own, CORRECTION * own + SKIRT * decay / (2 * np.pi) + 2 * sr / n, n, sr)
     shape = _line(own * (1 + grid[:, None]), decay, bins, n, sr, band_hz)
@@ -139,7 +139,7 @@ def _best(
     near = np.abs(bins * sr / n - own * (1 + grid[i])) < decay / np.pi + 2 * sr / n
     rest = np.abs(target - push[:, None] * shape[i])[:, near] ** 2
     pure = most == np.inf or rest.sum() < most * (np.abs(push[:, None] * shape[i])[:, near] ** 2).sum()
-    return float(grid[i]) if inside and pure and cost[i] < cost[0] - BETTER * energy[0] else now
+    return float(grid[i]) if inside and pure and cost[i] < cost[0] - better * energy[0] else now
 
 
 def _bins(freq_hz: float, half_hz: float, n: int, sr: int) -> Array:

@@ -24,9 +24,7 @@ from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.tensor import TensorFamily, tensor_family
 from sonic_bullet.records import Array, Material, ModalModel
 
-KEPT = 12  # solved tensors
 MODES = (30, 160)
-MORE = 1.6  # modes than the isotropic body has in the band: other tensors are softer somewhere
 
 
 def with_elastic(
@@ -49,6 +47,7 @@ def with_elastic(
     progress : callable
         Called with what is being done.
     """
+    more = 1.6  # modes than the isotropic body has in the band: other tensors are softer somewhere
     made = []
     for body in bodies:
         if body.family is None:
@@ -58,7 +57,7 @@ def with_elastic(
         gamma, poisson = found.fit.gamma_m2_s2, found.fit.poisson_ratio
         material = Material.isotropic("fitted", youngs_pa=gamma * density, poisson=poisson, density_kg_m3=density)
         lines = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
-        count = max(int(MORE * body.model.mode_count), round(1.2 * lines) + 8)
+        count = max(int(more * body.model.mode_count), round(1.2 * lines) + 8)
         made.append(
             replace(
                 body,
@@ -109,6 +108,7 @@ def elastic_of(
     say : callable
         Takes progress.
     """
+    kept = 12  # solved tensors
     thing = case.objects[name]
 
     @lru_cache(maxsize=1)
@@ -144,7 +144,7 @@ def elastic_of(
         observed = push * (sensor @ vector if sensor is not None else 1.0)
         return np.sqrt(value) / (2 * np.pi), lambda mode: family().slopes(vector[:, mode], value[mode]), observed
 
-    @lru_cache(maxsize=KEPT)
+    @lru_cache(maxsize=kept)
     def solved(content: bytes) -> ModalModel:
         value, vector = family().modes(np.frombuffer(content).reshape(6, 6))
         low = np.sqrt(value) / (2 * np.pi) < 1.02 * case.band_hz[1]

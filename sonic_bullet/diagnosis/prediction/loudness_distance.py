@@ -17,17 +17,17 @@ from sonic_bullet.estimator.perceptual.image import image
 from sonic_bullet.records.errors import RecordError
 
 FULL_SCALE = 90.0
-LEVELS = 2
 OBSERVED = 0.05  # sone
 
 
 def sone_distance(takes: Comparable, made: Predictions) -> float | None:
     """Compute the mean distance of the takes from a prediction in sone; None where none is audible."""
+    levels = 2
     found = []
     for take in (t for t in takes if isinstance(t, Take)):
         played = with_noise(take.played(made[take.body]), take.floor, take.strike)
         try:
-            a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=LEVELS, bark_step=1.0) for x in (take.sample, played))
+            a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=levels, bark_step=1.0) for x in (take.sample, played))
         except RecordError:
             continue
         for one, two in zip(a.levels, b.levels, strict=False):

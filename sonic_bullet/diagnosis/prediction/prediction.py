@@ -30,8 +30,6 @@ from sonic_bullet.effects.protocol import (
 )
 from sonic_bullet.records import Array, ModalModel
 
-SAMPLED = 300  # vertices by which modes are compared
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
@@ -209,9 +207,10 @@ def ordered(model: ModalModel, freq_hz: Array, decay_per_s: Array) -> tuple[Moda
 
 def came_from(old: ModalModel, new: ModalModel) -> Array:
     """Match each new mode (m,) to the old one that it is most like, by their motion on the surface, one to one."""
+    sampled = 300  # vertices by which modes are compared
     from scipy.optimize import linear_sum_assignment
 
-    step = max(1, len(old.shape) // SAMPLED)
+    step = max(1, len(old.shape) // sampled)
     a, b = (x.shape[::step].reshape(-1, x.mode_count).astype(float) for x in (old, new))
     return np.asarray(linear_sum_assignment(-np.abs(b.T @ a) / np.linalg.norm(a, axis=0))[1])
 

@@ -22,9 +22,7 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
 from sonic_bullet.records import Array
 
-IN_PHASE = 0.8  # of a line's energy, where 1 has one phase but for signs
 DELAY_S = np.linspace(-2.5e-4, 2.5e-4, 101)  # between the middles of a soft impact's pulse and a hard one's
-SWEEPS = 3
 
 
 def out_of_phase(lines: Lines) -> Array:
@@ -32,17 +30,19 @@ def out_of_phase(lines: Lines) -> Array:
 
     None where onsets are not known, or of one strike.
     """
+    in_phase = 0.8  # of a line's energy, where 1 has one phase but for signs
     loud = np.linalg.norm(lines.amplitude, axis=1, keepdims=True)
     a = lines.amplitude / np.maximum(loud, 1e-300)  # every strike has as much to say, however soft
     noise = 2 * ((lines.amplitude_sd / np.maximum(loud, 1e-300)) ** 2).sum(axis=0)
     a = _in_time(a, lines.freq_hz)
-    return np.asarray((np.abs((a**2).sum(axis=0)) < IN_PHASE * ((np.abs(a) ** 2).sum(axis=0) - noise)) & lines.signed)
+    return np.asarray((np.abs((a**2).sum(axis=0)) < in_phase * ((np.abs(a) ** 2).sum(axis=0) - noise)) & lines.signed)
 
 
 def _in_time(a: Array, freq_hz: Array) -> Array:
     """Remove one delay a strike from amplitudes (s, k), found by all lines: each against the others, in turns."""
+    sweeps = 3
     turn = np.exp(4j * np.pi * np.outer(DELAY_S, freq_hz))  # of a²
-    for _ in range(SWEEPS):
+    for _ in range(sweeps):
         for s in range(len(a)):
             common = (a**2).sum(axis=0) - a[s] ** 2
             best = int((turn @ (a[s] ** 2 * np.conj(common) / np.maximum(np.abs(common), 1e-300))).real.argmax())

@@ -21,7 +21,6 @@ from sonic_bullet.records import Array
 
 DELAYS_S = np.arange(-4e-4, 4.01e-4, 1e-5)
 FINER_S = np.linspace(-1e-5, 1e-5, 21)  # half a step of the coarse ones is a sixth of a radian at 5 kHz
-TURNS = 15
 
 
 def misfit(h: Hypothesis, bodies: tuple[Struck, ...]) -> float:
@@ -59,8 +58,9 @@ def _misfit(p: Prediction) -> float:
 
 def _cost(expected: Array, seen: Array, sd: Array, rough: Array) -> float:
     """Compute the same at the best common gain; rough: the shapes' own error, which grows with it."""
+    turns = 15
     gain, weight = 1.0, np.ones(len(expected))
-    for _ in range(TURNS):
+    for _ in range(turns):
         width = sd**2 + (gain * rough) ** 2
         gain = max(
             float(

@@ -37,7 +37,6 @@ LIGHTEST = 0.005
 TRIES = 6
 MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
 STAYED, DEGENERATE = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
-FAR_OFF = 0.015  # of ln f: more than pairs alone find
 BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
 
@@ -100,6 +99,7 @@ class AddedMass(ChangesBaseline):
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Search the surface for the mass that explains the lines best; None where the bare body does as well."""
+        far_off = 0.015  # of ln f: more than pairs alone find
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
         if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
             return None
@@ -138,7 +138,7 @@ class AddedMass(ChangesBaseline):
         first: dict[bool, dict[tuple[int, bool], Scored]] = {False: {}, True: {}}
         # one light and one heavy start a vertex, where the baseline's scale may be right and where it is wrong
         for one in found:
-            first[abs(one[4]) > FAR_OFF].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
+            first[abs(one[4]) > far_off].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
         best = min(
             parallel_map(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]])
         )

@@ -20,7 +20,6 @@ import numpy as np
 from sonic_bullet.geometry import inertia, volume_m3
 from sonic_bullet.records import Array, ModalModel
 
-STILL = 1e-5  # of the largest motion on the surface: a vertex that moves less, in every mode, is held
 OPEN = 0.1  # of the volume: a surface that encloses another is no body's
 
 
@@ -45,12 +44,13 @@ class FreeBody:
     @classmethod
     def of(cls, x: ModalModel) -> FreeBody | None:
         """Compute the properties of a model's body; None where it is held, or its surface encloses nothing."""
+        still = 1e-5  # of the largest motion on the surface: a vertex that moves less, in every mode, is held
         if not len(x.face) or not x.mode_count or x.mass_kg <= 0 or x.volume_m3 <= 0:
             return None
         if abs(volume_m3(x.vertex_m, x.face) / x.volume_m3 - 1) > OPEN:
             return None
         moves = np.abs(x.shape[np.unique(x.face)]).max(axis=(1, 2))
-        if moves.min() < STILL * moves.max():
+        if moves.min() < still * moves.max():
             return None
         _, centre, tensor = inertia(x.vertex_m, x.face, x.mass_kg / x.volume_m3)
         return cls(x.mass_kg, centre, np.linalg.inv(tensor))

@@ -29,7 +29,6 @@ NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
 WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
 # of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
 REACH, BINS = (-0.1, 0.25), 0.008
-PEAKS = 2  # of those shifts, tried further
 
 
 def strict(width: float) -> float:
@@ -167,6 +166,7 @@ class MassFit:
 
         By correlation of the two spectra on a logarithmic axis.
         """
+        peaks = 2  # of those shifts, tried further
         alike = 1.0
         if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(pattern).all():
             long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)
@@ -176,7 +176,7 @@ class MassFit:
         count = np.histogram(gap, edge, weights=np.broadcast_to(alike, gap.shape))[0]
         count = np.convolve(count, (0.5, 1.0, 0.5), "same")
         peak = np.flatnonzero((count[1:-1] >= count[:-2]) & (count[1:-1] > count[2:])) + 1
-        best = peak[np.argsort(-count[peak])][:PEAKS]
+        best = peak[np.argsort(-count[peak])][:peaks]
         return [0.0, *(float(edge[i] + BINS / 2) for i in best)]
 
     def sifted(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> list[Scored]:

@@ -42,9 +42,7 @@ from sonic_bullet.effects.protocol import (
 )
 from sonic_bullet.records import Array, ModalModel
 
-BETTER = 3.0  # of ln variance of the envelopes' logarithms, all lines together
 SHARE, FEWEST_LINES = 0.5, 1.5  # of the misfit must go, in lines that a damping growth would bend; of such lines
-LEAST = 0.05  # of c a₀ at the loudest
 POWERS = (1.0, 2.0)
 GROWTHS = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
 AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
@@ -179,6 +177,8 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
 
     known is the one found in the whole evidence, if this is a part of it.
     """
+    least = 0.05  # of c a₀ at the loudest
+    better = 3.0  # of ln variance of the envelopes' logarithms, all lines together
     if len(lines) < 2:
         return None
     most = float(max(line.level.max() for line in lines))
@@ -191,10 +191,10 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
     j = int(np.argmin([_cost(row) for row in closer]))
     damping_growth, row = float(fine[j]), closer[j]
     gain = np.array([a.least - b.least for a, b in zip(plain, row, strict=True)])
-    if damping_growth * most < LEAST:
+    if damping_growth * most < least:
         return None
     if known is None and not (
-        gain.sum() > BETTER
+        gain.sum() > better
         and -gain[gain < 0].sum() < 0.3 * gain[gain > 0].sum()
         and _supported_by_lines(lines, damping_growth, plain, row)
     ):

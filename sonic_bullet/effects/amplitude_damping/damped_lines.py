@@ -21,11 +21,8 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 ROUGH = 5e-3  # of ln |z|: what neighbours and windows do to a frame
-FEWEST_FRAMES = 8  # clear frames of a strike
 THIN = 3  # one frame of so many will do where angles are tried
-STEPS = 4  # of Gauss and Newton
 RANGE = (0.2, 1.6)  # of the observed decay
-TURNS = 0.1  # of a line's ln variance, that its degenerate modes' axes must be worth
 LEVEL, MOST, EARLY = 0.1, 2.0, 0.5  # of ln |z|: shapes' own error; more off is no worse; nepers of a line's decay
 FAINT = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
 
@@ -96,8 +93,9 @@ class DecayFit:
     @property
     def turned(self) -> bool:
         """Decide whether the mesh's own axes are certainly not the best."""
+        turns = 0.1  # of a line's ln variance, that its degenerate modes' axes must be worth
         whole = self.spread + self.between
-        return bool(self.best and whole[0] - whole[self.best] > TURNS)
+        return bool(self.best and whole[0] - whole[self.best] > turns)
 
 
 def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFrames]:
@@ -112,9 +110,10 @@ def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFram
     measure : str
         Measure of the levels, one of `amplitude_pitch.MEASURES`.
     """
+    fewest_frames = 8  # clear frames of a strike
     found = []
     for q, k in enumerate(e.line.tolist()):
-        good = e.good[:, q] & (e.good[:, q].sum(axis=1) >= FEWEST_FRAMES)[:, None]
+        good = e.good[:, q] & (e.good[:, q].sum(axis=1) >= fewest_frames)[:, None]
         if not good.any():
             continue
         pair = degenerate(h, k)
@@ -150,12 +149,13 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
     start : (p,)
         Decays to start from in 1/s; the observed one where None.
     """
+    steps = 4  # of Gauss and Newton
     if damping_growth == 0:  # no angle counts
         line = under(line)
     many = len(line.amplitude)
     decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
     low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
-    for _ in range(STEPS):
+    for _ in range(steps):
         left, slope = _left(line, damping_growth, decay)
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum(
             (line.weight * slope**2).sum(axis=(1, 2)), 1e-300

@@ -23,13 +23,9 @@ from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring,
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
-STANDARD_ERRORS = 5.0  # spreads that b must stand off zero
-BETTER = 0.5  # of the phases' misfit must go, in modes that b would move
-FEWEST_MODES = 1.5  # of such modes
 # times the bend that degenerate modes were identified with as if each pair were one mode
 FAR = np.geomspace(0.6, 1.7, 12)
 NEAR = np.geomspace(0.93, 1.07, 5)  # about what that leads to
-ENOUGH = 3  # modes without a degenerate partner, to be asked alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +155,7 @@ def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> di
 
     known is the effect found in the whole evidence.
     """
+    enough = 3  # modes without a degenerate partner, to be asked alone
     # the frequencies of degenerate modes drift each by its own level
     single = np.array([not degenerate(h, k) for k in e.line.tolist()], bool)
     rows = {
@@ -173,7 +170,7 @@ def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> di
         for name, row in rows.items():
             good = (row[:, 0] > 0) & (row[:, 2] > 0) & (single if alone else True)
             b = _agreed(row[good], alone)
-            if good.sum() >= (ENOUGH if alone else 1) and _significant(b, known):
+            if good.sum() >= (enough if alone else 1) and _significant(b, known):
                 found[name] = b
         if found:
             break
@@ -182,8 +179,10 @@ def _slopes(e: Envelopes, h: ObjectEvidence, known: AmplitudePitch | None) -> di
 
 def _significant(b: Slope, known: AmplitudePitch | None) -> bool:
     """Decide whether b is certain; with fewer strikes, whether it is above its spread with the known sign."""
+    better = 0.5  # of the phases' misfit must go, in modes that b would move
+    standard_errors = 5.0  # spreads that b must stand off zero
     if known is None:
-        return abs(b.bend) > STANDARD_ERRORS * b.sd and b.share > BETTER
+        return abs(b.bend) > standard_errors * b.sd and b.share > better
     return b.bend * np.sign(known.bend) > b.sd and b.share > 0
 
 
@@ -192,6 +191,7 @@ def _agreed(table: Array, single: bool) -> Slope:
 
     The spread is that of their scatter [White 1980].
     """
+    fewest_modes = 1.5  # of such modes
     if not len(table):
         return Slope(0.0, np.inf, 0.0, 0.0, single)
     xx, xy, yy = table.T
@@ -205,7 +205,7 @@ def _agreed(table: Array, single: bool) -> Slope:
     says = np.minimum(centre**2 * weight, 1.0)
     gone = np.maximum((2 * centre * xy - centre**2 * xx) / yy, -1.0)
     sd = float(np.sqrt(((says * (value - centre)) ** 2).sum()) / max(says.sum(), 1e-300))
-    alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < FEWEST_MODES
+    alone = says.sum() ** 2 / max(float((says**2).sum()), 1e-300) < fewest_modes
     return Slope(
         centre,
         np.inf if alone else max(sd, 1e-300),

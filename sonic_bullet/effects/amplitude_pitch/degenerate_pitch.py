@@ -22,7 +22,6 @@ FINER = (ANGLES[1] - ANGLES[0]) * np.linspace(-1, 1, 15)  # about the best angle
 LAGS = (2, 6, 18)  # frames
 ROUGH = 0.1  # of ln |z| and of a phase: what neighbours, windows and shapes do to a frame
 MOST = 2.0  # of ln |z|: more off is no worse
-TURNS = 0.1  # of a line's ln variance, that its degenerate modes' axes must be worth
 
 
 def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, factor: Array) -> float:
@@ -57,6 +56,7 @@ def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, f
 
 def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return frequencies and angles of the degenerate modes whose axes are observable."""
+    turns = 0.1  # of a line's ln variance, that its degenerate modes' axes must be worth
     assert h.model is not None
     found = []
     for q, k in enumerate(e.line.tolist()):
@@ -65,7 +65,7 @@ def axes_of(e: Envelopes, h: ObjectEvidence, measure: str, bend: float) -> tuple
         cost = spread(e, h, q, bend, *about(h, k, measure, ANGLES))
         fine = ANGLES[int(cost.argmin())] + FINER
         closer = spread(e, h, q, bend, *about(h, k, measure, fine))
-        if cost[0] - closer.min() > TURNS:
+        if cost[0] - closer.min() > turns:
             found.append((float(h.model.freq_hz[h.mode[k]].mean()), float(fine[int(closer.argmin())])))
     return tuple(f for f, _ in found), tuple(t for _, t in found)
 

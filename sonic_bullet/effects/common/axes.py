@@ -17,7 +17,6 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
-MESHED = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are degenerate modes that it split apart
 # relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they would
 # be two others
 ONE = 1e-4
@@ -43,10 +42,11 @@ def about_axes(pair: Array, turn_rad: float) -> Array:
 
 def degenerate(h: ObjectEvidence, k: int) -> bool:
     """Decide whether a line stands for two modes that are degenerate in the mesh itself."""
+    meshed = 1.5e-3  # relative: modes that a mesh leaves nearer to each other are degenerate modes that it split apart
     if h.model is None or h.plain is None or len(h.mode[k]) != 2:
         return False
     near = np.sort(h.plain.freq_hz[np.argsort(np.abs(h.plain.freq_hz - h.model_hz[k]))[:2]])
-    return bool(near[1] / near[0] - 1 < MESHED)
+    return bool(near[1] / near[0] - 1 < meshed)
 
 
 def split_apart(h: ObjectEvidence, k: int) -> bool:

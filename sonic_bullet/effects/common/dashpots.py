@@ -18,9 +18,6 @@ import numpy as np
 from sonic_bullet.effects.protocol import ascending
 from sonic_bullet.records import Array, ModalModel
 
-TIE = 1e-9  # relative: modes at one frequency that no dashpot tells apart stay the mesh's own
-STILL = 1e-6  # of ω: what swings slower does not swing
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coupled:
@@ -50,8 +47,10 @@ def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
     phi : (…, r, m)
         √c φ of the dashpots, c in N·s/m.
     """
+    still = 1e-6  # of ω: what swings slower does not swing
+    tie = 1e-9  # relative: modes at one frequency that no dashpot tells apart stay the mesh's own
     m = len(lam)
-    omega, at = np.sqrt(lam) * (1 + TIE * np.arange(m)), np.arange(m)
+    omega, at = np.sqrt(lam) * (1 + tie * np.arange(m)), np.arange(m)
     loss = np.swapaxes(phi, -1, -2) @ phi
     loss[..., at, at] += 2 * decay_per_s
     state = np.zeros((*loss.shape[:-2], 2 * m, 2 * m))  # of (ωq, q̇)
@@ -63,7 +62,7 @@ def coupled(lam: Array, decay_per_s: Array, phi: Array) -> Coupled:
         np.take_along_axis(s, order, -1),
         np.take_along_axis(vector[..., :m, :], order[..., None, :], -1) / omega[:, None],
     )
-    alive = s.imag > STILL * omega[0]
+    alive = s.imag > still * omega[0]
     norm = 2 * s * (q * q).sum(axis=-2) + (q * (loss @ q)).sum(axis=-2)
     turn = q * np.sqrt(2j * s.imag / np.where(norm == 0, 1, norm))[..., None, :]
     turn *= np.where((turn.real * np.abs(turn.real)).sum(axis=-2) < 0, -1, 1)[..., None, :]

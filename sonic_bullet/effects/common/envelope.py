@@ -25,12 +25,10 @@ WIDTH_HZ = (30.0, 400.0)
 MOST_LINES = 30
 FRAMES = 96
 MOST_SAID = 1e4  # by one frame
-NEPERS = 8.0  # of a line's decay are looked at
 SELF = 0.006  # relative: lines nearer than this may be one bent mode
 # of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted down,
 # or up
 FAR, FASTER = 0.15, 5.0
-LINK = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
 HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
 CLEAR = 12.0  # of |z| over the noise in it
 STEP = 1024  # samples between two exact phasors
@@ -94,6 +92,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
     window : list of int
         Length of each line's window in samples, odd.
     """
+    nepers = 8.0  # of a line's decay are looked at
     n, sr = signal.shape[1], h.sr
     z = np.zeros((len(signal), len(selected), FRAMES), complex)
     good = np.zeros(z.shape, bool)
@@ -104,7 +103,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
     for q, (k, length) in enumerate(zip(selected, window, strict=True)):
         shape = np.hanning(length + 2)[1:-1]
         shape /= shape.sum()
-        last = min(n - length, int(NEPERS / max(h.decay_per_s[k], 1e-2) * sr) + length)
+        last = min(n - length, int(nepers / max(h.decay_per_s[k], 1e-2) * sr) + length)
         at = np.unique(np.linspace(length // 2, max(last, length // 2 + FRAMES), FRAMES).astype(int))
         at = np.minimum(at, n - 1)
         time[q, : len(at)] = at / sr
@@ -193,12 +192,13 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
 
 def _chains(freq_hz: Array, decay_per_s: Array) -> Array:
     """Assign lines (k,) to chains: lines so near each other, for their decays, that one drifting mode may be all."""
+    link = 4.0  # of the shorter line's decay: how far in ω two lines of a chain are
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
     slow, fast = np.minimum.outer(decay_per_s, decay_per_s), np.maximum.outer(decay_per_s, decay_per_s)
     gap = np.abs(np.subtract.outer(freq_hz, freq_hz))
-    linked = (2 * np.pi * gap < LINK * fast) & (fast < FASTER * slow) & (gap < FAR * freq_hz)
+    linked = (2 * np.pi * gap < link * fast) & (fast < FASTER * slow) & (gap < FAR * freq_hz)
     return np.asarray(connected_components(csr_array(linked), directed=False)[1])
 
 

@@ -16,10 +16,8 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 
-MOST = 8  # multiples
 ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
-STILL = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
 FEWEST_RECORDINGS, LEAST_S = 2, 0.2  # recordings, and the length of their tails
 # multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
 LOW, UNLIKE = 2, 2.0
@@ -63,6 +61,8 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     Hum or None
         None where no tone has one amplitude in all recordings, and from first to last.
     """
+    still = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
+    most = 8  # multiples
     from scipy.optimize import minimize_scalar
 
     start = signals.shape[1] - signals.shape[1] // 3
@@ -75,7 +75,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     power, hz = np.abs(spectrum) ** 2, np.fft.rfftfreq(4 * n, 1 / sr)
     floor = (shape**2).sum() * np.median(noise) ** 2
     best: tuple[float, int, Array] | None = None
-    multiple = np.arange(1, MOST + 1)
+    multiple = np.arange(1, most + 1)
     for mains in [known_hz] if known_hz else MAINS_HZ:
         near = np.flatnonzero(np.abs(hz - mains) < (hz[1] if known_hz else 1.2 * mains / 50))
         if not len(near):
@@ -118,7 +118,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     steady = (
         (size.max(axis=0) < STEADY * size.min(axis=0))
         & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0)
-        & (np.abs(fades) < STILL)
+        & (np.abs(fades) < still)
     )
     peak = np.abs(signals).max(axis=1)
     alone = steady.sum() == 1 and not steady[:LOW].any() and peak.max() < UNLIKE * peak.min()

@@ -15,16 +15,16 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 WIDTH = 0.004
-MOST_LINES = 48
 
 
 def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
     """Return the strongest lines of an object, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
+    most_lines = 48
     freq = np.concatenate([h.freq_hz, h.foreign_hz])
     size = np.abs(np.concatenate([h.amplitude, h.foreign_amplitude], axis=1))
     decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
     sd = np.concatenate([h.freq_sd_hz, np.zeros(len(h.foreign_hz))])
-    strong = np.argsort(-np.nan_to_num(size).max(axis=0))[:MOST_LINES]
+    strong = np.argsort(-np.nan_to_num(size).max(axis=0))[:most_lines]
     strong = strong[np.argsort(freq[strong])]
     return freq[strong], size[:, strong], decay[strong], sd[strong]
 

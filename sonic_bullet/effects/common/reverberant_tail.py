@@ -29,15 +29,10 @@ LEAST = 4  # frames: in less no tail shows
 NODES = 8  # of a window's quadrature
 DECAYS = np.geomspace(0.5, 600.0, 31)
 SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
-SHIFTS = 21
-FAINT = 1e-25  # of the direct sound's power
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not identifiable
 # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
 LIKE = 0.7
-# times longer than it is observed to ring: no line's own, though a tail makes several of one, which end sooner
-OWNS = 8.0
-OUTLASTS = 0.5  # of the tail's decay: what falls slower has the recording to itself in the end
 STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
@@ -118,10 +113,11 @@ def through(h: ObjectEvidence, delta: float) -> Read:
 
     A line that outlasts the tail keeps its observed values: late, it is undisturbed.
     """
+    outlasts = 0.5  # of the tail's decay: what falls slower has the recording to itself in the end
     r = modes(h, np.array([delta]), np.arange(len(h.freq_hz)))
     sd = h.decay_sd_per_s / np.maximum(h.decay_per_s, 1e-9)
     # by both: a faint line may beat with the tail's own
-    alone = (h.decay_per_s < OUTLASTS * delta) & (r.decay_per_s < delta) & (sd < STANDARD_ERRORS)
+    alone = (h.decay_per_s < outlasts * delta) & (r.decay_per_s < delta) & (sd < STANDARD_ERRORS)
     return replace(
         r,
         decay_per_s=np.where(alone, h.decay_per_s, r.decay_per_s),
@@ -135,6 +131,8 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
 
     Lines that are no mode are assumed to follow the impulse.
     """
+    # times longer than it is observed to ring: no line's own, though a tail makes several of one, which end sooner
+    owns = 8.0
     if h.dry or h.signal is None or not len(h.freq_hz) or h.signal.shape[1] < LEAST * FRAME_S * h.sr:
         return h
     r = through(h, delta)
@@ -163,7 +161,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     # what strikes have in common says nothing of how they differ
     strange = h.foreign_sd * np.abs(amplitude) / np.maximum(np.abs(h.foreign_amplitude), 1e-300)
     # a tail prolongs: what is read to ring longer than it is observed to is a neighbour's
-    other = r.decay_per_s[0] * OWNS < h.foreign_decay_per_s
+    other = r.decay_per_s[0] * owns < h.foreign_decay_per_s
     return replace(
         dry,
         foreign_hz=h.foreign_hz + np.where(other, 0, r.shift_hz[0]),
@@ -258,6 +256,7 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
     Returns the first frame's mean, the variances (n,) of a tail of unit reverberant level along directions that are
     uncorrelated, for white noise of unit variance, and the frames' means and directions there (n, 1 + n).
     """
+    faint = 1e-25  # of the direct sound's power
     at = np.array(time)
     node, weight = (np.arange(NODES) + 0.5) / NODES * FRAME_S, np.hanning(NODES + 2)[1:-1]
     weight = weight / weight.sum()
@@ -269,7 +268,7 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
     )
     both = weight @ both.reshape(len(at), NODES, -1)
     both = both.reshape(len(at), len(at), NODES) @ weight
-    both[both < FAINT] = 0.0  # or the solver works on numbers that processors are a hundred times slower with
+    both[both < faint] = 0.0  # or the solver works on numbers that processors are a hundred times slower with
     white = _whitener(time)
     value, vector = np.linalg.eigh(white @ both @ white)
     mean = np.exp(-decay * (at[:, None] + node)) @ weight
@@ -279,10 +278,11 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
 
 def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, ...]:
     """Compute for every line ln likelihood, A, its spread, the best Δf and w, each (k, w), at one decay and one δ."""
+    shifts = 21
     mean, value, turn = _tail(time, decay, delta)
     at = np.array(time)
     half = min(max(2 * max(decay, delta) / np.pi, 2.0), 0.4 / (at[1] - at[0]))
-    shift = np.linspace(-half, half, SHIFTS)
+    shift = np.linspace(-half, half, shifts)
     moved = z[:, :, None] * np.exp(-2j * np.pi * at[:, None] * shift)
     # (n,), (k, n, Δ) real and imaginary side by side
     m, b = turn[:, 0], turn[:, 1:] @ moved.view(float).reshape(len(z), len(at), -1)

@@ -20,13 +20,8 @@ from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
 from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
-BETTER = 10.0  # in BIC, than isotropy
-NEARER = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
 # or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the tensor
 IN_A_ROOM = 30.0
-# rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
-SUFFICES = 5e-3
-LEAST = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
 
 
 @dataclass(frozen=True)
@@ -93,6 +88,9 @@ class Orthotropy:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Search for the tensor that explains all lines best; None where isotropy does as well."""
+        least = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
+        nearer = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
+        better = 10.0  # in BIC, than isotropy
         bodies = body_lines_of(evidence)
         if isinstance(evidence.known, cls) and bodies:
             density = bodies[0].elastic.material.density_kg_m3
@@ -108,9 +106,9 @@ class Orthotropy:
             return None
         plain, best = found
         gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.observed)
-        anisotropic = gain > BETTER and best.off < NEARER * plain.off
+        anisotropic = gain > better and best.off < nearer * plain.off
         anisotropic |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
-        if not anisotropic or departure(best) < LEAST:
+        if not anisotropic or departure(best) < least:
             return None
         return cls.of(best, bodies[0].elastic.material.density_kg_m3)
 
@@ -124,6 +122,8 @@ def departure(tensor: Tensor) -> float:
 
 def _fits(h: ObjectEvidence) -> bool:
     """Decide whether the isotropic body's modes are where the lines are."""
+    # rms of ln f from the nearest isotropic mode that leaves nothing to look for: split pairs, corrected meshes
+    suffices = 5e-3
     if not len(h.freq_hz):
         return False
     off, own = np.log(h.freq_hz / h.model_hz), ringing(h)
@@ -142,7 +142,7 @@ def _fits(h: ObjectEvidence) -> bool:
         if size.any()
         else np.ones(len(left))
     )
-    return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < SUFFICES)
+    return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < suffices)
 
 
 __all__ = ["NAMES", "Orthotropy", "departure"]

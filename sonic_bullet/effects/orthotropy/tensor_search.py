@@ -40,17 +40,14 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 FLOOR = 3e-4  # of ln f: less is not identifiable
-ROUGH = 0.02  # of 1 − c²: shapes' own error
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
 STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
-LARGEST_N = 0.46
 STARTS, BLIND = 24, 12  # of those sifted, taken further; without patterns
 # in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
 HINTED, HOP = 10.0, 2.0
 HOPPERS, HOPS = 3, 6  # ends that are gone on from, and how often
 FIRST = 10  # lines that decide where no pattern does
-PEAKS = 2
 FREED = (0, 1, 3)  # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
 NIL = 5.0  # of WIDE: farther off nothing is in common
 # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
@@ -157,6 +154,7 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
 
     By correlation of the two spectra on a logarithmic axis.
     """
+    peaks = 2
     shift = np.arange(-REACH, REACH + 1e-9, WIDE / 2)
     most = max(bodies, key=lambda t: float(t.worth.sum()))
     blind = most.amplitude is None
@@ -165,7 +163,7 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
     def scored(p: Array) -> list[tuple[float, Array]]:
         score = _agreement(most, seen_by(most, p), first, shift)
         moved = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
-        return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: PEAKS if blind else 1]]
+        return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: peaks if blind else 1]]
 
     found = sorted((one for some in parallel_map(scored, starts) for one in some), key=lambda s: -s[0])
     return [p for _, p in found[: BLIND if blind else STARTS]]
@@ -214,6 +212,7 @@ def fitted(
     widths : sequence of float
         Widths w of ln f, one step of the fit each.
     """
+    largest_n = 0.46
     q = reduced(symmetry, start)
     p = expanded(symmetry, q)
     for width in widths:
@@ -221,7 +220,7 @@ def fitted(
         step = _step(pairs, symmetry, q, guess, width)
         for _ in range(6):
             trial = expanded(symmetry, q + step)
-            if sound(trial) and np.abs(trial[3:6]).max() < LARGEST_N:
+            if sound(trial) and np.abs(trial[3:6]).max() < largest_n:
                 break
             step = step / 2
         else:
@@ -289,6 +288,7 @@ def _step(
 
 def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) -> Tensor:
     """Compute the BIC of a tensor, and which constants the lines leave to the prior."""
+    rough = 0.02  # of 1 − c²: shapes' own error
     p = expanded(symmetry, q)
     off, unlike, numbers, slopes = [], [], 0, []
     turn = _jacobian(symmetry, q, constants)
@@ -301,7 +301,7 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
         strikes = 1 if t.amplitude is None or (s.alike == 1).all() else len(t.amplitude)
         other = np.full(len(t.log_hz), 1 - 1 / strikes)  # of patterns that have nothing to do with each other
         other[line] = np.clip(1 - s.alike[line, mode] ** 2, 0, 1 - 1 / strikes)
-        unlike.append(other + ROUGH)
+        unlike.append(other + rough)
         numbers += (strikes - 1) * len(t.log_hz)
         slopes.append(0.5 * s.slope(mode).T @ turn)
     left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])

@@ -29,9 +29,7 @@ from sonic_bullet.effects.rebound.later_hits import (
 )
 from sonic_bullet.records import Array
 
-FAINT = 0.02  # of the first hit: weaker ones are not played
 NEAR = 0.03  # of ln t: delays that agree
-HELD = 0.999  # of the energy of what is played again
 MOST, FEW = (
     0.6,
     0.05,
@@ -41,7 +39,6 @@ MOST, FEW = (
 FADE = 2.0  # nepers over what is looked at
 # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
 ALL, CLEARLY, HALF = 0.25, 1.35, 0.5
-APART = 1.3  # loudest over softest strike, for that
 RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
@@ -83,10 +80,11 @@ class Rebound:
 
     def apply(self, x: Impact) -> Impact:
         """Repeat the impact's hits."""
+        faint = 0.02  # of the first hit: weaker ones are not played
         gap = self.gap_s * (x.impulse_n_s / self.impulse_n_s) ** self.exponent
         ratio = self.restitution if self.shrink is None else self.shrink
         share = self.restitution ** np.arange(self.hits)
-        share = share[share > FAINT]
+        share = share[share > faint]
         when = gap * np.concatenate([[0.0], np.cumsum(ratio ** np.arange(len(share) - 1))])
         delay = (x.delay_s[:, None] + when).ravel()
         return replace(x, delay_s=delay, share=(x.share[:, None] * share).ravel())
@@ -125,8 +123,9 @@ class Rebound:
         A slow decay looks alike a whole number of periods later, so that one strike alone allows many delays. Strikes
         of one strength are of no use: there all exponents fit alike, and hits and beats are not distinguishable.
         """
+        apart = 1.3  # loudest over softest strike, for that
         level = np.array([j if np.isfinite(j) else 1.0 for j in h.impulse_n_s])
-        if len(level) < 2 or level.max() < APART * level.min():
+        if len(level) < 2 or level.max() < apart * level.min():
             return None
         reference = float(np.exp(np.log(level).mean()))
         (said, gap, exponent), (next_best, _, _), *_ = sorted(second_hit(h, level / reference), reverse=True)
@@ -183,6 +182,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
 
     Returns what is left, up to a constant, and the fitted fields. known: whether start is near the solution.
     """
+    held = 0.999  # of the energy of what is played again
     assert h.signal is not None
     n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
     size = 2 * n
@@ -193,7 +193,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2
     loud = np.argsort(-own.sum(axis=0))
     # the bins that hold the modes
-    loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), HELD * own.sum()))])
+    loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), held * own.sum()))])
     both, own, cycles = both[:, loud], own[:, loud], np.fft.rfftfreq(size, 1 / h.sr)[loud]
     level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
     total = ((h.signal[:, :n] * window) ** 2).sum(axis=1) * size / 2

@@ -33,7 +33,6 @@ FASTER, FEWEST_LINES, SHARE = 1.25, 3, 0.35  # than the room; lines that are, an
 PLAINLY, LESS = 100.0, 0.25
 # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
 TELLS, ALIKE = 10.0, 0.3
-MODEL_ERROR = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
 # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
 TURNS, AGAIN, FULLY = 150, 40, 400
 
@@ -243,6 +242,7 @@ def identified(
     turns : int
         Iterations at most.
     """
+    model_error = 0.03  # of the direct sound's spectrum, relative: what shapes and pulses get wrong
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = signal.shape[1]
@@ -251,7 +251,7 @@ def identified(
     level = np.median(noise) ** 2 * n if np.isfinite(noise).all() else 0.0
     power = (np.abs(x) ** 2).sum(axis=0)
     smooth = np.convolve(power, np.ones(9) / 9, "same")
-    trust = 1 / (level + MODEL_ERROR**2 * smooth + 1e-12 * smooth.max())
+    trust = 1 / (level + model_error**2 * smooth + 1e-12 * smooth.max())
     # h = root · g, g of unit variance
     root = reverberant_level * np.sqrt(2 * delta / sr) * np.exp(-delta * np.arange(n) / sr)
 

@@ -19,7 +19,6 @@ ALIKE, DECAY = 0.97, 0.1  # cosine over the strikes; of ln d
 # pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
 FEWEST_PAIRS, SHARE = 5, 0.2
 ALL = 0.5  # of all two lines alike: then strikes tell none apart
-CHANCE = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
 
 
 def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None:
@@ -37,6 +36,7 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
     float or None
         None where fewer than SHARE of all lines recur.
     """
+    chance = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
     from scipy.stats import poisson
 
     good = np.isfinite(amplitude).all(axis=0) & (decay_per_s > 0)
@@ -57,7 +57,7 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
     if (
         many < FEWEST_PAIRS
         or 2 * many < SHARE * len(f)
-        or poisson.sf(many - 1, (len(ratio) - many) * wide) > CHANCE * wide
+        or poisson.sf(many - 1, (len(ratio) - many) * wide) > chance * wide
     ):
         return None
     return float(np.exp(np.median(ratio[near[int(np.argmax(pairs))]])))

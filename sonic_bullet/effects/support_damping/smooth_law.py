@@ -11,7 +11,6 @@ import numpy as np
 from sonic_bullet.effects.common.points import solved
 from sonic_bullet.records import Array
 
-LOW = 0.3  # of a line's spread where it lies under the least law
 # of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as
 # ω²
 TAU_S = (1e-5, 3e-5, 1e-4)
@@ -28,9 +27,10 @@ def least_law(omega: Array, decay: Array) -> Array:
 
     A dashpot only adds to a decay.
     """
+    low = 0.3  # of a line's spread where it lies under the least law
     column, above = smooth_columns(omega), np.ones(len(omega), bool)
     value = np.zeros(column.shape[1])
     for _ in range(10):
-        value, _ = solved(decay, np.where(above, 1.0, LOW) * decay, column)
+        value, _ = solved(decay, np.where(above, 1.0, low) * decay, column)
         above = decay > column @ value
     return value

@@ -23,8 +23,6 @@ FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # tim
 LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
 TUNED = 0.15  # of ln c
-MOST = 4
-MANY = 40  # trials that are worth a second process
 WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
 BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
 
@@ -34,6 +32,7 @@ def sought(t: DashpotFit) -> Dashpots:
 
     The least Bayes information criterion decides how many, with BETTER for each on top.
     """
+    most = 4
     data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
     apiece = 3 * np.log(data) + BETTER
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
@@ -56,7 +55,7 @@ def sought(t: DashpotFit) -> Dashpots:
     if some[1] and t.left(some[1]) < ENOUGH * least:
         return without_idle(some)
     tried, starts = [none], [chosen]
-    while len(chosen) < MOST:  # of one alone a basin may lie between the points of a coarse grid
+    while len(chosen) < most:  # of one alone a basin may lie between the points of a coarse grid
         chosen, starts = _with_one_more(t, starts, _grid(t, spots[:POINTS] if chosen else spots), spots)
         tried.append(priced(chosen))
         best = min(tried, key=_cost)
@@ -124,7 +123,8 @@ def _left(t: DashpotFit, trials: list[Dashpots]) -> list[float]:
 
 def _of_each(price: Callable[[list[Dashpots]], list[float]], trials: list[Dashpots]) -> list[float]:
     """Compute the prices of many trials, in two processes where there are many."""
-    parts = [trials[: len(trials) // 2], trials[len(trials) // 2 :]] if len(trials) >= MANY else [trials]
+    many = 40  # trials that are worth a second process
+    parts = [trials[: len(trials) // 2], trials[len(trials) // 2 :]] if len(trials) >= many else [trials]
     return [one for part in parallel_map(price, parts) for one in part]
 
 

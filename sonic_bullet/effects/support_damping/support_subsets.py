@@ -14,11 +14,6 @@ import numpy as np
 from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit, Dashpots
 from sonic_bullet.records import Array
 
-PAIRS = 200  # best of two, of which threes are made
-APART = 1e-6  # of the columns' Gram determinant: two that do the same are one
-STILL = 1e-3  # of what the most telling point does: where nothing moves, nothing is weak
-SAME = 1e-6  # of what a set explains
-
 
 def subsets(t: DashpotFit, vertices: Array, few: int) -> list[Dashpots]:
     """Find the best single dashpots, pairs and triples on a grid.
@@ -32,6 +27,9 @@ def subsets(t: DashpotFit, vertices: Array, few: int) -> list[Dashpots]:
     few : int
         Sets of each size.
     """
+    same = 1e-6  # of what a set explains
+    still = 1e-3  # of what the most telling point does: where nothing moves, nothing is weak
+    pairs = 200  # best of two, of which threes are made
     line, mode = t.plain()
     if len(line) < 4:
         return []  # the law says it all
@@ -44,18 +42,18 @@ def subsets(t: DashpotFit, vertices: Array, few: int) -> list[Dashpots]:
     gram, projection = column @ column.T, column @ y
     place = [(int(v), direction) for direction in ("normal", "every") for v in vertices]
     does = np.linalg.norm(column, axis=1)
-    one = np.flatnonzero(does > STILL * does.max())
+    one = np.flatnonzero(does > still * does.max())
     found: list[Dashpots] = []
     sets = one[:, None]
     for size in (1, 2, 3):
         best, strength, gain = _best(gram, projection, sets)
-        new = np.flatnonzero(np.diff(gain, prepend=np.inf) < -SAME * gain)[:few]  # a body's mirrors do the same
+        new = np.flatnonzero(np.diff(gain, prepend=np.inf) < -same * gain)[:few]  # a body's mirrors do the same
         found += [
             tuple(Dashpot(place[k][0], c, place[k][1]) for k, c in zip(s, x, strict=True))
             for s, x in zip(best[new].tolist(), strength[new].tolist(), strict=True)
         ]
         if size < 3:  # with every other one
-            kept = one[:, None] if size == 1 else best[:PAIRS]
+            kept = one[:, None] if size == 1 else best[:pairs]
             sets = np.column_stack([np.repeat(kept, len(one), axis=0), np.tile(one, len(kept))])
             sets = np.unique(np.sort(sets, axis=1), axis=0)
     return found
@@ -66,9 +64,10 @@ def _best(gram: Array, projection: Array, sets: Array) -> tuple[Array, Array, Ar
 
     The best come first.
     """
+    apart = 1e-6  # of the columns' Gram determinant: two that do the same are one
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))[sets]
     matrix = gram[sets[:, :, None], sets[:, None, :]] / (size[:, :, None] * size[:, None, :])
-    good = np.linalg.det(matrix) > APART
+    good = np.linalg.det(matrix) > apart
     sets, size, matrix = sets[good], size[good], matrix[good]
     right = projection[sets] / size
     strength = np.linalg.solve(matrix, right[..., None])[..., 0]

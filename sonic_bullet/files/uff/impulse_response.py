@@ -25,14 +25,9 @@ from sonic_bullet.records.errors import FileError
 
 LOWEST_HZ = 20.0
 BAND = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
-BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
-OFF_GRID = 0.01  # of a step
 OFF_RATE = 5e-5  # relative: six figures of a step, and their last
-ABOUT_JUMP = 40  # samples at twice the highest frequency: W rings √(π² + β²)/(π·0.2)/2 periods of it, 34 samples
 ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
-EXACT = 1e-13  # of the largest eigenvalue: below it are rounding errors
 STEPS = 4001  # of an edge
-LENGTHS = 4096  # even numbers of samples to choose the whole rate from
 MOTION = {"acceleration": -1, "velocity": 0, "displacement": 1}
 """Powers of iω from a quantity to velocity."""
 
@@ -59,11 +54,13 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     FileError
         Its rate is not a whole number of Hz, or it unpacks to too many samples.
     """
+    about_jump = 40  # samples at twice the highest frequency: W rings √(π² + β²)/(π·0.2)/2 periods of it, 34 samples
+    off_grid = 0.01  # of a step
     power = MOTION.get(response.quantity, 0)
     if not response.spectral:
         return _from_time(response, power)
     step, first = response.step, round(response.start / response.step)
-    if abs(response.start / step - first) > OFF_GRID:
+    if abs(response.start / step - first) > off_grid:
         raise FileError(
             f"a response starts at {response.start:g} Hz in steps of {step:g} Hz", "export it from a multiple of them"
         )
@@ -74,18 +71,19 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     spectrum = np.zeros(count // 2 + 1, complex)
     spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, BAND * freq[-1])
     sound = np.fft.irfft(spectrum, count) * sr
-    jump = math.ceil(ABOUT_JUMP * sr / (2 * freq[-1]))
+    jump = math.ceil(about_jump * sr / (2 * freq[-1]))
     return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, BAND * float(freq[-1]))
 
 
 def _predicted_back(sound: Array, jump: int) -> Array:
     """Predict the first samples of a recording (n,) from later ones; unchanged where it is too short."""
+    exact = 1e-13  # of the largest eigenvalue: below it are rounding errors
     order = min(ORDER, (len(sound) - jump) // 8)
     if order < 2:
         return sound
     window = np.lib.stride_tricks.sliding_window_view(sound[jump : jump + 7 * order], order + 1)
     value, vector = np.linalg.eigh(window[:, 1:].T @ window[:, 1:])
-    keep = value > EXACT * value[-1]
+    keep = value > exact * value[-1]
     weight = vector[:, keep] @ ((vector[:, keep].T @ (window[:, 1:].T @ window[:, 0])) / value[keep])
     made = sound.copy()
     for n in range(jump - 1, -1, -1):
@@ -114,9 +112,10 @@ def _derived(value: Array, freq_hz: Array, power: int) -> Array:
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
     """Return one between two frequencies; falls to zero at half the first and at the last frequency."""
+    beta = 10.0  # of the Kaiser window: side lobes of 1e-5
     below = (freq_hz - low_hz / 2) / (low_hz / 2)
     above = (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
-    step = np.cumsum(np.kaiser(STEPS, BETA))
+    step = np.cumsum(np.kaiser(STEPS, beta))
     at = np.linspace(0, 1, STEPS)
     return np.asarray(np.interp(below, at, step) * np.interp(above, at, step) / step[-1] ** 2)
 
@@ -126,7 +125,8 @@ def _length(least: int, step_hz: float) -> tuple[int, int]:
 
     Raises FileError where there is none.
     """
-    count = least + least % 2 + 2 * np.arange(LENGTHS)
+    lengths = 4096  # even numbers of samples to choose the whole rate from
+    count = least + least % 2 + 2 * np.arange(lengths)
     if count[0] > MOST_SAMPLES:
         raise FileError(f"a response unpacks to {count[0]} samples", "export it in larger steps, or a smaller band")
     rate = count * step_hz

@@ -24,10 +24,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 BYTES_MAX = 1 << 30
-GRAVITY_M_S2 = 9.80665  # standard, of accelerations in g
 LARGEST_VALUE = 1e12
-LEAST_STEP = 1e-7  # Hz or s: the highest rate that a recording has
-UNEVEN = 1e-4  # of the last abscissa: text has six figures of each
 READ = (15, 58, 164, 2411)
 QUIET = (151, 2412, 82)  # header, elements, trace lines: nothing for a case
 SYSTEMS = (18, 2420)
@@ -210,6 +207,9 @@ def _response(
     one: dict[str, Any], nodes: dict[int, Point], units: tuple[float, float], path: str | os.PathLike[str]
 ) -> Response | str:
     """Convert a dataset 58, or describe it where it is not understood; FileError where it is cut."""
+    uneven = 1e-4  # of the last abscissa: text has six figures of each
+    least_step = 1e-7  # Hz or s: the highest rate that a recording has
+    gravity_m_s2 = 9.80665  # standard, of accelerations in g
     kind, quantity = int(one["func_type"]), QUANTITIES.get(int(one["ordinate_spec_data_type"]))
     if kind not in (1, 4):
         return FUNCTIONS.get(kind, f"functions of type {kind}")
@@ -226,14 +226,14 @@ def _response(
     if not (np.isfinite(x).all() and (np.abs(value) <= LARGEST_VALUE).all()):
         raise FileError(f"{path} holds values that are NaN or beyond {LARGEST_VALUE:g}", "export it again")
     step = float(x[-1] - x[0]) / (count - 1)
-    if not LEAST_STEP <= step <= LARGEST or np.abs(x[0] + step * np.arange(count) - x).max() > UNEVEN * abs(
+    if not least_step <= step <= LARGEST or np.abs(x[0] + step * np.arange(count) - x).max() > uneven * abs(
         float(x[-1])
     ):
         return "functions with uneven steps"
     metre, newton = units
     scale = newton / metre**2 if quantity == "pressure" else metre
     if str(one.get("ordinate_axis_units_lab", "")).strip().lower() in ("g", "gn", "g's"):
-        scale = GRAVITY_M_S2
+        scale = gravity_m_s2
     per_force = kind == 4 or below in FORCES
     sensor, strike = (
         Freedom(int(one[f"{end}_node"]), int(one[f"{end}_dir"]), nodes.get(int(one[f"{end}_node"])))

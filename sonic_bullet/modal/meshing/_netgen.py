@@ -17,7 +17,6 @@ FACET = (
     "facet normal %.17g %.17g %.17g\nouter loop\nvertex %.17g %.17g %.17g\nvertex %.17g %.17g %.17g\n"
     "vertex %.17g %.17g %.17g\nendloop\nendfacet"
 )
-GRADING = 0.3  # how fast sizes may grow, Netgen's own
 
 
 def limited(memory: int, seconds: int) -> None:
@@ -33,6 +32,7 @@ def limited(memory: int, seconds: int) -> None:
 
 def main() -> None:
     """Mesh the surface of the first argument's file and write nodes and tetrahedra to the second's."""
+    grading = 0.3  # how fast sizes may grow, Netgen's own
     source, target = sys.argv[1:]
     with np.load(source, allow_pickle=False) as found:
         given = {name: found[name] for name in found.files}
@@ -48,7 +48,7 @@ def main() -> None:
     file = Path("in.stl")  # text, as binary STL holds float32
     rows = np.concatenate([normal[:, None], corner], axis=1).reshape(-1, 12)
     np.savetxt(file, rows, fmt=FACET, header="solid body", footer="endsolid body", comments="")
-    wanted = netgen.meshing.MeshingParameters(maxh=float(given["edge"]), grading=GRADING, closeedgefac=None)
+    wanted = netgen.meshing.MeshingParameters(maxh=float(given["edge"]), grading=grading, closeedgefac=None)
     for (x, y, z), size in zip(given["point"], given["size"], strict=True):
         wanted.RestrictH(x, y, z, size)
     mesh = netgen.stl.STLGeometry(str(file)).GenerateMesh(wanted)

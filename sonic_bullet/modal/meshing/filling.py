@@ -43,10 +43,8 @@ refuse: slivers of unions, on which it takes ten times as long.
 WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
 LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
 LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
-LATTICE_LEAST = 0.4  # of a wall's thickness: least edge of a lattice
 LATTICE_TETS, LATTICE_MORE = 8000, 1.25
 """Tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts."""
-WALL_TETS = 20.0  # elements in a square of a wall about an edge wide
 
 
 class TooThinError(MeshError):
@@ -72,6 +70,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
 
     edge_m: by default from a budget of unknowns. Raises MeshError.
     """
+    lattice_least = 0.4  # of a wall's thickness: least edge of a lattice
     made = by_rule(skin, edge_m)
     if made is not None:
         return made
@@ -82,7 +81,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
     if filler == "lattice":
         return _of_lattice(skin, edge, edge, say, "as before")
     of_lattice = edge_m or min((LATTICE_VOLUME * volume / tets) ** (1 / 3), LATTICE_WALL * thickness)
-    finest = LATTICE_LEAST * thickness
+    finest = lattice_least * thickness
     if not geometry.is_closed(skin.face):
         return _of_lattice(skin, of_lattice, finest, say, "its surface is open")
     whole, simple = skin, simplified(skin, SIMPLER * edge)
@@ -125,7 +124,8 @@ def has_detail(skin: Skin) -> bool:
 
 def thick_enough_m(skin: Skin) -> float:
     """Compute the wall of an open surface that a lattice can fill."""
-    return float(np.sqrt(WALL_TETS * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
+    wall_tets = 20.0  # elements in a square of a wall about an edge wide
+    return float(np.sqrt(wall_tets * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
 
 
 def _slivers(skin: Skin, edge_m: float) -> bool:

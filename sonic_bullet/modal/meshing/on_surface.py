@@ -15,7 +15,6 @@ from sonic_bullet.modal.meshing.solid import TET_EDGE, TET_FACE, Solid, corner_v
 from sonic_bullet.records import Array
 
 FARTHEST = 0.25  # of an edge's length: a chord of a right angle deviates by 0.21
-LEAST_DET = 0.3  # of the straight element's: below it counts as folded
 LATTICE = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
 """Where an element's Jacobian is checked: corners and middles of its edges."""
 
@@ -80,6 +79,7 @@ def nearest_on_lines(line_m: Array, point_m: Array) -> Array:
 
 def unfolded(solid: Solid) -> Solid:
     """Return the solid with straight edges where an element would fold."""
+    least_det = 0.3  # of the straight element's: below it counts as folded
     from skfem import ElementTetP2
 
     element = ElementTetP2()
@@ -88,7 +88,7 @@ def unfolded(solid: Solid) -> Solid:
     straight = 6 * corner_volume_m3(node, solid.tet)
     while True:  # each round straightens one element at least
         determinant = np.linalg.det(np.einsum("tid,ikq->tqdk", node[solid.tet], gradient))
-        folded = solid.tet[(determinant < LEAST_DET * straight[:, None]).any(axis=1)]
+        folded = solid.tet[(determinant < least_det * straight[:, None]).any(axis=1)]
         if not len(folded):
             return Solid(node, solid.tet, solid.affine, solid.note)
         node[folded[:, 4:]] = node[folded[:, TET_EDGE]].mean(axis=2)

@@ -12,8 +12,6 @@ DOF_PER_TET = 5.6  # measured on meshes of bars, slabs and bowls
 CURVED = 1.5
 """Edge on a wall of thickness t and radius r, over √(r t): chords of both sides deviate by a quarter of the wall, and
 at twice this they touch."""
-LEAST_EDGE = 0.25  # of the wanted edge: where the surface is bent as sharply as a crease
-MOST_ALONG = 40  # points at which a size is given, along a face's longest side
 
 
 def dof_budget(thickness_m: float, diagonal_m: float) -> int:
@@ -40,13 +38,15 @@ def edge_within_m(volume_m3: float, thickness_m: float, tets: float) -> float:
 
 def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
     """Find points (k, 3) of a closed surface whose bent walls need elements below edge_m, and their size (k,)."""
+    most_along = 40  # points at which a size is given, along a face's longest side
+    least_edge = 0.25  # of the wanted edge: where the surface is bent as sharply as a crease
     curvature = np.abs(geometry.face_curvature(vertex_m, face))
     wall = wall_m(vertex_m, face)
-    size = np.maximum(CURVED * np.sqrt(wall / np.maximum(curvature, 1e-300)), LEAST_EDGE * edge_m)
+    size = np.maximum(CURVED * np.sqrt(wall / np.maximum(curvature, 1e-300)), least_edge * edge_m)
     bent = np.flatnonzero(size < edge_m)
     corner = vertex_m[face[bent]]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    along = np.clip(np.ceil(longest / size[bent]), 1, MOST_ALONG).astype(int)
+    along = np.clip(np.ceil(longest / size[bent]), 1, most_along).astype(int)
     points, sizes = [np.zeros((0, 3))], [np.zeros(0)]
     for count in np.unique(along):
         mine = along == count

@@ -23,7 +23,6 @@ MOST_CELLS = 400_000  # of the lattice about the body: 1 GB
 WARP_LONG, WARP_SHORT = 0.24999, 0.41189  # part of an edge [Labelle & Shewchuk 2007, table 1]
 GROUP = 8  # faces that are one dipole from afar
 GROUPS = 8  # groups that are one larger group
-FAR = 3.0  # radii of a group, from its middle on
 RING = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))
 PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # A wedge 012 345 turned so that its vertex k comes first [Dompierre et al. 1999, table 1]
@@ -96,6 +95,7 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
     1 inside and 0 outside a closed one, between both at a hole. corner_m (f, 3, 3): faces, neighbours one after the
     other.
     """
+    far = 3.0  # radii of a group, from its middle on
     corner_m = np.ascontiguousarray(corner_m, float)
     vector = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0]) / 2
     area = np.linalg.norm(vector, axis=1)
@@ -106,7 +106,7 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
         middle = np.add.reduceat(area[:, None] * corner_m.mean(axis=1), start) / np.maximum(total, 1e-300)[:, None]
         here = middle[np.arange(len(corner_m)) // members]
         reach = np.maximum.reduceat(np.linalg.norm(corner_m - here[:, None], axis=2).max(axis=1), start)
-        levels.append(np.column_stack([middle, np.add.reduceat(vector, start), FAR * reach]))
+        levels.append(np.column_stack([middle, np.add.reduceat(vector, start), far * reach]))
         if len(start) <= GROUPS:
             break
         members *= GROUPS

@@ -26,7 +26,6 @@ CAP_PART = 0.05
 """Of a piece's area: flat caps on its holes, below which it encloses a volume."""
 OPEN_PART = 0.025
 """Mean winding number just outside: a ball with a hole of 5 % of its area has it."""
-SAMPLES = 2000  # faces outside which it is evaluated
 SHEET_PART = 0.02
 FLAT_PART = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
 SIZE_M = (1e-5, 1e4)
@@ -170,7 +169,8 @@ def _openness(vertex_m: Array, face: Array) -> float:
 
     Its pieces may share their edges or not.
     """
-    shown = face[:: -(-len(face) // SAMPLES)]
+    samples = 2000  # faces outside which it is evaluated
+    shown = face[:: -(-len(face) // samples)]
     area, normal = geometry.face_areas_m2(vertex_m, shown), geometry.outward_normals(vertex_m, shown)
     outside = vertex_m[shown].mean(axis=1) + FLAT_PART * np.linalg.norm(np.ptp(vertex_m, axis=0)) * normal
     near = geometry.surface_index(vertex_m, face).order

@@ -24,7 +24,6 @@ BUSY = 20.0
 """Wall time per processor time that a child may take on a busy machine before it counts as hung."""
 MEMORY_LIMIT_BYTES = 2 * 1024**3
 CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
-ACROSS = 100.0  # the diagonal as Netgen sees it: its tolerances then fit metres and micrometres alike
 
 
 class EndlessError(MeshError):
@@ -56,8 +55,9 @@ def tetrahedra(
     MeshError
         Netgen fails, fills nothing, needs more than 2 GiB, or hangs.
     """
+    across = 100.0  # the diagonal as Netgen sees it: its tolerances then fit metres and micrometres alike
     low, high = vertex_m[face].reshape(-1, 3).min(axis=0), vertex_m[face].reshape(-1, 3).max(axis=0)
-    unit_m = float(np.linalg.norm(high - low)) / ACROSS
+    unit_m = float(np.linalg.norm(high - low)) / across
     centre = (low + high) / 2
     point_m, size_m = (np.zeros((0, 3)), np.zeros(0)) if point_m is None or size_m is None else (point_m, size_m)
     given = {

@@ -20,11 +20,11 @@ from sonic_bullet.records import Array
 
 GROWTH = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 """Of the diagonal: how far each piece's surface moves outward; the least that joins them is taken."""
-ONE = 0.99  # of the volume in the largest piece: the rest is negligible
 
 
 def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
     """Unite a closed surface's pieces, piece (f,) their labels: vertices, faces, and what was done ("": nothing)."""
+    one = 0.99  # of the volume in the largest piece: the rest is negligible
     import manifold3d
 
     count = int(piece.max()) + 1
@@ -45,7 +45,7 @@ def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, st
         volumes = [piece.volume() for piece in union.decompose()]
         if not volumes:
             return vertex_m, face, ""
-        if max(volumes) >= ONE * sum(volumes):
+        if max(volumes) >= one * sum(volumes):
             grown = f", each grown by {growth * diagonal_m:.2g} m to close the gaps between them" if growth else ""
             return (*_arrays(union), f"; {count} pieces united{grown}")
         if first is None:

@@ -17,12 +17,9 @@ from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
-MOST_AROUND = 400  # waves around
 CURVED = 1.3  # wave number of a curved wall over that of a flat one of as many modes: membranes take the low ones away
 FINER = 1.5  # sides shorter by this leave FINER^-q of the error, q from 1.1 at notches to 6
-HIGHER = 4.0  # factor on λ where the last try held too few modes
 FEWEST_NODES = 120  # fewer save no time
-LEFT = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +60,7 @@ class Fourier:
 
     def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), a sector a wave number. Raises ModalError."""
+        higher = 4.0  # factor on λ where the last try held too few modes
         say(f"solving {3 * self.section.nodes} unknowns of a section for each wave around")
         problems = series(self.section, list(tensors))
         high = self.high
@@ -74,10 +72,11 @@ class Fourier:
             )
             if high >= wanted.limit or few >= wanted.most:
                 return found
-            high *= HIGHER
+            high *= higher
 
     def _up_to(self, problems: Series, tensors: int, wanted: Wanted) -> list[Sector]:
         """Solve for one wave number around after another, until none holds a mode that is wanted."""
+        most_around = 400  # waves around
         found: list[Sector] = []
         before = np.full(tensors, np.inf)
         for m in count():
@@ -90,7 +89,7 @@ class Fourier:
             elif m > 1 and (lowest > before).all():
                 break
             before = lowest
-            if m == MOST_AROUND:
+            if m == most_around:
                 raise ModalError(f"body has modes of more than {m} waves around", "ask for fewer, or for a lower to_hz")
         return found
 
@@ -130,13 +129,14 @@ class Fourier:
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Estimate the relative error of the frequency of mode top[1] of sector top[0] by a finer section."""
+        left = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
         finer = self.finer()
         if finer is None:
             return float("nan")
         m, value = sectors[top[0]].place[0], sectors[top[0]].found[0][0]
         most = (top[1] + 1) * sectors[top[0]].multiplicity
         other, _ = finer._around(series(finer.section, [tensor]), m, most, [np.inf])
-        return LEFT * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
+        return left * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
 
     def finer(self) -> Fourier | None:
         """Return the body on a section with sides `FINER` times shorter, None where that takes too many nodes."""

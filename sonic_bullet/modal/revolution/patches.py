@@ -15,7 +15,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-STEEP = 3.0  # slope against r, or against z, at most
 OFF = 0.05  # of the longest edge: how far a face's middle may lie off the curve; facets lie within it
 APART = 0.4  # of the median edge: how far points of the curve lie apart
 
@@ -59,6 +58,7 @@ def patches(point: Array, face: Array, ring: Array, middle: Array) -> list[Patch
 
 
 def _patch(point: Array, face: Array, ring: Array, middle: Array) -> Patch | None:
+    steep = 3.0  # slope against r, or against z, at most
     edge = np.linalg.norm(point[face] - point[np.roll(face, -1, axis=1)], axis=2)
     ends = np.setdiff1d(ring[face], [-1])
     mine = np.unique(face[ring[face] < 0])
@@ -78,7 +78,7 @@ def _patch(point: Array, face: Array, ring: Array, middle: Array) -> Patch | Non
     order = np.argsort(along, kind="stable")
     step, rise = np.diff(along[order]), np.abs(np.diff(across[order]))
     least = 1e-4 * float(np.median(edge))
-    if order[0] != 0 or order[-1] != len(whole) - 1 or (rise > STEEP * step + least).any():
+    if order[0] != 0 or order[-1] != len(whole) - 1 or (rise > steep * step + least).any():
         return None
     kept, here = [0], along[0]
     for i in order[1:-1]:

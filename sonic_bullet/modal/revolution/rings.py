@@ -26,10 +26,7 @@ ROUND = 2e-5  # of the diagonal: what a ring's vertices may differ by
 GAP = (
     0.45  # radians: the widest gap between neighbours on a ring; with fewer than 14 the area is 3 % less than a disc's
 )
-BORE = 1e-3  # of the diagonal: the least radius of a ring
 BETWEEN = 1.02  # a detour over a third ring of less than this times the direct length replaces the direct side
-ALIKE = 0.3  # relative difference of sides that are taken for chords of one arc
-SAME = 0.02  # relative difference of volumes
 ARC = 256  # sides of a half circle: its area to 5e-5
 
 
@@ -71,6 +68,7 @@ class Revolved:
         A bend is an arc that begins half the shorter side before it and ends as far behind. A corner has none, and a
         side that ends in one continues as it is. On the axis the outline meets its mirror image.
         """
+        alike = 0.3  # relative difference of sides that are taken for chords of one arc
         along = np.roll(self.outline_m, -1, axis=0) - self.outline_m
         length, heading = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
         turn, short, on = turns(self.outline_m), np.minimum(length, np.roll(length, 1)), self.on_axis
@@ -82,7 +80,7 @@ class Revolved:
         after = (side + 1) % len(length)
         mine, other = np.where(at < 0.5, side, after), np.where(at < 0.5, after, side)
         away = np.minimum(at, 1 - at) * length[side]
-        going_on = np.where(short[other] > (1 - ALIKE) * length[side], arc[other], 0)
+        going_on = np.where(short[other] > (1 - alike) * length[side], arc[other], 0)
         return np.asarray(np.where(smooth[mine], np.where(away < (0.5 + ROUND) * short[mine], arc[mine], 0), going_on))
 
     def scaled(self, factor: float) -> Revolved:
@@ -157,6 +155,7 @@ def _outline(point: Array, face: Array) -> Array | None:
 
     None where there are no rings, or they make no closed outline.
     """
+    same = 0.02  # relative difference of volumes
     diagonal = float(np.linalg.norm(np.ptp(point, axis=0)))
     ring, middle, filled = _rings(point, diagonal)
     between = patches(point, face, ring, middle) if len(middle) else None
@@ -171,7 +170,7 @@ def _outline(point: Array, face: Array) -> Array | None:
     if float((outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1]).sum()) < 0:
         outline, share = outline[::-1], share[::-1]
     expected = float((_swept(outline) * (share + np.roll(share, -1)) / 2).sum())
-    return outline if abs(geometry.volume_m3(point, face) / expected - 1) < SAME else None
+    return outline if abs(geometry.volume_m3(point, face) / expected - 1) < same else None
 
 
 def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
@@ -180,6 +179,7 @@ def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
     Returns the ring (v,) of each vertex, -1 for none; radius and height (k, 2) of each ring, radius 0 on the axis; and
     the fraction (k,) of its disc that the ring's polygon fills.
     """
+    bore = 1e-3  # of the diagonal: the least radius of a ring
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -204,7 +204,7 @@ def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
     filled = np.bincount(ring[order], np.sin(step)) / (2 * np.pi)
     filled[pole] = 1.0  # no area: any fraction does
     middle[pole, 0] = 0
-    good = pole | ((widest < GAP) & (middle[:, 0] > BORE * diagonal))
+    good = pole | ((widest < GAP) & (middle[:, 0] > bore * diagonal))
     number = np.where(good, np.cumsum(good) - 1, -1)
     return number[ring], middle[good], filled[good]
 

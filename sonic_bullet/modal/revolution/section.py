@@ -21,7 +21,6 @@ from sonic_bullet.records import Array
 
 WALL, LONG = 0.5, 3.0  # a triangle's side over the wall's thickness, at a corner and far from all
 WAVE = 0.25  # a triangle's side over the shortest wave
-PIECES = 600  # of an outline, about, for which the size is found
 BENT = 0.3  # radians that a side may turn
 CORNER = 0.15  # radians: a larger turn is a corner
 GROWTH = 0.5  # of size over distance
@@ -110,10 +109,11 @@ class _Outline:
 
 
 def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
+    pieces = 600  # of an outline, about, for which the size is found
     outline = body.outline_m
     along = np.roll(outline, -1, axis=0) - outline
     length, turn, wall = np.linalg.norm(along, axis=1), np.abs(turns(outline)), thickness(outline)
-    cuts = np.ceil(length / np.maximum(np.minimum(wall, length), length.sum() / PIECES)).astype(int)
+    cuts = np.ceil(length / np.maximum(np.minimum(wall, length), length.sum() / pieces)).astype(int)
     owner = np.repeat(np.arange(len(outline)), cuts)
     share = np.concatenate([np.arange(n) / n for n in cuts])
     point = outline[owner] + share[:, None] * along[owner]

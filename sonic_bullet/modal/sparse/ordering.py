@@ -13,7 +13,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LEAF = 40
 QUANTILES = (0.4, 0.45, 0.5, 0.55, 0.6)
 
 
@@ -38,6 +37,7 @@ def _touching(nodes: Array, mask: Array, start: Array, neighbour: Array) -> Arra
 
 def dissection(node_m: Array, tet: Array) -> Array:
     """Order the nodes node_m (n, 3) of a solid tet (t, k) for elimination: (n,)."""
+    leaf = 40
     n = len(node_m)
     start, neighbour = _neighbours(tet, n)
     mask = np.zeros(n, bool)
@@ -45,7 +45,7 @@ def dissection(node_m: Array, tet: Array) -> Array:
     todo: list[tuple[Array, bool]] = [(np.arange(n), False)]  # (nodes, already cut: to be numbered as they are)
     while todo:
         nodes, final = todo.pop()
-        if final or len(nodes) <= LEAF:
+        if final or len(nodes) <= leaf:
             order.append(nodes)
             continue
         point = node_m[nodes]

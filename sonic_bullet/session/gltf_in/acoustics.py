@@ -31,7 +31,6 @@ from sonic_bullet.session.gltf_in.physics import BodyFrame
 AUDIO = "KHR_audio_rigid_bodies"
 OTHERWISE = "steel"
 """Whose elastic constants a body has that rings and does not say what it is made of."""
-MASS_OFF = 0.01
 
 
 def audio_of(nodes: Nodes) -> Mapping[str, Any]:
@@ -136,6 +135,7 @@ def model_of(
     notes: list[str],
 ) -> ModalModel:
     """Read a node's modal model, at its scale, in its body's frame; raises the tree's error."""
+    mass_off = 0.01
     tree, audio, node = nodes.tree, audio_of(nodes), nodes.name(owner)
     entry = one_of(tree, audio.get("modalModels", ()), number, f"{node}: modalModel")
     name = str(entry.get("name") or f"model {number}")
@@ -155,7 +155,7 @@ def model_of(
     vertex = (placed.position_m + (point * scale) @ placed.turn.T - frame.centre_m) @ frame.turn
     mass, volume, face = _solid(entry, vertex, face, scale, body_mass_kg, bulk)
     stated = entry.get("massProperties", {}).get("mass")
-    if body_mass_kg and stated and abs(stated * scale**3 / body_mass_kg - 1) > MASS_OFF:
+    if body_mass_kg and stated and abs(stated * scale**3 / body_mass_kg - 1) > mass_off:
         notes.append(f"{node} weighs {body_mass_kg:.4g} kg, its model {stated * scale**3:.4g} kg: shapes stay as given")
     order = np.argsort(freq, kind="stable")
     turned = shape[order].astype(float) @ own * scale**-1.5

@@ -21,7 +21,6 @@ from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import Animation, check_orientations
 
-ONE_SPOT_M = 1e-4
 RESTITUTION, FRICTION = 0.7, 0.7
 """Of a body where none is stated: the pair's are products, 0.5 and 0.5."""
 
@@ -197,9 +196,10 @@ def _times(first: Array, second: Array) -> Array:
 
 def _check_apart(names: Sequence[str], place: Array, turn: Array, moving: Array) -> None:
     """Raise AnimationError where two bodies coincide all the time: an object exported twice."""
+    one_spot_m = 1e-4
     for i in range(len(names)):
         for j in range(i + 1, len(names)):
-            if (moving[i] or moving[j]) and np.abs(place[:, i] - place[:, j]).max() < ONE_SPOT_M:
+            if (moving[i] or moving[j]) and np.abs(place[:, i] - place[:, j]).max() < one_spot_m:
                 raise AnimationError(
                     f"{shown(names[i])} and {shown(names[j])} are on one spot in every frame",
                     "export each object once; leave out copies and collision hulls",

@@ -19,7 +19,6 @@ LEAST_FRAMES = 4
 FALL_RANGE = (0.02, 5.0)
 """Falls below are a slow motion of 1:7, and above another unit of length."""
 HANDED = 0.5
-NEAR_M = 5e-3
 SIGMAS = 5.0
 REST_FRAMES, WHITE, QUIETER = 16, 5.0, 4.0
 """Frames of a rest from which noise is estimated; see _rests."""
@@ -68,13 +67,14 @@ def fall_m_s2(animation: Animation, noise_m: float | None = None) -> float | Non
 
 def alone(animation: Animation, stage: PoseStage) -> Array:
     """Return (t, b) which bodies touch no other from a frame before to a frame after, by their distance."""
+    near_m = 5e-3
     motion, step_s = animation.poses(), 1 / animation.fps
     fall_m = float(np.linalg.norm(animation.gravity_m_s2)) * step_s**2
     speed_m_s = np.stack([speeds(one, stage.reach_m) for one in motion])
     speed_m_s[:-1] = np.maximum(speed_m_s[:-1], speed_m_s[1:])
     found = np.ones(motion.shape, bool)
     for k in range(len(motion)):
-        pairs = near_pairs(motion[k], stage.reach_m, speed_m_s[k] * step_s + fall_m + NEAR_M, ~animation.moving, stage)
+        pairs = near_pairs(motion[k], stage.reach_m, speed_m_s[k] * step_s + fall_m + near_m, ~animation.moving, stage)
         found[k, [one for pair in pairs for one in pair]] = False
     return found
 

@@ -32,7 +32,6 @@ from sonic_bullet.soundtrack.score.keyframes import tipped, upright
 BYTES_MAX = 1 << 30
 POSES_MAX = 2_000_000
 """Of all nodes: half a gigabyte while they are read."""
-LATE_S = 1e-3
 _REMEDY = "export it again as glTF 2.0 (.glb)"
 REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 STRETCH = 1e-3
@@ -44,6 +43,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
 
     fps: of the frames; None: that of its keyframes. scale: of lengths. Raises FileError, AnimationError.
     """
+    late_s = 1e-3
     place = Path(path)
     with reading(path, "glTF file", AnimationError, _REMEDY):
         if place.stat().st_size > BYTES_MAX:
@@ -65,7 +65,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
                 "export a shorter take, or give a lower --fps",
             )
         at_s = first + np.arange(count) / rate
-        notes = [f"the first key is at {first:.3f} s: the sound begins there"] * bool(first > LATE_S)
+        notes = [f"the first key is at {first:.3f} s: the sound begins there"] * bool(first > late_s)
         objects = tuple(_objects(file, channels, at_s, scale, notes))
         return Export(rate, objects, np.array([0.0, 0.0, -9.81]), tuple(notes))
 

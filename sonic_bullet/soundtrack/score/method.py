@@ -12,12 +12,12 @@ from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 from sonic_bullet.soundtrack.score.shooting import Shooting
 
 FIT_FROM_FPS = 119.0
-STEP_HZ = 240.0
 
 
 def substeps_of(fps: float) -> int:
     """Return the number of steps to a frame."""
-    return 1 if fps >= FIT_FROM_FPS else ceil(STEP_HZ / fps - 1e-9)
+    step_hz = 240.0
+    return 1 if fps >= FIT_FROM_FPS else ceil(step_hz / fps - 1e-9)
 
 
 def find_steps(

@@ -27,10 +27,8 @@ POSE_M, SPEED_M_S = 1e-4, 3e-2
 """σ_x, σ_v: a pose is trusted to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
 about a step of the simulation.
 """
-FIRST_SPEED_M_S = 3.0
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.65, 0.8, 0.95)
 NUDGE = 0.01  # m/s, and of restitution
-ROUNDS = 4
 FORCES = ("force_n", "friction_1_n", "friction_2_n")
 ENOUGH = 4.0
 """Cost of a body's shot below which nothing is searched: every pose within 2 σ."""
@@ -57,6 +55,7 @@ class Shooting:
     """
 
     def __init__(self, animation: Animation, stage: PoseStage, substeps: int, hidden_m_s: float = 0.0) -> None:
+        first_speed_m_s = 3.0
         self._animation, self._stage, self._substeps, self._hidden_m_s = animation, stage, substeps, hidden_m_s
         self._step_s = 1 / animation.fps / substeps
         self._hidden_m = hidden_m_s / float(np.sqrt(6)) / animation.fps
@@ -74,7 +73,7 @@ class Shooting:
         # the mean speed of the first frame is its end's, less what half of the steps' gravity adds
         lag = 0.5 * (substeps + 1) / substeps / animation.fps
         self._prior[self._free, :3] -= lag * animation.gravity_m_s2
-        self._trust_m_s = FIRST_SPEED_M_S
+        self._trust_m_s = first_speed_m_s
 
     def find_steps(self, found: list[tuple[Array, Array]], progress: Callable[[float], None] | None = None) -> None:
         """Append MOTION (b,) and loaded RAW rows of each step."""
@@ -200,6 +199,7 @@ class Shooting:
 
     def _searched(self, k: int) -> _Try:
         """Search the best start at frame k."""
+        rounds = 4
         best = self._shot(k, self._prior.copy(), self._given)
         best = self._flown(k, best)
         touching = best.shot.touching.copy()
@@ -211,7 +211,7 @@ class Shooting:
             best = self._merged(best, one, islands)
         if others:
             best = self._shot(k, best.speed, best.restitution)
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             rest = [x for x in islands if best.cost(x) > ENOUGH * len(x)]
             if not rest:
                 break
