@@ -125,3 +125,14 @@ def test_a_folder_that_cannot_be_made_and_a_full_disk_are_one_line(
     with full_disk(50_000), pytest.raises(FileError, match="cannot write"):
         list(write_stems(tmp_path / "stems", stems, log.sr))
     assert list((tmp_path / "stems").iterdir()) == []
+
+
+def test_a_full_disk_at_the_fourth_stem_leaves_three(tmp_path: Path, log: ContactLog, stems: tuple[Stem, ...]) -> None:
+    four = [replace(stems[k % len(stems)], name=f"{k:02d}-body") for k in range(4)]
+    reports = write_stems(tmp_path, four, log.sr)
+    finished = [next(reports) for _ in range(3)]
+    with full_disk(50_000), pytest.raises(FileError, match=r"cannot write .*03-body\.wav"):
+        next(reports)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["00-body.wav", "01-body.wav", "02-body.wav"]
+    for stem, report in zip(four, finished, strict=False):
+        assert soundfile.info(report.path).frames == stem.sound.shape[1]
