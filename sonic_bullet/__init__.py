@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sonic_bullet.comparing.compared_sides import compare
     from sonic_bullet.files import read_audio, read_log, write_audio
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.files.responses.sensor_responses import read_response
     from sonic_bullet.files.sofa.heads import read_head
     from sonic_bullet.listener import keep_restitution
     from sonic_bullet.presets import list_materials, load_material
@@ -24,12 +25,14 @@ if TYPE_CHECKING:
         Air,
         Ambisonics,
         Binaural,
+        ContactMicrophone,
         Head,
         Material,
         Microphone,
         MicrophonePath,
         ModalModel,
         ModalSum,
+        SensorResponse,
         Shape,
         ShoeboxRoom,
         Vibrometer,
@@ -46,6 +49,7 @@ _HOME = {
     "Ambisonics": "records",
     "Binaural": "records",
     "ContactLog": "files",
+    "ContactMicrophone": "records",
     "Contacts": "records.contacts",
     "Head": "records",
     "Listener": "session",
@@ -54,6 +58,7 @@ _HOME = {
     "MicrophonePath": "records",
     "ModalModel": "records",
     "ModalSum": "records",
+    "SensorResponse": "records",
     "ShoeboxRoom": "records",
     "Shape": "records",
     "SonicBulletError": "records.errors",
@@ -68,6 +73,7 @@ _HOME = {
     "read_baked": "bake",
     "read_head": "files.sofa.heads",
     "read_log": "files",
+    "read_response": "files.responses.sensor_responses",
     "render_log": "render",
     "write_audio": "files",
 }
@@ -77,6 +83,7 @@ __all__ = [
     "Ambisonics",
     "Binaural",
     "ContactLog",
+    "ContactMicrophone",
     "Contacts",
     "Head",
     "Listener",
@@ -85,6 +92,7 @@ __all__ = [
     "MicrophonePath",
     "ModalModel",
     "ModalSum",
+    "SensorResponse",
     "Shape",
     "ShoeboxRoom",
     "SonicBulletError",
@@ -99,6 +107,7 @@ __all__ = [
     "read_baked",
     "read_head",
     "read_log",
+    "read_response",
     "render_log",
     "write_audio",
 ]

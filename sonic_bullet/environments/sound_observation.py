@@ -27,6 +27,7 @@ from sonic_bullet.records.coerce import as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
+from sonic_bullet.session.drawn_recording import ChainSpread, RecordingChain, RecordingState, draw_chain, record
 from sonic_bullet.synth.clock import exact_step
 
 AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
@@ -55,6 +56,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     step_s
         T; None: measured, on another environment of the same spec where one can be made, else by a reset and a step of
         this one.
+    recording
+        What a recording would add, drawn for each episode by ``seed`` and the seed of its reset, or its number without
+        one: info["recording"] of `reset` has the numbers. None: nothing.
 
     Raises
     ------
@@ -75,9 +79,10 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         step_s: float | None = None,
         seed: int = 0,
         air: Air | None = None,
+        recording: ChainSpread | None = None,
     ) -> None:
         given = {"sr": sr, "microphones": microphones, "materials": materials, "client": client, "step_s": step_s}
-        RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given, seed=seed, air=air)
+        RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given, seed=seed, air=air, recording=recording)
         gymnasium.Wrapper.__init__(self, env)
         self._options: dict[str, Any] = {
             "sr": check_sr(sr),
@@ -96,6 +101,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         self._added = 0
         self._listener: Listener | None = None
         self._episodes = RepeatedEpisodes()
+        remedy = "give a ChainSpread, or leave it out"
+        self._spread = None if recording is None else as_kind(recording, ChainSpread, "recording", remedy)
+        self._chain, self._recorded, self._begun = RecordingChain(), RecordingState(), 0
         inner = env.observation_space
         self._is_dict = isinstance(inner, Dict)
         parts = dict(inner.spaces) if isinstance(inner, Dict) else {"observation": inner}
@@ -125,7 +133,14 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         observation, info = self.env.reset(seed=seed, options=options)
         self._listen()
         self._episodes.begin(None if options else seed)
-        return self._with_audio(observation, np.zeros(self._shape, np.float32)), {**info, COUNT: 0}
+        info = {**info, COUNT: 0}
+        if self._spread is not None:
+            number = [0, self._begun] if seed is None else [1, seed]
+            draw = np.random.default_rng([self._options["seed"], *number])
+            self._chain, self._recorded = draw_chain(draw, self._spread), RecordingState()
+            info["recording"] = self._chain.to_json()
+        self._begun += 1
+        return self._with_audio(observation, np.zeros(self._shape, np.float32)), info
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
         """Step the environment and observe its sound.
@@ -144,6 +159,8 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
         new = self._listener.read()
+        if self._spread is not None:
+            new, self._recorded = record(new, self._options["sr"], self._chain, None, self._recorded)
         audio = np.zeros(self._shape, np.float32)
         audio[:, audio.shape[1] - new.shape[1] :] = new
         info = {**info, COUNT: new.shape[1]}

@@ -19,6 +19,7 @@ from sonic_bullet.records import (
     Array,
     Binaural,
     Body,
+    ContactMicrophone,
     Head,
     Material,
     Microphone,
@@ -26,6 +27,7 @@ from sonic_bullet.records import (
     ModalSum,
     Residual,
     Sensor,
+    SensorResponse,
     Vibrometer,
 )
 from sonic_bullet.records.contacts import Event
@@ -110,8 +112,16 @@ class _Vibrometer(msgspec.Struct, tag="vibrometer"):
     direction: Vector
 
 
+class _ContactMicrophone(_Vibrometer, tag="contact-microphone", omit_defaults=True):
+    noise_m_s2_rthz: float = 0.0
+    has_response: bool = False
+
+
 class _ModalSum(msgspec.Struct, tag="modal-sum"):
     scale: float
+
+
+_Sensor = _Microphone | _Vibrometer | _ContactMicrophone | _ModalSum
 
 
 class LogHeader(msgspec.Struct):
@@ -122,7 +132,7 @@ class LogHeader(msgspec.Struct):
     seed: int
     air_density_kg_m3: float
     air_sound_speed_m_s: float
-    sensors: list[_Microphone | _Vibrometer | _ModalSum]
+    sensors: list[_Sensor]
     materials: list[_Material]
     models: list[LoggedModel]
     bodies: list[_Body]
@@ -203,12 +213,15 @@ def unpack_change(x: _Change) -> Change:
     return Change(x.step, x.body, x.values)
 
 
-def pack_sensor(sensor: Sensor) -> _Microphone | _Vibrometer | _ModalSum:
+def pack_sensor(sensor: Sensor) -> _Sensor:
     """Convert a sensor to the header's struct."""
     if isinstance(sensor, Microphone):
         return _pack_microphone(sensor)
     if isinstance(sensor, Vibrometer):
-        return _Vibrometer(int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
+        place = (int(sensor.body_id), int(sensor.link), _vector(sensor.point_m), _vector(sensor.direction))
+        if isinstance(sensor, ContactMicrophone):
+            return _ContactMicrophone(*place, float(sensor.noise_m_s2_rthz), sensor.response is not None)
+        return _Vibrometer(*place)
     return _ModalSum(float(sensor.scale))
 
 
@@ -227,9 +240,15 @@ def _pack_microphone(one: Microphone) -> _Microphone:
     )
 
 
-def head_arrays(sensors: Sequence[Sensor]) -> dict[str, Array]:
-    """List the arrays that lie beside the header: responses of heads, by the number of their sensor."""
-    return {
+def sensor_arrays(sensors: Sequence[Sensor]) -> dict[str, Array]:
+    """List the arrays that lie beside the header: responses of heads and sensors, by the number of the sensor."""
+    touching = {
+        f"response{i}_{name}": getattr(sensor.response, name)
+        for i, sensor in enumerate(sensors)
+        if isinstance(sensor, ContactMicrophone) and sensor.response is not None
+        for name in ("freq_hz", "magnitude")
+    }
+    return touching | {
         f"head{i}_{name}": getattr(sensor.head, name)
         for i, sensor in enumerate(sensors)
         if isinstance(sensor, Binaural)
@@ -257,14 +276,18 @@ def unpack_residual(header: _Residual | None, arrays: Mapping[str, Array], index
     return Residual(**parts, clip_energy=header.clip_energy, source=header.source)
 
 
-def unpack_sensor(
-    sensor: _Microphone | _Vibrometer | _ModalSum, arrays: Mapping[str, Array], index: int, path: object
-) -> Sensor:
+def unpack_sensor(sensor: _Sensor, arrays: Mapping[str, Array], index: int, path: object) -> Sensor:
     """Build the sensor of entry ``index``; raises LogError, RecordError."""
     if isinstance(sensor, _Microphone):
         return _unpack_microphone(sensor, arrays, index, path)
     if isinstance(sensor, _Vibrometer):
-        made = Vibrometer(sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
+        place = (sensor.body_id, np.array(sensor.point_m), np.array(sensor.direction), sensor.link)
+        made = Vibrometer(*place)
+        if isinstance(sensor, _ContactMicrophone):
+            parts = [take(arrays, f"response{index}_{name}", float, (None,), path) for name in ("freq_hz", "magnitude")
+                     if sensor.has_response]  # fmt: skip
+            response = SensorResponse(*parts) if parts else None
+            made = ContactMicrophone(*place, response=response, noise_m_s2_rthz=sensor.noise_m_s2_rthz)
         # already of unit length: dividing again would move its last bit
         object.__setattr__(made, "direction", np.array(sensor.direction))
         made.direction.setflags(write=False)

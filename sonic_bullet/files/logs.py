@@ -12,6 +12,8 @@ their own:
       contact_<field> (k, …)
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
                                             sweep_m_s, approach_m_s, gap_m f8
+      step_motion_count (s,) i8, motion_<field> (r, …)   only where a sensor is on a jointed body
+          how its links move, the fields of `records.touching.link_motions.MOTION`
       body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
       material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
@@ -24,6 +26,8 @@ their own:
           `differences` of those numbers, and the powers (records/mode_shapes.py)
       head<i>_direction (d, 3) f8, head<i>_response (d, 2, n) f8
           of sensor i, where it is a head
+      response<i>_freq_hz, response<i>_magnitude (k,) f8
+          of sensor i, where it touches and has a response
       models (in the header)
           each model without its arrays; or its SHA-256, where it is in the cache
       events (in the header)
@@ -54,7 +58,6 @@ from sonic_bullet.files.levels import check_sr
 from sonic_bullet.files.log_header import (
     RESIDUAL_ARRAYS,
     LogHeader,
-    head_arrays,
     material_key,
     pack_body,
     pack_change,
@@ -62,6 +65,7 @@ from sonic_bullet.files.log_header import (
     pack_sensor,
     pack_values,
     pick,
+    sensor_arrays,
     unpack_body,
     unpack_change,
     unpack_residual,
@@ -117,7 +121,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
             float
         ),
     }
-    arrays |= model_arrays | head_arrays(log.sensors)
+    arrays |= model_arrays | sensor_arrays(log.sensors)
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}

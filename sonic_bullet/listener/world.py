@@ -27,6 +27,8 @@ class World(ABC):
     """Whether the last `after_step` found a step: a second call without one between finds none."""
     emptied = 0
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
+    felt: Collection[int] = ()
+    """Ids of the bodies that sensors are on. Of jointed ones, steps tell how their links move (`Step.motions`)."""
     logged = True
     """False where no log is kept: data that only a log needs may be dropped, records of removed bodies above all."""
 

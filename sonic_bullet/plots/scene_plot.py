@@ -22,7 +22,7 @@ from sonic_bullet.files import check_output, check_sr, replacing
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import as_sound
 from sonic_bullet.files.rows.spool import READ_FRAMES, KeptSound
-from sonic_bullet.records import Array, Microphone, Sensor, Vibrometer
+from sonic_bullet.records import Array, ContactMicrophone, Microphone, Sensor, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, SoundEvent, find_sound_events
@@ -97,6 +97,8 @@ def quantity(sensor: Sensor) -> tuple[str, str]:
     """Return the quantity of a sensor's samples, and their unit."""
     if isinstance(sensor, Microphone):
         return "pressure", "Pa"
+    if isinstance(sensor, ContactMicrophone):
+        return "acceleration", "m/s²"
     return ("velocity", "m/s") if isinstance(sensor, Vibrometer) else ("modal sum", "1")
 
 

@@ -27,14 +27,17 @@ if TYPE_CHECKING:
         Air,
         Ambisonics,
         Binaural,
+        ContactMicrophone,
         Microphone,
         ModalSum,
         Sensor,
         Vibrometer,
         channel_sensors,
         channels_of,
+        felt_bodies,
     )
     from sonic_bullet.records.simulated import Body
+    from sonic_bullet.records.touching.sensor_response import SensorResponse
 
 __all__ = [
     "ORTHOTROPIC",
@@ -43,6 +46,7 @@ __all__ = [
     "Array",
     "Binaural",
     "Body",
+    "ContactMicrophone",
     "Head",
     "Material",
     "Microphone",
@@ -51,12 +55,14 @@ __all__ = [
     "ModalSum",
     "Residual",
     "Sensor",
+    "SensorResponse",
     "Shape",
     "ShapeKind",
     "ShoeboxRoom",
     "Vibrometer",
     "channel_sensors",
     "channels_of",
+    "felt_bodies",
     "frozen_array",
     "isotropic_stiffness_pa",
 ]
@@ -67,6 +73,7 @@ _HOME = {
     "Array": "arrays",
     "Binaural": "sensors",
     "Body": "simulated",
+    "ContactMicrophone": "sensors",
     "Material": "bodies",
     "Head": "receivers",
     "Microphone": "sensors",
@@ -77,11 +84,13 @@ _HOME = {
     "Residual": "residual",
     "ShoeboxRoom": "receivers",
     "Sensor": "sensors",
+    "SensorResponse": "touching.sensor_response",
     "Shape": "bodies",
     "ShapeKind": "bodies",
     "Vibrometer": "sensors",
     "channel_sensors": "sensors",
     "channels_of": "sensors",
+    "felt_bodies": "sensors",
     "frozen_array": "arrays",
     "isotropic_stiffness_pa": "bodies",
 }

@@ -12,7 +12,7 @@ b.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import Any
 
@@ -22,6 +22,7 @@ from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import LARGEST, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, shown
 from sonic_bullet.records.errors import LogError, RecordError
+from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
 
 CONTACT = np.dtype(
     [
@@ -234,6 +235,8 @@ class Step:
         World frame; a body that falls for one step gains that speed, which is no impact (see synth.strikes).
     body : Array, shape (b,)
         Ascending indices of these bodies into the log's `bodies`, by default the first b; a removed body never returns.
+    motions : Array of MOTION, shape (r,)
+        How links of jointed bodies move from this step on, where it is known anew; see `records.touching.link_motions`.
     """
 
     dt_s: float
@@ -243,6 +246,7 @@ class Step:
     contacts: Contacts
     gravity_m_s2: Array = field(default_factory=lambda: np.zeros(3))
     body: Array = field(default_factory=lambda: _FIRST)
+    motions: Array = field(default_factory=lambda: NO_MOTIONS)
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -268,6 +272,7 @@ class Step:
             raise LogError("step: body: its indices do not ascend from 0", "use an unbroken contact log")
         if not (np.isin(self.contacts.a, body).all() and np.isin(self.contacts.b, body).all()):
             raise LogError("a contact names a body that the step does not know", "use an unbroken contact log")
+        object.__setattr__(self, "motions", as_motions(self.motions, body))
 
     @classmethod
     def trusted(
@@ -287,17 +292,20 @@ class Step:
         made = object.__new__(cls)
         for array in (position_m, quaternion_xyzw, teleported, gravity_m_s2):
             array.flags.writeable = False
-        keep = object.__setattr__
-        keep(made, "dt_s", dt_s)
-        keep(made, "position_m", position_m)
-        keep(made, "quaternion_xyzw", quaternion_xyzw)
-        keep(made, "teleported", teleported)
-        keep(made, "contacts", contacts)
-        keep(made, "gravity_m_s2", gravity_m_s2)
-        keep(made, "body", first_bodies(len(position_m)) if body is None else body)
+        who = first_bodies(len(position_m)) if body is None else body
+        numbers = dt_s, position_m, quaternion_xyzw, teleported, contacts, gravity_m_s2, who, NO_MOTIONS
+        for name, value in zip(STEP_FIELDS, numbers, strict=True):
+            object.__setattr__(made, name, value)
+        return made
+
+    def with_motions(self, motions: Array) -> Step:
+        """Return the step with rows of MOTION checked before."""
+        made = Step.trusted(*(getattr(self, name) for name in STEP_FIELDS[:-1]))
+        object.__setattr__(made, "motions", motions)
         return made
 
 
+STEP_FIELDS = tuple(one.name for one in fields(Step))
 EVENT_KINDS = ("quench", "reset", "moved")
 OF_ONE_BODY = ("moved",)
 """Kinds of event that concern one body; the others concern all."""

@@ -10,6 +10,7 @@ import numpy as np
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_kind, as_number, as_whole
 from sonic_bullet.records.receivers import AHEAD_XYZW, Head, MicrophonePath, unit_quaternions
+from sonic_bullet.records.touching.sensor_response import SensorResponse
 
 MOST_ORDER = 3
 """Of ambisonics: the microphone arrays that are sold, and most players, end there."""
@@ -101,7 +102,11 @@ class Binaural(Microphone):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Vibrometer:
-    """Velocity in m/s of a body's surface at point_m (3,) along direction (3,), both in the body frame."""
+    """Velocity in m/s of a body's surface at point_m (3,) along direction (3,), both in the body frame.
+
+    Its modes and its rigid motion, as contact pulses make it from 8 Hz on: of a free body, of a link with what its
+    joints pass on.
+    """
 
     body_id: int
     point_m: Array
@@ -110,17 +115,50 @@ class Vibrometer:
 
     def __post_init__(self) -> None:
         """Check the fields and normalise the direction."""
-        direction = frozen_array(self.direction, float, (3,), "vibrometer: direction")
+        name = self.kind
+        direction = frozen_array(self.direction, float, (3,), f"{name}: direction")
         with np.errstate(over="ignore"):
             length = float(np.linalg.norm(direction))
-        require(0 < length < np.inf, "vibrometer: direction is zero", "give the direction in which it looks")
+        require(0 < length < np.inf, f"{name}: direction is zero", "give the direction in which it looks")
         store(
             self,
-            body_id=as_whole(self.body_id, "vibrometer: body_id", "give the body's id"),
-            link=as_whole(self.link, "vibrometer: link", "give -1 (the base) or a link's number"),
-            point_m=frozen_array(self.point_m, float, (3,), "vibrometer: point_m"),
-            direction=frozen_array(direction / length, float, (3,), "vibrometer: direction"),
+            body_id=as_whole(self.body_id, f"{name}: body_id", "give the body's id"),
+            link=as_whole(self.link, f"{name}: link", "give -1 (the base) or a link's number"),
+            point_m=frozen_array(self.point_m, float, (3,), f"{name}: point_m"),
+            direction=frozen_array(direction / length, float, (3,), f"{name}: direction"),
         )
+
+    @property
+    def kind(self) -> str:
+        """What it is called in messages."""
+        return "vibrometer"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactMicrophone(Vibrometer):
+    """Acceleration in m/s² of a body's surface at point_m (3,) along direction (3,), both in the body frame.
+
+    As a `Vibrometer` moves, so it is accelerated; 7.5 samples late. Through its own frequency ``response``, None: flat;
+    with its own white noise of ``noise_m_s2_rthz``, m/s² per √Hz of what it gives.
+    """
+
+    response: SensorResponse | None = None
+    noise_m_s2_rthz: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        Vibrometer.__post_init__(self)
+        name = self.kind
+        if self.response is not None:
+            as_kind(self.response, SensorResponse, f"{name}: response", "give a SensorResponse(freq_hz, magnitude)")
+        remedy = "give its density in m/s² per √Hz, such as 1e-3"
+        noise = as_number(self.noise_m_s2_rthz, f"{name}: noise_m_s2_rthz", remedy, least=0, below=1e12)
+        store(self, noise_m_s2_rthz=noise)
+
+    @property
+    def kind(self) -> str:
+        """What it is called in messages."""
+        return "contact microphone"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,6 +188,11 @@ def channels_of(sensors: Sequence[Sensor]) -> int:
 def channel_sensors(sensors: Sequence[Sensor]) -> tuple[Sensor, ...]:
     """List the sensor of each channel."""
     return tuple(s for s in sensors for _ in range(s.channels if isinstance(s, Microphone) else 1))
+
+
+def felt_bodies(sensors: Sequence[Sensor]) -> frozenset[int]:
+    """Return the ids of the bodies on whose surfaces sensors are."""
+    return frozenset(one.body_id for one in sensors if isinstance(one, Vibrometer))
 
 
 @dataclass(frozen=True, slots=True)

@@ -134,6 +134,11 @@ class Body:
         """Factor of gain_db."""
         return float(10 ** (self.gain_db / 20))
 
+    @property
+    def sounding_gain(self) -> float:
+        """The same; 0 of a silent body."""
+        return 0.0 if self.silent else self.gain
+
 
 @dataclass(frozen=True, slots=True)
 class Change:

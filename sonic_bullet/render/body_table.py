@@ -14,6 +14,7 @@ import numpy as np
 
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.render.resonator import Resonator
+from sonic_bullet.render.surface.rigid_motion import rigid_shape
 from sonic_bullet.render.tables import BODY, FACE, NODE
 from sonic_bullet.support import ContactSide
 from sonic_bullet.synth.strikes import SPAN
@@ -87,7 +88,7 @@ class BodyTable:
     def __init__(self) -> None:
         self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
         self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
-        self._places: dict[tuple[ModalModel, bytes], _Place] = {}
+        self._places: dict[tuple[ModalModel, bytes, int], _Place] = {}
 
     @property
     def bodies(self) -> Array:
@@ -137,7 +138,8 @@ class BodyTable:
         row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
         row["surface_seed"] = surface_seed
         row["rigid"] = resonator.translation is not None
-        row["modes"], row["columns"] = resonator.mode_count, resonator.mode_count + len(follows)
+        row["modes"] = resonator.mode_count
+        row["columns"] = resonator.mode_count + len(follows) + resonator.rigid_columns
         _stand(row, place)
         # a silent partner's record begins where it first touches, not where it was put
         row["placed"] = -SPAN if material is None else body.since_step
@@ -160,7 +162,7 @@ class BodyTable:
         """
         other = BodyTable()
         other._bodies.append(self.bodies[keep])
-        keys = {(one.body.model, follows.tobytes()) for one, follows in kept}
+        keys = {(one.body.model, follows.tobytes(), one.rigid_columns) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}
         if 2 * sum(place.faces for place in places.values()) >= len(self.faces):
             other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
@@ -175,10 +177,11 @@ class BodyTable:
         model, index = resonator.body.model, resonator.index
         if model is None or index is None:
             return _NOWHERE
-        key = (model, follows.tobytes())  # records are compared by identity
+        key = (model, follows.tobytes(), resonator.rigid_columns)  # records are compared by identity
         place = self._places.get(key)
         if place is None:
-            shape = np.concatenate([resonator.shape, resonator.shape[:, :, follows]], axis=2)
+            rigid = rigid_shape(model.vertex_m)[:, :, : resonator.rigid_columns]
+            shape = np.concatenate([resonator.shape, resonator.shape[:, :, follows], rigid], axis=2)
             place = self._places[key] = _Place(
                 self._frequencies.append(resonator.omega_rad_s / (2 * np.pi)),
                 self._shapes.append(shape.ravel()),

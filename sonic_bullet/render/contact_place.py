@@ -94,6 +94,26 @@ def contact_modulus(low_pa, high_pa):
 
 
 @njit(nogil=True, error_model="numpy")
+def jointed_mobility(mobility, q, r, n):
+    """Compute the speed along n (3,) per impulse along it at r (3,), world frame: gᵀ W g, g = (n, r × n) turned back.
+
+    mobility W (6, 6) in the frame that q (4,) turns into the world.
+    """
+    g = np.empty(6)
+    turn = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]
+    x, y, z, w = q[0], q[1], q[2], q[3]
+    s = 2 / (x * x + y * y + z * z + w * w)
+    for at, (a, b, c) in ((0, (n[0], n[1], n[2])), (3, turn)):
+        i, j, k = s * (y * c - z * b), s * (z * a - x * c), s * (x * b - y * a)
+        g[at], g[at + 1], g[at + 2] = a - w * i + y * k - z * j, b - w * j + z * i - x * k, c - w * k + x * j - y * i
+    total = 0.0
+    for row in range(6):
+        for column in range(6):
+            total += g[row] * mobility[row, column] * g[column]
+    return total
+
+
+@njit(nogil=True, error_model="numpy")
 def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
     """Compute m* in kg of two bodies, 0 where neither moves.
 
@@ -104,7 +124,9 @@ def effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal):
         body, q, r = (
             (bodies[low], quaternion[low], arm_low) if side == 0 else (bodies[high], quaternion[high], arm_high)
         )
-        if body.mass_kg > 0:
+        if body.jointed:
+            mobility += jointed_mobility(body.mobility, q, r, n)
+        elif body.mass_kg > 0:
             mobility += 1 / body.mass_kg
             # the rotational part is a scalar: computed in the body's frame, where its inertia is
             a, b, c = r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]

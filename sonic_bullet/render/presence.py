@@ -125,8 +125,9 @@ def subset(state: State, keep: Array) -> None:
     state.stand = state.stand[keep]
     state.travelling = path.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
-    if state.space is not None:
-        state.space.subset(keep)
+    for part in (state.space, state.surface):
+        if part is not None:
+            part.subset(keep)
     state.pairs.subset(number)
     state.grains = tuple(replace(grain, body=int(number[grain.body])) for grain in state.grains)
     state.rubs = {(int(number[low]), int(number[high]), side): one for (low, high, side), one in state.rubs.items()}

@@ -24,6 +24,7 @@ import numpy as np
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.render.resonator import Resonator, build_resonator
+from sonic_bullet.render.surface.rigid_motion import with_rigid
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
 from sonic_bullet.residual.transfer import StruckModes
@@ -282,19 +283,19 @@ def friction_grains(
 
 
 def with_lines(resonator: Resonator, voice: ResidualVoice | None) -> ModeSet:
-    """Return a body's modes for the bank, followed by the lines of its residual."""
+    """Return a body's modes for the bank, followed by the lines of its residual, and its rigid motions."""
     s = resonator
     modes = ModeSet(
         s.omega_rad_s, s.decay_per_s, s.weight, s.bend, s.damping_growth, s.damping_growth_power, s.translation
     )
     if voice is None:
-        return modes
+        return with_rigid(modes, s.rigid_columns, s.body.sounding_gain)
     lines = voice.lines
     bend, growth = (
         None if mine is None or more is None else np.concatenate([mine, more])
         for mine, more in ((s.bend, lines.bend), (s.damping_growth, lines.damping_growth))
     )
-    return ModeSet(
+    modes = ModeSet(
         np.concatenate([s.omega_rad_s, lines.omega_rad_s]),
         np.concatenate([s.decay_per_s, lines.decay_per_s]),
         np.concatenate([s.weight, lines.weight], axis=1),
@@ -303,3 +304,4 @@ def with_lines(resonator: Resonator, voice: ResidualVoice | None) -> ModeSet:
         s.damping_growth_power,
         s.translation,
     )
+    return with_rigid(modes, s.rigid_columns, s.body.sounding_gain)

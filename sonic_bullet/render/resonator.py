@@ -23,6 +23,7 @@ from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.records.mounting import Mounting, loss_factor, radiating_share
+from sonic_bullet.render.surface.rigid_motion import rigid_columns, rigid_rows
 from sonic_bullet.support import ContactSide, Moving
 from sonic_bullet.synth.bank import Translation, audible
 
@@ -48,6 +49,7 @@ class Resonator:
     moving, side : mobility where it is touched, and its elastic properties there
     bend, damping_growth : (m,) of frequency per |z|², of decay by (damping_growth·|z|)^damping_growth_power
         None in a linear body
+    rigid_columns : 6 where its rigid motion is played too, else 0
     """
 
     body: Body
@@ -65,6 +67,7 @@ class Resonator:
     bend: Array | None = None
     damping_growth: Array | None = None
     damping_growth_power: float = 1.0
+    rigid_columns: int = 0
 
     @property
     def mode_count(self) -> int:
@@ -77,6 +80,17 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
     return tuple(sensor for sensor in sensors if not isinstance(sensor, Microphone))
 
 
+def weight_set_count(sensors: tuple[Sensor, ...]) -> int:
+    """Count row 0, a row for each of `weight_sets`, and those that read rigid motions."""
+    return 1 + len(weight_sets(sensors)) + rigid_rows(sensors)
+
+
+def read_sets(sensors: tuple[Sensor, ...]) -> Array:
+    """Return the weight set (c,) that each sensor reads, 0 for all microphones; then those of rigid motions."""
+    own = np.array([not isinstance(one, Microphone) for one in sensors] + [True] * rigid_rows(sensors), bool)
+    return np.where(own, np.cumsum(own), 0).astype(np.int64)
+
+
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
     """Prepare one body. Modes at or above sr/2 and overdamped ones are dropped and counted.
 
@@ -85,7 +99,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     d/ω).
     """
     model = body.model
-    readers = weight_sets(sensors)
+    readers, sets = weight_sets(sensors), weight_set_count(sensors)
     side = RIGID if body.material is None else ContactSide.of(body.material)
     if model is None:
         none = np.zeros(0)
@@ -93,7 +107,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             body,
             none,
             none,
-            np.zeros((1 + len(readers), 0), complex),
+            np.zeros((sets, 0), complex),
             np.zeros((0, 3, 0), np.float32),
             None,
             _size(body),
@@ -104,7 +118,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             side,
         )
     keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr, body.mounting)
-    weight = np.zeros((1 + len(readers), len(omega)), complex)
+    weight = np.zeros((sets, len(omega)), complex)
     weight[0] = pressure
     for row, sensor in enumerate(readers, start=1):
         if isinstance(sensor, ModalSum):
@@ -120,9 +134,9 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     dropped = model.dropped + int(np.sum(~keep))
     translation = _translation(body, sr, air)
     if body.silent or body.gain_db:  # of its sound at sensors; its coupling to partners stays
-        gain = 0.0 if body.silent else body.gain
-        weight *= gain
-        translation = None if translation is None else replace(translation, weight=translation.weight * gain)
+        weight *= body.sounding_gain
+        if translation is not None:
+            translation = replace(translation, weight=translation.weight * body.sounding_gain)
     bend = None if model.bend_s2_m2 is None else model.bend_s2_m2[keep] * most**2
     damping_growth = None if model.damping_growth_s_m is None else model.damping_growth_s_m[keep] * most
     return Resonator(
@@ -141,6 +155,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         bend,
         damping_growth,
         model.damping_growth_power,
+        rigid_columns(body, sensors) if index is not None else 0,
     )
 
 

@@ -68,7 +68,7 @@ def render_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]
 def body_notes(log: ContactLog) -> tuple[str, ...]:
     """Return notes on added bodies that are silent or simplified, each kind in one note.
 
-    Kinds: not touched, no mode in the band, radiation by a simpler law.
+    Kinds: not touched, no mode in the band, a sensor on a body that was not added, radiation by a simpler law.
     """
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
@@ -82,6 +82,11 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
         mute = [body for body in dull if (body.mass_kg == 0) == still]
         if mute:
             notes.append(f"no mode below {min(20_000.0, log.sr / 2):g} Hz: {_names(mute, MANY)}; {said}")
+    here = {(body.body_id, body.link) for body in log.bodies if body.material is not None}
+    off = [one for one in log.sensors if isinstance(one, Vibrometer) and (one.body_id, one.link) not in here]
+    if off and here:
+        places = ", ".join(sorted({_read_place(one, log) for one in off}))
+        notes.append(f"the {off[0].kind} is on {places}, which was not added, so it reads nothing; add it")
     if any(isinstance(sensor, Microphone) for sensor in log.sensors):
         simple = [body for body, model in models if radiation_note(model, log.air)]
         if simple:
@@ -143,13 +148,14 @@ def _mute(log: ContactLog, resonators: list[Resonator]) -> str | None:
     readers = [sensor for sensor in log.sensors if isinstance(sensor, Vibrometer)]
     ringing = [resonator for resonator in resonators if resonator.mode_count]
     if len(readers) == len(log.sensors):
-        there = {(resonator.body.body_id, resonator.body.link) for resonator in ringing}
-        if ringing and not any((sensor.body_id, sensor.link) in there for sensor in readers):
+        moving = [one for one in resonators if one.mode_count or one.rigid_columns]
+        there = {(one.body.body_id, one.body.link) for one in ringing}
+        joined = {one.body.body_id for one in moving if one.rigid_columns}
+        if moving and not any((sensor.body_id, sensor.link) in there or sensor.body_id in joined for sensor in readers):
             places = ", ".join(sorted({_read_place(sensor, log) for sensor in readers}))
-            return (
-                f"the vibrometer is on {places}, and only {_names(s.body for s in ringing)} was touched; put it there"
-            )
-    if ringing:
+            struck = _names(s.body for s in moving)
+            return f"the {readers[0].kind} is on {places}, and only {struck} was touched; put it there"
+    if ringing or any(one.rigid_columns for one in resonators):
         return None
     if any(isinstance(sensor, Microphone) for sensor in log.sensors) and any(
         resonator.translation is not None for resonator in resonators

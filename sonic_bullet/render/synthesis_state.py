@@ -17,9 +17,10 @@ from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
-from sonic_bullet.render.resonator import Resonator, build_resonator, weight_sets
+from sonic_bullet.render.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.render.space.space_state import SpaceState, is_spatial
 from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
+from sonic_bullet.render.surface.surface_state import SurfaceState, start_surface
 from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
@@ -62,9 +63,8 @@ class Setup:
 
     @property
     def reads(self) -> Array:
-        """Weight set (c,) that each sensor reads; 0, that of all microphones, for a microphone."""
-        own = np.array([not isinstance(sensor, Microphone) for sensor in self.sensors], bool)
-        return np.where(own, np.cumsum(own), 0).astype(np.int64)
+        """Weight set (c,) that each sensor reads, 0 for all microphones; then those of rigid motions."""
+        return read_sets(self.sensors)
 
 
 def pair_key(body: Array) -> Array:
@@ -206,8 +206,8 @@ class State:
     have left, and ring on where they were); newest: the highest so far. quenches: steps before which all ringing stops.
     voices (b): residuals; grains, rubs: their grains and sections under way. witness: called with every step once it
     rings, then one at a time. stand (b,) STAND: support state; credit_s (1,): time left for new poles, (0,) where
-    nothing supports. space: of microphones that move, ambisonics and heads. lifted: of bodies that left, by name, the
-    steps that they rang on contacts, and those with contact separation.
+    nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces. lifted: of
+    bodies that left, by name, the steps that they rang on contacts, and those with contact separation.
     """
 
     window: Window
@@ -236,6 +236,7 @@ class State:
     credit_s: Array = field(default_factory=lambda: np.zeros(0))
     lifted: dict[str, tuple[int, int]] = field(default_factory=dict)
     space: SpaceState | None = None
+    surface: SurfaceState | None = None
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -278,7 +279,7 @@ class State:
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.witness, self.stand.copy(), self.credit_s.copy(), dict(self.lifted),
-            None if self.space is None else self.space.copy(),
+            self.space and self.space.copy(), self.surface and self.surface.copy(),
         )  # fmt: skip
 
 
@@ -292,9 +293,8 @@ class Witness(Protocol):
 
 def start(setup: Setup) -> State:
     """Return silence at time 0, without bodies."""
-    instrument, ringing = bank.empty_bank(
-        setup.sr, 1 + len(weight_sets(setup.sensors)), passes=bank.PASSES if setup.supports else 0
-    )
+    sets, passes = weight_set_count(setup.sensors), bank.PASSES if setup.supports else 0
+    instrument, ringing = bank.empty_bank(setup.sr, sets, passes=passes)
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
     none = np.zeros(0, np.int64)
     window = Window(
@@ -310,6 +310,7 @@ def start(setup: Setup) -> State:
         window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads, credit_s=credit_s
     )
     state.space = SpaceState(setup.sensors, setup.sr, setup.air) if is_spatial(setup.sensors) else None
+    state.surface = start_surface(setup.sensors, setup.sr, setup.seed, apart=setup.apart)
     return state
 
 
@@ -342,7 +343,8 @@ def quench(state: State) -> None:
     state.path, state.travelling = path.append_bodies(air, travelling, radius)
     state.ringing = bank.silence(state.ringing)
     state.grains, state.rubs = (), {}
-    if state.space is not None:
-        state.space.quench()
+    for part in (state.space, state.surface):
+        if part is not None:
+            part.quench()
     state.changed()
     state.quenches = frozenset(number for number in state.quenches if number > state.number)

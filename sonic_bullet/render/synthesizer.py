@@ -24,9 +24,10 @@ from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.ringing_on import with_tail
-from sonic_bullet.render.room.room_convolution import sum_rows
 from sonic_bullet.render.space.space_state import hears_apart
 from sonic_bullet.render.standing.supports import settle
+from sonic_bullet.render.surface.finished_channels import finish_channels
+from sonic_bullet.render.surface.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
 from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places
@@ -53,7 +54,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
             quench(state)
         count = 1 if state.has_residual or state.witness is not None else len(steps)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
-        count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead)])
+        count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead), until_motions(steps)])
         frames.append(_advanced(setup, state, steps[:count]))
         steps = steps[count:]
     return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
@@ -86,18 +87,20 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # noqa: PLR0912 - a branch a reason
     """Advance by steps without a quench between; by one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
+    enter_mobility(state.table.bodies, state.body, steps[0].motions)
     table, clock, waiting = _schedule(sr, state, steps)
     contacts, poses = _joined(steps)
     if state.present is not state.body or state.mapped:
         contacts, poses = in_tables(state, contacts, poses)
     stop = clock.sample(sr)
-    aim, by_body = AT_REST, setup.apart or hears_apart(setup.sensors)
+    aim, sensors = AT_REST, len(state.reads)
+    by_body = setup.apart or hears_apart(setup.sensors) or state.surface is not None
     if state.space is not None:
         next_s = clock.after(waiting[0]).time_s
         aim = state.space.aim(table, next_s, poses, state.resonators)
     groups, microphones = len(state.body) if by_body else 1, len(state.path.microphone_m)
-    out = np.zeros((groups * len(setup.sensors), stop - begin))
-    pressure = out if microphones == len(setup.sensors) else np.zeros((groups * microphones, stop - begin))
+    out = np.zeros((groups * sensors, stop - begin))
+    pressure = out if microphones == sensors else np.zeros((groups * microphones, stop - begin))
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
@@ -133,9 +136,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     state.taken += len(steps)
     state.clock, state.waiting = clock, waiting
     state.ringing.at = state.travelling.at = stop
-    if state.space is not None and hears_apart(setup.sensors):
-        out = state.space.channels(table, out, pressure, apart=setup.apart)
-    return out if setup.mixing is None else sum_rows(setup.mixing, out)
+    return finish_channels(setup, state, table, steps, out, pressure)
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:

@@ -27,6 +27,8 @@ BODY = np.dtype(
     [
         ("mass_kg", "f8"),  # 0 for what does not move
         ("inertia_kg_m2", "f8", (3, 3)),  # body frame
+        ("jointed", "i8"),  # 1: how it moves is the mobility, not mass and inertia
+        ("mobility", "f8", (6, 6)),  # velocity and spin per impulse and its moment, body frame
         ("modulus_pa", "f8"),  # E/(1-ν²), infinite where it is a rigid partner
         ("restitution", "f8"),  # infinite where it has no material
         ("roughness_m", "f8"),

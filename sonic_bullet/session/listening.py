@@ -29,6 +29,7 @@ from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.directed import absent
+from sonic_bullet.session.felt_bodies import felt_now
 from sonic_bullet.session.keeping import KeptRun, package_versions
 from sonic_bullet.session.material_choice import choose_materials, current_choice
 from sonic_bullet.session.wanted_bodies import WantedBody, checked, enter_bodies, solved_bodies, wanted_body
@@ -69,6 +70,7 @@ class Listener:
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
         self.world = client if isinstance(client, World) else _opened(client)
+        self.world.felt = felt_now(self.sensors)
         self.world.silence(current_choice().silent)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")

@@ -17,6 +17,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.listener import disconnect
 from sonic_bullet.records.errors import AudioError, MaterialError, RecordError, SceneError, SceneWarning
+from sonic_bullet.session.drawn_recording import ChainSpread, draw_chain, record
 from sonic_bullet.synth.clock import Clock, exact_step
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -402,3 +403,21 @@ def test_gymnasium_is_an_extra() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=120)
     assert done.stdout == 'gymnasium is not installed; pip install "sonic_bullet[environments]"\n'
+
+
+def test_an_episode_is_recorded_as_its_chain_says(opened: Any) -> None:
+    """The plain episode through the chain of its seed, whose numbers are in info; another seed has another chain."""
+    spread = ChainSpread(gain_db=(-6, 6), response_db=3.0, noise_rthz=(1e-6, 1e-5), latency_s=(0.0, 0.01))
+    how: dict[str, Any] = {"microphones": MICROPHONES, "materials": plates, "seed": 4}
+    plain, _ = episode(opened(SoundObservation(FallingBox(), **how)), 3)
+    env = opened(SoundObservation(FallingBox(), **how, recording=spread))
+    heard, _ = episode(env, 3)
+    _, info = env.reset(seed=3)
+    chain = draw_chain(np.random.default_rng([4, 1, 3]), spread)
+    assert info["recording"] == chain.to_json()
+    law, _ = record(plain.astype(float), 48_000, chain)
+    assert np.abs(heard - law).max() < 1e-5 * np.abs(law).max()
+    assert np.array_equal(heard, episode(env, 3)[0])
+    assert env.reset(seed=5)[1]["recording"] != info["recording"]
+    with pytest.raises(RecordError, match="recording"):
+        SoundObservation(FallingBox(), recording=5)

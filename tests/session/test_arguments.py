@@ -24,6 +24,7 @@ from sonic_bullet.records.errors import (
     SceneError,
     SonicBulletError,
 )
+from sonic_bullet.records.touching.link_motions import MOTION
 from tests.made import heads
 from tests.made.models import STEEL
 from tests.made.worlds import box, plate_model
@@ -62,6 +63,7 @@ STEP = {
     "contacts": sb.Contacts.none(),
     "gravity_m_s2": [0, 0, -9.8],
     "body": [0, 1],
+    "motions": np.zeros(1, MOTION),
 }
 MATERIAL = {
     "name": "m",
@@ -204,6 +206,11 @@ def reading_audio(_: Any, folder: Path) -> Made:
     return sb.read_audio, {"path": folder / "a.wav"}
 
 
+def reading_response(_: Any, folder: Path) -> Made:
+    (folder / "a.csv").write_text("100,0.5\n1000,1\n")
+    return sb.read_response, {"path": folder / "a.csv"}
+
+
 def reading_log(_: Any, folder: Path) -> Made:
     sb.ContactLog(**LOG).save(folder / "a.npz")
     return sb.read_log, {"path": folder / "a.npz"}
@@ -258,6 +265,19 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Shape": lambda *_: (sb.Shape, SHAPE),
     "Step": lambda *_: (sb.Step, STEP),
     "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
+    "ContactMicrophone": lambda *_: (
+        sb.ContactMicrophone,
+        {
+            "body_id": 0,
+            "point_m": [0, 0, 0],
+            "direction": [0, 0, 1],
+            "link": -1,
+            "response": None,
+            "noise_m_s2_rthz": 0.0,
+        },
+    ),
+    "SensorResponse": lambda *_: (sb.SensorResponse, {"freq_hz": [100, 1000], "magnitude": [0.5, 1]}),
+    "read_response": reading_response,
     "attach": lambda client, _: (
         sb.attach,
         {"client": client, "sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None, **KEEPS},
@@ -302,6 +322,12 @@ FLAG = ["no", None, 0, 1.0]
 TEXT = [None, 5, b"m", ["m"]]
 RECORD = ["helium", 5, object(), {}]
 WHOLE = [*NUMBER, 1.5]
+ON_SURFACE = {
+    "body_id": WHOLE,
+    "point_m": [*ARRAY, [0, 0]],
+    "direction": [*ARRAY, [0, 0], [0, 0, 0]],
+    "link": WHOLE,
+}
 CLIENT = [None, "client", 99, -1, 10**30, True, object(), pybullet.connect]
 PLACED_BAD: dict[str, list[Any]] = {
     "position_m": [*ARRAY, [0, 0]],
@@ -437,13 +463,12 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "contacts": [*RECORD, None],
         "gravity_m_s2": [*ARRAY, 5],
         "body": [*[value for value in ARRAY if value is not None], 5, [1, 0], [-1, 0], [0, 0], [0.5, 1]],
+        "motions": [*ARRAY, 5, np.full(1, 7, MOTION), np.full(1, -1, MOTION)],
     },
-    "Vibrometer": {
-        "body_id": WHOLE,
-        "point_m": [*ARRAY, [0, 0]],
-        "direction": [*ARRAY, [0, 0], [0, 0, 0]],
-        "link": WHOLE,
-    },
+    "Vibrometer": ON_SURFACE,
+    "ContactMicrophone": ON_SURFACE | {"response": ["x", 5, [1], {}, object()], "noise_m_s2_rthz": [*NUMBER, -1]},
+    "SensorResponse": {"freq_hz": [*ARRAY, [0, 1], [2, 1]], "magnitude": [*ARRAY, [0, 0], [-1, 1], [1]]},
+    "read_response": {"path": PATH},
     "attach": {
         "client": CLIENT,
         "sr": [*NUMBER, 0, 10**9, 44_100.5],

@@ -115,11 +115,14 @@ def run_render(
 
 def log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
+    from sonic_bullet.render import render_notes
+
     if is_log(scene):
         log, _, said = prepared(scene, wish)
     else:
-        result = simulated(scene, replace(wish, tail_db=0.0, room=None))
-        log, said = result.log, result.notes
+        result = simulated(scene, replace(wish, tail_db=0.0, room=None, feels_all=bool(space.touching)))
+        log, of_other_sensors = result.log, render_notes(result.sound, result.log)
+        said = tuple(note for note in result.notes if note not in of_other_sensors)
     if not space:
         return log, said
     log, more = space.applied(log if wish.rate is None else replace(log, sr=wish.rate), scene)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,6 +84,7 @@ class Wish:
     at_end: Callable[[Listener], object] | None = None
     tail_db: float | None = None
     room: ShoeboxRoom | None = None
+    feels_all: bool = False
 
 
 def is_log(scene: str) -> bool:
@@ -118,6 +120,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
     """Run a scene."""
     with quiet_stderr():
         from sonic_bullet.scene import render_scene
+        from sonic_bullet.session.felt_bodies import feeling_all
 
     sr, places = wish.rate or DEFAULT_SR, wish.microphones or None
     asked: dict[str, Any] = {
@@ -130,7 +133,8 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         "tail_db": wish.tail_db,
         **wish.materials.options,
     }
-    return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
+    with feeling_all() if wish.feels_all else nullcontext():
+        return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,4 +195,5 @@ def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise
-    return Replay(sound, log, rate, (*said, *render_notes(sound, log)), plan)
+    notes = tuple(dict.fromkeys((*said, *render_notes(sound, log))))
+    return Replay(sound, log, rate, notes, plan)

@@ -1,4 +1,4 @@
-"""Where a render is listened from, and how: microphones that move, ambisonics, heads.
+"""Where a render is listened from, and how: microphones that move or touch, ambisonics, heads.
 
 SpaceWish (options) -> checked -> sensors of a log, in the place of its own
 """
@@ -16,9 +16,12 @@ from sonic_bullet.records.errors import FileError, SceneError
 
 if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog
-    from sonic_bullet.records import Array, Head, Microphone
+    from sonic_bullet.records import Array, Body, Head, Microphone, SensorResponse, Vibrometer
 
-OPTIONS = ("ambisonics", "head", "facing", "microphone_path", "microphone_on")
+OPTIONS = (
+    "ambisonics", "head", "facing", "microphone_path", "microphone_on", "contact_microphone", "vibrometer",
+    "contact_response", "contact_noise",
+)  # fmt: skip
 COLUMNS = (4, 8)
 """Of a path's table: time and place, and, it may be, the quaternion."""
 
@@ -56,10 +59,66 @@ def space_options(command: Any) -> Any:
                 metavar="NAME[=X,Y,Z]",
                 help="A microphone that moves with the body NAME, at X,Y,Z of its frame, in m; repeatable.",
             ),
+            click.option(
+                "--contact-microphone",
+                multiple=True,
+                metavar="NAME[=X,Y,Z[,DX,DY,DZ]]",
+                help="A microphone that touches the body NAME at X,Y,Z of its frame, in m, and gives its acceleration "
+                "along DX,DY,DZ, in m/s²; repeatable. [default: 0,0,0,0,0,1]",
+            ),
+            click.option(
+                "--vibrometer",
+                multiple=True,
+                metavar="NAME[=X,Y,Z[,DX,DY,DZ]]",
+                help="The same as a vibrometer, which gives its velocity, in m/s; repeatable.",
+            ),
+            click.option(
+                "--contact-response",
+                metavar="FILE.csv|.wav",
+                help="Response of contact microphones: rows of Hz and factor, or a FIR filter. [default: flat]",
+            ),
+            click.option(
+                "--contact-noise",
+                type=float,
+                metavar="M_S2_RTHZ",
+                help="Their own noise, in m/s² per √Hz. [default: none]",
+            ),
         )
     ):
         command = option(command)
     return command
+
+
+@dataclass(frozen=True, slots=True)
+class Touching:
+    """A sensor on a surface that is asked for.
+
+    The option, the body's name, place and direction in its frame, response and noise.
+    """
+
+    option: str
+    name: str
+    place_m: tuple[float, ...]
+    direction: tuple[float, ...]
+    chain: tuple[SensorResponse | None, float] = (None, 0.0)
+
+    @classmethod
+    def read(cls, option: str, given: str, chain: tuple[SensorResponse | None, float] = (None, 0.0)) -> Touching:
+        """Read NAME[=X,Y,Z[,DX,DY,DZ]]. Raises click.BadParameter."""
+        name, _, place = given.partition("=")
+        six = place.count(",") == 5
+        numbers = Numbers("X,Y,Z,DX,DY,DZ" if six else "X,Y,Z").convert(place, None, None) if place else (0.0,) * 3
+        return cls(option, name, numbers[:3], numbers[3:] or (0.0, 0.0, 1.0), chain)
+
+    def sensor(self, log: ContactLog, where: str) -> Vibrometer:
+        """Put it on the body of that name. Raises SceneError."""
+        import numpy as np
+
+        from sonic_bullet.records import ContactMicrophone, Vibrometer
+
+        body = _body_called(log, self.name, f"--{self.option}", where)
+        where_on = (body.body_id, np.array(self.place_m), np.array(self.direction), body.link)
+        return Vibrometer(*where_on) if self.option == "vibrometer" else ContactMicrophone(*where_on, *self.chain)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,15 +130,21 @@ class SpaceWish:
     facing: tuple[float, float, float] | None = None
     paths: tuple[Microphone, ...] = ()
     on: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    touching: tuple[Touching, ...] = ()
 
     @classmethod
     def read(
         cls,
+        *,
         ambisonics: int | None,
         head: str | None,
         facing: tuple[float, float, float] | None,
         microphone_path: tuple[str, ...],
         microphone_on: tuple[str, ...],
+        contact_microphone: tuple[str, ...],
+        vibrometer: tuple[str, ...],
+        contact_response: str | None,
+        contact_noise: float | None,
     ) -> SpaceWish:
         """Read the options. Raises FileError where a file cannot be read, or options contradict each other."""
         if ambisonics is not None and head is not None:
@@ -94,11 +159,24 @@ class SpaceWish:
             from sonic_bullet.files.sofa.heads import read_head
 
             found = read_head(head)
-        return cls(ambisonics, found, facing, tuple(read_path(path) for path in microphone_path), tuple(on))
+        chain_options = {"--contact-response": contact_response, "--contact-noise": contact_noise}
+        if not contact_microphone and any(value is not None for value in chain_options.values()):
+            option = next(name for name, value in chain_options.items() if value is not None)
+            raise FileError(f"{option} is of a contact microphone, and there is none", "give --contact-microphone too")
+        response = None
+        if contact_response is not None:
+            from sonic_bullet.files.responses.sensor_responses import read_response
+
+            response = read_response(contact_response)
+        chain = response, 0.0 if contact_noise is None else contact_noise
+        touching = [Touching.read("contact-microphone", one, chain) for one in contact_microphone]
+        touching += [Touching.read("vibrometer", one) for one in vibrometer]
+        paths = tuple(read_path(path) for path in microphone_path)
+        return cls(ambisonics, found, facing, paths, tuple(on), tuple(touching))
 
     def __bool__(self) -> bool:
         """Return whether anything is asked for."""
-        return bool(self.ambisonics or self.head or self.facing or self.paths or self.on)
+        return bool(self.ambisonics or self.head or self.facing or self.paths or self.on or self.touching)
 
     @property
     def channels(self) -> int:
@@ -109,8 +187,10 @@ class SpaceWish:
         """Give the log such sensors, and what a user should read of them. Raises SceneError."""
         from sonic_bullet.records import Ambisonics, Binaural, Microphone
 
-        moving = [*self.paths, *(_on_body(log, name, place, where) for name, place in self.on)]
-        sensors, notes = list(moving or log.sensors), []
+        moving: list[Any] = [*self.paths, *(_on_body(log, name, place, where) for name, place in self.on)]
+        moving += [one.sensor(log, where) for one in self.touching]
+        sensors: list[Any] = list(moving or log.sensors)
+        notes = []
         for i, one in enumerate(sensors):
             if not isinstance(one, Microphone):
                 continue
@@ -134,12 +214,19 @@ def _on_body(log: ContactLog, name: str, place: tuple[float, ...], where: str) -
     import numpy as np
 
     from sonic_bullet.records import Microphone
+
+    body = _body_called(log, name, "--microphone-on", where)
+    return Microphone(np.array(place), body_id=body.body_id, link=body.link)
+
+
+def _body_called(log: ContactLog, name: str, option: str, where: str) -> Body:
+    """Find a body that sounds by its name. Raises SceneError."""
     from sonic_bullet.records.coerce import nearest
 
     known = {body.name: body for body in log.bodies if body.material is not None}
     if name not in known:
-        raise SceneError(f"--microphone-on {name}: nothing that sounds in {where} is called that", nearest(name, known))
-    return Microphone(np.array(place), body_id=known[name].body_id, link=known[name].link)
+        raise SceneError(f"{option} {name}: nothing that sounds in {where} is called that", nearest(name, known))
+    return known[name]
 
 
 def turn_to(place_m: Array, target_m: tuple[float, float, float]) -> Array:

@@ -1,18 +1,19 @@
 """Steps of a contact log as columns, in memory and on disk, for logs of hours.
 
-Step -> StepLog -> STEP row + POSE rows + CONTACT rows (spools) -> LogSteps -> Step, on request
-npz  -> the same three tables, read from the file (step_entries) -> LogSteps -> Step
+Step -> StepLog -> STEP row + POSE rows + CONTACT rows + MOTION rows (spools) -> LogSteps -> Step, on request
+npz  -> the same four tables, read from the file (step_entries) -> LogSteps -> Step
 
-STEP       length, gravity, and the end of its rows among all poses and contacts
+STEP       length, gravity, and the end of its rows among all poses, contacts and motions
 POSE       index of the body into the log's `bodies`, moved by hand or not, position, quaternion
 CONTACT    records.contacts
+MOTION     records.touching.link_motions
 """
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -21,8 +22,11 @@ from sonic_bullet.files.rows.spool import Spool
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
+from sonic_bullet.records.touching.link_motions import MOTION
 
-STEP = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), ("pose_end", "i8"), ("contact_end", "i8")])
+KINDS = ("pose", "contact", "motion")
+"""Tables whose rows belong to steps."""
+STEP = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), *((f"{kind}_end", "i8") for kind in KINDS)])
 POSE = np.dtype(
     [("body", "i4"), ("teleported", "?"), ("position_m", "f8", (3,)), ("quaternion_xyzw", "f8", (4,))], align=True
 )
@@ -47,35 +51,37 @@ class StepBlock(NamedTuple):
 
     Parameters
     ----------
-    step, pose, contact : Array of STEP, POSE, CONTACT
+    step, pose, contact, motion : Array of STEP, POSE, CONTACT, MOTION
         The ends in step count from this block's first rows.
     """
 
     step: Array
     pose: Array
     contact: Array
+    motion: Array
 
     def counts(self, name: str) -> Array:
-        """Return the rows (n,) of each step; name: "pose" or "contact"."""
+        """Return the rows (n,) of each step; name: of `KINDS`."""
         return np.diff(self.step[f"{name}_end"], prepend=0)
 
     def steps(self) -> list[Step]:
         """Make the block's steps, whose numbers were checked before."""
-        made, p0, k0 = [], 0, 0
+        made, p0, k0, m0 = [], 0, 0, 0
         position, turned, moved, body = (
             _column(self.pose, name) for name in ("position_m", "quaternion_xyzw", "teleported", "body")
         )
         gravity, none = _column(self.step, "gravity_m_s2"), Contacts.none()
         body = body.astype(np.int64)
         body.flags.writeable = False
-        columns = (self.step[name].tolist() for name in ("dt_s", "pose_end", "contact_end"))
-        for i, (dt_s, p1, k1) in enumerate(zip(*columns, strict=True)):
+        columns = (self.step[name].tolist() for name in ("dt_s", *(f"{kind}_end" for kind in KINDS)))
+        for i, (dt_s, p1, k1, m1) in enumerate(zip(*columns, strict=True)):
             rows = Contacts.trusted(self.contact[k0:k1]) if k1 > k0 else none
             # ascending from 0, so that the last tells whether it is the first p1 - p0
             usual = p1 == p0 or body[p1 - 1] == p1 - p0 - 1
             who = first_bodies(p1 - p0) if usual else body[p0:p1]
-            made.append(Step.trusted(dt_s, position[p0:p1], turned[p0:p1], moved[p0:p1], rows, gravity[i], who))
-            p0, k0 = p1, k1
+            step = Step.trusted(dt_s, position[p0:p1], turned[p0:p1], moved[p0:p1], rows, gravity[i], who)
+            made.append(step.with_motions(self.motion[m0:m1]) if m1 > m0 else step)
+            p0, k0, m0 = p1, k1, m1
         return made
 
 
@@ -88,12 +94,12 @@ def _column(table: Array, name: str) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogSteps(Sequence[Step]):
-    """Steps start … stop-1 of three tables, made on request, as are slices.
+    """Steps start … stop-1 of four tables, made on request, as are slices.
 
     Parameters
     ----------
-    step, pose, contact
-        Tables of STEP, POSE, CONTACT; they may grow beyond ``stop``.
+    step, pose, contact, motion
+        Tables of STEP, POSE, CONTACT, MOTION; they may grow beyond ``stop``.
     known
         More than the largest index of a body in the tables.
     """
@@ -101,6 +107,7 @@ class LogSteps(Sequence[Step]):
     step: Table
     pose: Table
     contact: Table
+    motion: Table
     start: int
     stop: int
     known: int
@@ -125,9 +132,7 @@ class LogSteps(Sequence[Step]):
             if stride != 1:
                 return tuple(self[i] for i in range(start, stop, stride))
             first = self.start + start
-            return LogSteps(
-                self.step, self.pose, self.contact, first, max(first, self.start + stop), self.known, [0, ()]
-            )
+            return replace(self, start=first, stop=max(first, self.start + stop), _last=[0, ()])
         number = range(len(self))[index] + self.start
         first, steps = self._last
         if not first <= number < first + len(steps):
@@ -148,22 +153,27 @@ class LogSteps(Sequence[Step]):
 
     def _blocks(self, first: int, stop: int) -> Iterator[StepBlock]:
         while first < stop:
-            p0, k0 = self._before(first)
+            before = self._before(first)
             step = self.step[first : min(first + BLOCK_STEPS, stop)].copy()
-            step["pose_end"] -= p0
-            step["contact_end"] -= k0
-            full = np.searchsorted(np.maximum(step["pose_end"], step["contact_end"]), BLOCK_ROWS, side="right")
-            step = step[: max(1, int(full))]
-            p1, k1 = p0 + int(step["pose_end"][-1]), k0 + int(step["contact_end"][-1])
-            yield StepBlock(step, self.pose[p0:p1], self.contact[k0:k1])
+            for kind, rows in zip(KINDS, before, strict=True):
+                step[f"{kind}_end"] -= rows
+            most = np.max([step[f"{kind}_end"] for kind in KINDS], axis=0)
+            step = step[: max(1, int(np.searchsorted(most, BLOCK_ROWS, side="right")))]
+            yield StepBlock(
+                step,
+                *(
+                    getattr(self, kind)[rows : rows + int(step[f"{kind}_end"][-1])]
+                    for kind, rows in zip(KINDS, before, strict=True)
+                ),
+            )
             first += len(step)
 
-    def _before(self, number: int) -> tuple[int, int]:
-        """Count the poses and contacts before a step."""
+    def _before(self, number: int) -> tuple[int, ...]:
+        """Count the rows of each of `KINDS` before a step."""
         if number == 0:
-            return 0, 0
+            return (0,) * len(KINDS)
         (row,) = self.step[number - 1 : number]
-        return int(row["pose_end"]), int(row["contact_end"])
+        return tuple(int(row[f"{kind}_end"]) for kind in KINDS)
 
     def lengths_s(self) -> Array:
         """Return the length (n,) of each step."""
@@ -179,15 +189,14 @@ class LogSteps(Sequence[Step]):
         return LogSteps.of, (tuple(self),)  # by value: another process has neither the spool nor the file
 
     @property
-    def rows_before(self) -> tuple[int, int]:
-        """Number of poses and contacts in the tables before the first step."""
+    def rows_before(self) -> tuple[int, ...]:
+        """Number of rows of each of `KINDS` in the tables before the first step."""
         return self._before(self.start)
 
     @property
-    def row_counts(self) -> tuple[int, int]:
-        """Number of poses and contacts of the steps."""
-        (p0, k0), (p1, k1) = self.rows_before, self._before(self.stop)
-        return p1 - p0, k1 - k0
+    def row_counts(self) -> tuple[int, ...]:
+        """Number of rows of each of `KINDS` of the steps."""
+        return tuple(np.subtract(self._before(self.stop), self.rows_before).tolist())
 
     def bodies(self) -> int:
         """Return one more than the largest index of a body that has a pose."""
@@ -198,7 +207,9 @@ class StepLog:
     """Packs steps into tables as they arrive."""
 
     def __init__(self, instead: str = "") -> None:
-        self._tables = tuple(Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT))
+        self._tables = tuple(
+            Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT, MOTION)
+        )
         self._fresh: list[Step] = []
         self._known = 0
         self._lock = threading.Lock()
@@ -217,26 +228,26 @@ class StepLog:
         """Return the steps so far, without later ones."""
         with self._lock:
             self._pack()
-        step, pose, contact = self._tables
-        return LogSteps(step, pose, contact, 0, len(step), self._known, [0, ()])
+        step, pose, contact, motion = self._tables
+        return LogSteps(step, pose, contact, motion, 0, len(step), self._known, [0, ()])
 
     def _pack(self) -> None:
         fresh = self._fresh
         if not fresh:
             return
-        steps, poses, contacts = self._tables
-        poses_before, contacts_before = len(poses), len(contacts)
-        bodies, rows = np.array([(len(one.body), len(one.contacts.row)) for one in fresh], np.int64).T
-        step, pose = np.zeros(len(fresh), STEP), np.zeros(int(bodies.sum()), POSE)
+        steps, *tables = self._tables
+        counts = np.array([(len(one.body), len(one.contacts.row), len(one.motions)) for one in fresh], np.int64).T
+        step, pose = np.zeros(len(fresh), STEP), np.zeros(int(counts[0].sum()), POSE)
         step["dt_s"] = [one.dt_s for one in fresh]
         step["gravity_m_s2"] = joined([one.gravity_m_s2 for one in fresh], float, (3,))
-        step["pose_end"] = poses_before + np.cumsum(bodies)
-        step["contact_end"] = contacts_before + np.cumsum(rows)
+        for kind, table, count in zip(KINDS, tables, counts, strict=True):
+            step[f"{kind}_end"] = len(table) + np.cumsum(count)
         for name in ("body", "teleported", "position_m", "quaternion_xyzw"):
-            kind, tail = POSE[name].base, POSE[name].shape
-            pose[name] = joined([getattr(one, name) for one in fresh], np.int64 if name == "body" else kind, tail)
+            dtype, tail = POSE[name].base, POSE[name].shape
+            pose[name] = joined([getattr(one, name) for one in fresh], np.int64 if name == "body" else dtype, tail)
         self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
         steps.append(step)
-        poses.append(pose)
-        contacts.append(joined([one.contacts.row for one in fresh], CONTACT))
+        contacts, motions = joined([one.contacts.row for one in fresh], CONTACT), [one.motions for one in fresh]
+        for table, rows in zip(tables, (pose, contacts, joined(motions, MOTION)), strict=True):
+            table.append(rows)
         self._fresh = []  # last: an interrupt loses nothing

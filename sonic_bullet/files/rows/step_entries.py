@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.container import REMEDY, Column, RowsOfEntry, take
-from sonic_bullet.files.rows.log_steps import BLOCK_ROWS, POSE, STEP, LogSteps, StepBlock, Table
+from sonic_bullet.files.rows.log_steps import BLOCK_ROWS, KINDS, POSE, STEP, LogSteps, StepBlock, Table
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS
 from sonic_bullet.records.errors import LogError
+from sonic_bullet.records.touching.link_motions import MOTION, MOTION_FIELDS, check_motions
 
 POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "position_m": (float, (3,)),
@@ -55,7 +56,7 @@ class Fields:
 
 def step_entries(steps: LogSteps) -> dict[str, Column]:
     """Return the columns that `write_container` writes of the steps, each read when it is written."""
-    (p0, k0), (p, k), s = steps.rows_before, steps.row_counts, len(steps)
+    (p0, k0, m0), (p, k, m), s = steps.rows_before, steps.row_counts, len(steps)
 
     def of_steps(name: str) -> Iterator[Array]:
         return (rows[name] for rows in steps.step_rows())
@@ -74,6 +75,10 @@ def step_entries(steps: LogSteps) -> dict[str, Column]:
             for name, (dtype, tail) in of.items()
         }
 
+    motions = {
+        "step_motion_count": Column(np.int64, (s,), partial(counts, "motion_end", m0)),
+        **fields("motion", steps.motion, m0, m, MOTION_FIELDS),
+    }
     return {
         "step_dt_s": Column(float, (s,), partial(of_steps, "dt_s")),
         "step_gravity_m_s2": Column(float, (s, 3), partial(of_steps, "gravity_m_s2")),
@@ -81,6 +86,7 @@ def step_entries(steps: LogSteps) -> dict[str, Column]:
         "step_contact_count": Column(np.int64, (s,), partial(counts, "contact_end", k0)),
         **fields("pose", steps.pose, p0, p, POSE_FIELDS),
         **fields("contact", steps.contact, k0, k, ROW_FIELDS),
+        **(motions if m else {}),
     }
 
 
@@ -96,24 +102,30 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
     """
     dt = take(arrays, "step_dt_s", float, (None,), path)
     step = np.zeros(len(dt), STEP)
-    for name, field in (("step_body_count", "pose_end"), ("step_contact_count", "contact_end")):
+    for kind, what in zip(KINDS, ("body", "contact", "motion"), strict=True):
+        name, field = f"step_{what}_count", f"{kind}_end"
+        if kind == "motion" and name not in arrays:  # nothing jointed is listened to
+            continue
         count = take(arrays, name, np.int64, (len(dt),), path)
         if (count < 0).any() or (count > ROWS_MOST).any() or count.sum(dtype=float) > 2**62:
             raise LogError(f"{path}: {name} is negative or absurd", REMEDY)
         step[field] = np.cumsum(count)
-    p, k = (int(step[name][-1]) if len(dt) else 0 for name in ("pose_end", "contact_end"))
+    p, k, m = (int(step[f"{kind}_end"][-1]) if len(dt) else 0 for kind in KINDS)
     gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
     step["gravity_m_s2"] = frozen_array(gravity, float, (len(dt), 3), "step: gravity_m_s2")
     remedy = "set a time step between 0 and 1 s with setTimeStep"
     for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
         as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
     step["dt_s"] = dt
-    poses, contacts = (
+    poses, contacts, motions = (
         {name: take(arrays, f"{kind}_{name}", dtype, (rows, *tail), path) for name, (dtype, tail) in fields.items()}
-        for kind, rows, fields in (("pose", p, POSE_FIELDS), ("contact", k, ROW_FIELDS))
-    )
+        for kind, rows, fields in (
+            ("pose", p, POSE_FIELDS), ("contact", k, ROW_FIELDS), ("motion", m, MOTION_FIELDS if m else {})
+        )
+    )  # fmt: skip
     step.flags.writeable = False
-    steps = LogSteps(step, Fields(POSE, p, poses), Fields(CONTACT, k, contacts), 0, len(dt), bodies, [0, ()])
+    tables = Fields(POSE, p, poses), Fields(CONTACT, k, contacts), Fields(MOTION, m, motions)
+    steps = LogSteps(step, *tables, 0, len(dt), bodies, [0, ()])
     for block in steps.blocks():
         _check(block, bodies, path)
     return steps
@@ -125,6 +137,7 @@ def _check(block: StepBlock, bodies: int, path: object) -> None:
         for name, (dtype, tail) in fields.items():
             if dtype is float:
                 frozen_array(table[name], float, (len(table), *tail), what + name)
+    check_motions(block.motion, path)
     number = np.arange(len(block.step))
     # one number for each body of each step, ascending throughout where each step's bodies do
     body = block.pose["body"].astype(np.int64)
@@ -133,10 +146,10 @@ def _check(block: StepBlock, bodies: int, path: object) -> None:
     known = np.repeat(number, block.counts("pose")) * bodies + body
     if (np.diff(known) <= 0).any():
         raise LogError(f"{path}: a step's bodies do not ascend", REMEDY)
-    step = np.repeat(number, block.counts("contact"))
-    for side in ("a", "b"):
-        touching = block.contact[side]
-        if touching.min(initial=0) < 0:
-            raise LogError(f"{path}: a contact names a body below zero", REMEDY)
-        if touching.max(initial=-1) >= bodies or not np.isin(step * bodies + touching, known).all():
-            raise LogError(f"{path}: a contact names a body that the step does not know", REMEDY)
+    touched = [("contact", block.contact[side]) for side in ("a", "b")]
+    for kind, body in (*touched, ("motion", block.motion["body"])):
+        if body.min(initial=0) < 0:
+            raise LogError(f"{path}: a {kind} names a body below zero", REMEDY)
+        step = np.repeat(number, block.counts(kind))
+        if body.max(initial=-1) >= bodies or not np.isin(step * bodies + body, known).all():
+            raise LogError(f"{path}: a {kind} names a body that the step does not know", REMEDY)

@@ -22,6 +22,7 @@ from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import LISTED, shown
+from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, usual_mounting
@@ -314,6 +315,17 @@ class AskedLinks(World):
         if described_pieces(self.client_id, body, link)[1]:
             self.left_out.meet_drawn(body, link_name(self.client_id, body, link))
         return shapes
+
+    def with_motions(self, step: Step) -> Step:
+        """Return the step with the motions of touched links of bodies that sensors are on."""
+        if not self.felt or not len(step.contacts):
+            return step
+        from sonic_bullet.listener.pybullet.jointed.joint_motions import touched_motions
+
+        known = {i: self.records[i] for i in step.body.tolist()}
+        touched = np.concatenate([step.contacts.a, step.contacts.b])
+        motions = touched_motions(self.client_id, self.felt, known, touched)
+        return step if motions is None else step.with_motions(motions)
 
     def make_ready(self) -> None:
         """Compile, or load, the machine code for which the first step would else wait."""

@@ -260,7 +260,7 @@ class PyBulletWorld(facts.AskedLinks):
             self._past = now
             self._moved.clear()
             self.step_count += 1
-        return step
+        return self.with_motions(step)
 
     def _poll(self, hooked: bool) -> Touches | None:
         """Poll this step's contacts, once: store them in the memory, or return those of sub-steps."""

@@ -87,7 +87,8 @@ def _stand(state: State, b: int, quaternion: Array) -> None:
     new = _audible((-placed.decay_per_s + 1j * placed.omega_rad_s) / state.bank.sr, free[:m])
     voice = state.voices[b]
     if voice is not None:
-        new = np.concatenate([new, free[m:] + (new - free[:m])[voice.follows]])
+        new = np.concatenate([new, free[m : m + len(voice.follows)] + (new - free[:m])[voice.follows]])
+    new = np.concatenate([new, free[len(new) :]])  # rigid motions
     lift = np.zeros(len(free))
     lift[:m] = np.nan_to_num(np.abs(placed.force_n_s) / load_n[:, None]).max(axis=0)
     bank.set_poles(state.bank, state.ringing, b, new, lift)

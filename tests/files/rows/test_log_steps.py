@@ -78,7 +78,7 @@ def test_a_snapshot_reads_no_row_of_the_steps_before_it() -> None:
         def __getitem__(self, rows: slice) -> np.ndarray:
             raise AssertionError("a row was read")
 
-    steps = LogSteps(*[Unreadable()] * 3, 0, 10**9, 2, [0, ()])
+    steps = LogSteps(*[Unreadable()] * 4, 0, 10**9, 2, [0, ()])
     assert len(ContactLog(log().bodies, steps, (), 48_000, 0).steps) == 10**9
 
 

@@ -1,0 +1,1 @@
+"""Responses of instruments, from tables and filters."""

@@ -1,0 +1,1 @@
+"""Jointed bodies: how their links move together."""

@@ -1,0 +1,1 @@
+"""What touches a surface, and how it moves: responses of sensors, motions of links."""

@@ -1,0 +1,1 @@
+"""What sensors on a surface read: its rigid motion beside its modes, and their own chain."""
