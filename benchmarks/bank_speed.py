@@ -20,8 +20,7 @@ from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer, b
 from benchmarks.peers.tools import SR
 from sonic_bullet.records import Array
 from sonic_bullet.synth.bank import FLOOR, ModeSet, append, bank_kernel, empty_bank
-from sonic_bullet.synth.pulse import pulse_table
-from tests.made.banks import Force, Strike, advance, passed, room
+from tests.made.banks import Force, Strike, advance, room, step_scratch, tables
 
 FRAMES = 32  # 6400 samples: 25 of the bank's blocks
 PULSE_S = 1e-4
@@ -71,18 +70,14 @@ def ringing(sizes: list[int], repeats: int = 5) -> float:
     bank, state = empty_bank(SR)
     bank, state = append(bank, state, [modes_of(rng, size) for size in sizes])
     advance(bank, state, 512, [Strike(b, 1.3, PULSE_S, rng.normal(size=size)) for b, size in enumerate(sizes)])
-    count, none = bank.body_count, np.zeros((0, 2, bank.columns))
-    source, pushed, sounds = np.zeros((1, count, FRAME)), np.zeros((count, 3, FRAME)), np.ones((count, 2), np.int64)
-    nobody = 0, np.zeros((0, 2), np.int64), np.zeros((0, FRAME)), none, none, np.zeros((0, 3)), np.zeros((0, 3))
-    along, scratch = np.zeros(FRAME), room(count, 0, FRAME)
+    count = bank.body_count
+    scratch, work, group = step_scratch(bank, FRAME), room(count, 0, FRAME), tables(bank, state)
+    scratch.sounds[:] = 1
+    along = np.zeros(FRAME)
 
     def run() -> None:
         for _ in range(FRAMES):
-            bank_kernel.advance(
-                state.at, FRAME, float(SR), bank.body, bank.law, bank.weight, bank.observed, state.ringing, state.z,
-                state.driven, state.sound, state.pole, state.block, *passed(bank, state, FRAME), state.strikes,
-                state.rows, state.free, pulse_table(), *nobody, along, *scratch, source, pushed, sounds,
-            )  # fmt: skip
+            bank_kernel.advance(state.at, FRAME, float(SR), along, group, scratch, work)
             state.at += FRAME
 
     return best_s(run, repeats)

@@ -9,18 +9,33 @@ from __future__ import annotations
 
 from typing import Any
 
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 
 @intrinsic
-def borrowed(typingctx, array):
-    """Return the array without its count. Only for an argument of the kernel: its caller keeps the memory."""
+def borrowed(typingctx, value):
+    """Return an array, or a tuple of arrays and others, without its count.
+
+    Only for an argument of the kernel: its caller keeps the memory.
+    """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        view = cgutils.create_struct_proxy(signature.return_type)(context, builder, value=args[0])
+        return without_count(context, builder, signature.return_type, args[0])
+
+    return value(value), codegen
+
+
+def without_count(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """Write the code of `borrowed` for a value of a type."""
+    if isinstance(kind, types.Array):
+        view = cgutils.create_struct_proxy(kind)(context, builder, value=value)
         for owner in ("meminfo", "parent"):
             setattr(view, owner, cgutils.get_null_value(getattr(view, owner).type))
         return view._getvalue()
-
-    return array(array), codegen
+    if isinstance(kind, types.BaseTuple):
+        parts = cgutils.unpack_tuple(builder, value, len(kind))
+        bare = [without_count(context, builder, one, part) for one, part in zip(kind.types, parts, strict=True)]
+        return context.make_tuple(builder, kind, bare)
+    return value

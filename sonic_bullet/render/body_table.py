@@ -17,6 +17,7 @@ from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.surface.rigid_motion import rigid_shape
 from sonic_bullet.render.tables import BODY, FACE, NODE
 from sonic_bullet.support import ContactSide
+from sonic_bullet.synth.pulse import spectrum_table
 from sonic_bullet.synth.strikes import SPAN
 
 EDGE_RADIUS_SHARE = 0.005
@@ -114,6 +115,11 @@ class BodyTable:
     def frequency_hz(self) -> Array:
         """Frequencies of the modes, flat."""
         return self._frequencies.filled
+
+    @property
+    def spectrum(self) -> Array:
+        """Spectra of both pulses."""
+        return spectrum_table()
 
     @property
     def columns(self) -> int:

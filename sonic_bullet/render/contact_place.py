@@ -24,7 +24,7 @@ SIZELESS_M = 0.1
 
 
 @njit(nogil=True, error_model="numpy")
-def touch(rows, r, bodies, faces, nodes):
+def touch(rows, r, table):
     """Find face, weights and curvature of row r on either body: its fields face, barycentric, curvature_per_m.
 
     Nothing is done where they are known already. Where the contact's normal leans more than 20° from the face's, an
@@ -35,15 +35,15 @@ def touch(rows, r, bodies, faces, nodes):
         return
     row.touched = 1
     for side in range(2):
-        body = bodies[row.body[side]]
+        body = table.bodies[row.body[side]]
         bent = body.curvature_per_m
         face, u, v, w = -1, 0.0, 0.0, 0.0
         if body.faces > 0:
             p, n = row.point_m[side], row.outward[side]
             face, u, v, w, _ = nearest_face(
-                faces,
+                table.faces,
                 body.face_at,
-                nodes,
+                table.nodes,
                 body.node_at,
                 body.wall_m,
                 body.tie_m,
@@ -51,7 +51,7 @@ def touch(rows, r, bodies, faces, nodes):
                 (n[0], n[1], n[2]),
             )
             if not np.isfinite(bent):
-                here = faces[body.face_at + face]
+                here = table.faces[body.face_at + face]
                 normal = here.normal
                 leans = normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2] < CREASE_COS
                 bent = body.edge_per_m if leans else here.curvature_per_m
@@ -62,17 +62,17 @@ def touch(rows, r, bodies, faces, nodes):
 
 
 @njit(nogil=True, error_model="numpy")
-def add_push(rows, r, side, factor, bodies, faces, shapes, out):
+def add_push(rows, r, side, factor, table, out):
     """Add factor·Uᵀj of row r on the body of a side to out (columns,).
 
     Uᵀj: the shapes, linear in the triangle, times the row's impulse in N·s (with factor 1: N·s/√kg). `touch` the row
-    first. shapes: flat float32, see BODY.shape_at. out may be longer than the body's columns.
+    first. The shapes are flat float32, see BODY.shape_at. out may be longer than the body's columns.
     """
-    row = rows[r]
-    body = bodies[row.body[side]]
+    row, shapes = rows[r], table.shapes
+    body = table.bodies[row.body[side]]
     if row.face[side] < 0:
         return
-    push, weight, vertex = row.push_n_s[side], row.barycentric[side], faces[body.face_at + row.face[side]].vertex
+    push, weight, vertex = row.push_n_s[side], row.barycentric[side], table.faces[body.face_at + row.face[side]].vertex
     x, y, z = factor * push[0], factor * push[1], factor * push[2]
     columns = body.columns
     for corner in range(3):

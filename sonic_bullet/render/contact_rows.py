@@ -5,7 +5,7 @@
         -> support N at both ends of the step being rendered: the opening of the load   [synth.strikes]
 
 A pair keeps its place in the PAIR table as long as it touches: `active` (places) lists those in use, sorted by key, and
-`free` the others, the next one to be taken last; counts (2,): how many of both. Python makes room before it calls: for
+`free` the others, the next one to be taken last; count (2,): how many of both. Python makes room before it calls: for
 the active pairs and all that the steps at hand name. No result depends on which place a pair has.
 """
 # mypy: disable-error-code="no-untyped-def"
@@ -84,23 +84,24 @@ def _turn(contact, quaternion, turn, row):
 
 
 @njit(nogil=True, error_model="numpy")
-def enter_loads(rows, start, stop, dt_s, pairs, active, counts, free):
+def enter_loads(rows, start, stop, dt_s, pairs):
     """Enter the loads of rows start … stop - 1, one step's, into the histories, which are shifted by a step.
 
     Pairs without load in all of their history and without friction (rubs) leave.
     """
+    active, counts, free = pairs.active, pairs.count, pairs.free
     merged = np.empty(counts[0] + stop - start, np.int64)
     i, r, kept = 0, start, 0
     while i < counts[0] or r < stop:  # pairs of both lists, by key
-        fresh = r < stop and (i == counts[0] or rows[r].key < pairs[active[i]].key)
+        fresh = r < stop and (i == counts[0] or rows[r].key < pairs.pair[active[i]].key)
         if fresh:
             counts[1] -= 1
             place = free[counts[1]]
-            _begin(pairs[place], rows[r])
+            _begin(pairs.pair[place], rows[r])
         else:
             place = active[i]
             i += 1
-        pair = pairs[place]
+        pair = pairs.pair[place]
         force, struck = pair.force_n, pair.struck_n
         stays = pair.rubs != 0
         for column in range(1, HISTORY):

@@ -19,16 +19,18 @@ from struct import Struct
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.machine.groups import grouping
 from sonic_bullet.render.contact_rows import enter_loads, orient
 from sonic_bullet.render.friction import advance_friction
+from sonic_bullet.render.groups import Groups
 from sonic_bullet.render.standing.held_contacts import choose_bodies, count_lifted, hold_contacts
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
 from sonic_bullet.synth.bank import bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
-from sonic_bullet.synth.bank.layout import DRIVEN
+from sonic_bullet.synth.bank.layout import DRIVEN, BankWork
 from sonic_bullet.synth.bank.strike_pool import enter_pulses
 from sonic_bullet.synth.path_kernel import WORK, hear
-from sonic_bullet.synth.path_places import DONE
+from sonic_bullet.synth.path_places import DONE, Arrivals, Course, Emission
 from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 from sonic_bullet.synth.vector import LANES
@@ -58,6 +60,9 @@ STEP_LAYOUT = Struct("4d4q3dq")
 assert STEP_LAYOUT.size == STEP.itemsize
 
 
+grouped = grouping(Groups)
+
+
 @njit(nogil=True, error_model="numpy")
 def aligned(size):  # pragma: no cover - compiled
     """Allocate (size,) numbers that begin where a vector register does."""
@@ -67,107 +72,69 @@ def aligned(size):  # pragma: no cover - compiled
 
 
 @njit(nogil=True, error_model="numpy")
-def take(
-    slot, step, contacts, position, quaternion, teleported, window, window_position, window_quaternion,
-    window_teleported, rows, pairs, active, counts, free,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Take a step into a slot of the window: its poses (b, ·), its rows, the pairs' loads."""
-    for b in range(len(position)):
+def take(i, number, given, window, pairs):  # pragma: no cover - compiled
+    """Take step i of those given into the window as step ``number``: its poses, its rows, the pairs' loads."""
+    slot, step, rows = number % SPAN, given.steps[i], window.row
+    for b in range(given.position.shape[1]):
         for axis in range(3):
-            window_position[slot, b, axis] = position[b, axis]
+            window.position_m[slot, b, axis] = given.position[i, b, axis]
         for axis in range(4):
-            window_quaternion[slot, b, axis] = quaternion[b, axis]
-        window_teleported[slot, b] = teleported[b]
+            window.quaternion_xyzw[slot, b, axis] = given.quaternion[i, b, axis]
+        window.teleported[slot, b] = given.teleported[i, b]
     first = slot * (len(rows) // SPAN)
     count = step.row[1] - step.row[0]
-    orient(contacts[step.row[0] : step.row[1]], window_quaternion[slot], rows[first : first + count])
-    here = window[slot]
+    orient(given.contacts[step.row[0] : step.row[1]], window.quaternion_xyzw[slot], rows[first : first + count])
+    here = window.step[slot]
     here.dt_s, here.row[0], here.row[1] = step.dt_s, first, first + count
     for axis in range(3):
         here.gravity_m_s2[axis] = step.gravity_m_s2[axis]
-    enter_loads(rows, first, first + count, step.dt_s, pairs, active, counts, free)
+    enter_loads(rows, first, first + count, step.dt_s, pairs)
 
 
 @njit(nogil=True, error_model="numpy")
-def excite(
-    number, quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces, nodes, shapes,
-    frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, force, gain0, gain1, direction0, direction1,
-    drive_body, drive_slot,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Find strikes and friction of step ``number``; return the numbers of its pulses and drives."""
-    here, there = window[number % SPAN], window[(number + 1) % SPAN]
-    known = np.empty((SPAN, 2), np.int64)
-    for j in range(SPAN):
-        known[j, 0], known[j, 1] = window[(number + j) % SPAN].row[0], window[(number + j) % SPAN].row[1]
-    for b in range(len(bodies)):
-        if window_teleported[(number + 1) % SPAN, b]:
-            bodies[b].placed = number + 1
-    strikes, voices = np.empty(counts[0], STRIKE), np.empty(counts[0], VOICE)
-    found = find_pulses(
-        np.int64(0), number, 0.0, here.dt_s, here.gravity_m_s2, window_quaternion[number % SPAN], rows, known, pairs,
-        active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses, push, np.int64(0),
-    )  # fmt: skip
+def excite(number, quench, x, sr, window, table, pairs, scratch):  # pragma: no cover - compiled
+    """Find strikes and friction of step ``number``: its pulses and drives, as many as scratch.count tells."""
+    for b in range(len(table.bodies)):
+        if window.teleported[(number + 1) % SPAN, b]:
+            table.bodies[b].placed = number + 1
+    strikes, voices = np.empty(pairs.count[0], STRIKE), np.empty(pairs.count[0], VOICE)
+    found = find_pulses(np.int64(0), number, np.int64(0), window, table, pairs, strikes, scratch)
     # else a strike after the quench would be dated back before it and be lost: it waits for its own step
     if not quench:
-        found = find_pulses(
-            np.int64(1), number + 1, -here.dt_s, there.dt_s, there.gravity_m_s2, window_quaternion[(number + 1) % SPAN],
-            rows, known, pairs, active, counts, bodies, faces, nodes, shapes, frequency_hz, spectrum, strikes, pulses,
-            push, found,
-        )  # fmt: skip
-    drives = advance_friction(
-        pairs, active, counts[0], bodies, rows[known[1, 0] : known[1, 1]], known[1, 1] - known[1, 0], faces, nodes,
-        shapes, window_quaternion[(number + 1) % SPAN], here.dt_s, x, sr, gain, voices, force, gain0, gain1, direction0,
-        direction1, drive_body, drive_slot,
-    )  # fmt: skip
-    return found, drives
+        found = find_pulses(np.int64(1), number + 1, found, window, table, pairs, strikes, scratch)
+    scratch.count[0] = found
+    advance_friction(number, x, sr, window, table, pairs, voices, scratch)
 
 
 @njit(nogil=True, error_model="numpy")
-def settle(
-    number, window, rows, pairs, active, counts, held, stand, credit_s, bodies, bank_body, ringing, law, z, driven,
-    pulses, found, drive_body, drives,
-):  # fmt: skip  # pragma: no cover - compiled
+def settle(number, window, table, pairs, supports, bank, scratch):  # pragma: no cover - compiled
     """Update the support state of step ``number``; return how many bodies' poles are to be computed."""
-    here = window[number % SPAN]
-    hold_contacts(pairs, active, counts[0], held, stand, bodies, rows, here.row[0], here.row[1], here.dt_s)
-    count_lifted(stand, bank_body, ringing, law, z, driven)
-    return choose_bodies(
-        pairs, active, counts[0], held, stand, bodies, ringing, pulses, found, drive_body, drives, here.dt_s, credit_s
-    )
+    here = window.step[number % SPAN]
+    hold_contacts(here, window.row, table, pairs, supports.stand)
+    count_lifted(supports.stand, bank)
+    return choose_bodies(here.dt_s, table, pairs, supports, bank, scratch)
 
 
 @njit(nogil=True, error_model="numpy")
-def ring(
-    step, sr, found, pulses, push, drives, drive_body, force, gain0, gain1, direction0, direction1, x, bank_body, law,
-    weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight, pass_sound, passed, strikes,
-    phasors, free_strikes, hertz, source, pushed, sounds,
-):  # fmt: skip  # pragma: no cover - compiled
+def ring(step, x, sr, bank, scratch):  # pragma: no cover - compiled
     """Apply the step's pulses and drives to the bank: source (W, b, n or more) and pushed (b, 3, n or more).
 
     False where a pulse found no place.
     """
-    entered = enter_pulses(
-        pulses, found, push, step.begin_s, step.after_s, step.sample, sr, bank_body, law, ringing, strikes, phasors,
-        free_strikes, hertz,
+    entered = enter_pulses(step.begin_s, step.after_s, step.sample, sr, bank, scratch)
+    n, drives = step.count, scratch.count[1]
+    work = BankWork(
+        np.empty(len(bank.body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
+        np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)),
     )  # fmt: skip
-    n = step.count
-    bank_kernel.advance(
-        step.sample, n, sr, bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
-        pass_weight, pass_sound, passed, strikes, phasors, free_strikes, hertz, drives, drive_body, force, gain0,
-        gain1, direction0, direction1, x,
-        np.empty(len(bank_body) + 1, np.int64), np.empty(2 * drives, np.int64), np.empty((drives, 2, n + LANES)),
-        np.empty((6, n + LANES)), np.empty((DRIVEN, 3), np.int64), aligned(max(DRIVE_SCRATCH, RING_SCRATCH)), source,
-        pushed, sounds,
-    )  # fmt: skip
-    return entered == found
+    bank_kernel.advance(step.sample, n, sr, x, bank, scratch, work)
+    return entered == scratch.count[0]
 
 
 @njit(nogil=True, error_model="numpy")
-def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - compiled
-    """Compute a step's signal at sensors that read modes themselves; False where it is not finite.
-
-    reads (c,): their weight set, 0 for a microphone. apart 1: of each body of it.
-    """
+def sum_at_sensors(source, n, out_at, frames):  # pragma: no cover - compiled
+    """Compute a step's signal at sensors that read modes themselves; False where it is not finite."""
+    reads, out = frames.reads, frames.out
     channels = len(reads)
     for c in range(channels):
         if reads[c] == 0:
@@ -176,9 +143,9 @@ def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - 
             total = 0.0
             for b in range(source.shape[1]):
                 total += source[reads[c], b, k]
-                if apart:
+                if frames.apart:
                     out[b * channels + c, out_at + k] = source[reads[c], b, k]
-            if not apart:
+            if not frames.apart:
                 out[c, out_at + k] = total
             if not abs(total) < np.inf:
                 return False
@@ -186,109 +153,77 @@ def sum_at_sensors(source, n, reads, out, out_at, apart):  # pragma: no cover - 
 
 
 @njit(nogil=True, error_model="numpy")
-def advance_steps(  # noqa: PLR0911 - one return a reason to come back
-    first, taken, start, pause, resume, found, drives, sr, steps, contacts, position, quaternion, teleported, aim_m,
-    window, window_position, window_quaternion, window_teleported, rows,
-    bodies, faces, nodes, shapes, frequency_hz, spectrum, pairs, active, counts, free, gain,
-    held, stand, credit_s, pulses, push, force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
-    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight, pass_sound,
-    passed, strikes, phasors, free_strikes, hertz, source, pushed, sounds, microphone_m, samples_per_m, sources, places,
-    lines, memory, taps, reads, apart, pressure, out,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Render steps ``first`` … of the table into out (channels, samples of all of them).
-
-    Returns how many are done, why it returned, and how many pulses and drives the last one has.
-
-    Parameters
-    ----------
-    taken : number of the first step of the table
-    start : sample of out's first
-    contacts : of all steps
-    position, quaternion, teleported : (k, b, 3), (k, b, 4), (k, b)
-    aim_m : (k + 1, b, c, 3) as `path_kernel.hear` has it, at each step's start and the last one's end; (0, …): at rest
-    pressure : (microphones, as out)
-    pause : return before `hear` of the first step
-    resume : progress of the first step
-    found, drives : its pulses and drives, where it is EXCITED
-    credit_s : (1,), (0,) where nothing supports
-    apart : 1: out is (bodies·channels, …) and pressure (bodies·microphones, …), body by body, nothing summed
-    """
-    done = 0
-    for i in range(first, len(steps)):
-        step, number, far = steps[i], taken + i, resume if i == first else ANEW
-        anew = far == ANEW
-        if anew:
-            new = step.row[1] - step.row[0]
-            bound = counts[0] + new
-            if counts[1] < new or len(rows) // SPAN < new or len(pulses) < 2 * bound or len(drive_slot) < bound:
-                return done, TO_GROW, found, drives
-            if free_strikes[0] < 4 * bound:
-                return done, TO_GROW, found, drives
-            take(
-                number % SPAN, step, contacts, position[i], quaternion[i], teleported[i], window, window_position,
-                window_quaternion, window_teleported, rows, pairs, active, counts, free,
-            )  # fmt: skip
-        number -= LOOKAHEAD
-        if number >= 0:
-            n, dt_s = step.count, window[number % SPAN].dt_s
-            x = np.empty(n)
-            for k in range(n):
-                x[k] = min(max((k + step.offset) / (dt_s * sr), 0.0), 1.0)
-            signal = force[: len(drive_slot) * n].reshape((len(drive_slot), n))
-            if anew:
-                found, drives = excite(
-                    number, step.quench, x, sr, window, window_quaternion, window_teleported, rows, bodies, faces,
-                    nodes, shapes, frequency_hz, spectrum, pairs, active, counts, gain, pulses, push, signal, gain0,
-                    gain1, direction0, direction1, drive_body, drive_slot,
-                )  # fmt: skip
-                if len(credit_s) > 0 and settle(
-                    number, window, rows, pairs, active, counts, held, stand, credit_s, bodies, bank_body, ringing, law,
-                    z, driven, pulses, found, drive_body, drives,
-                ):  # fmt: skip
-                    return done, TO_SETTLE, found, drives
-            if far != RINGS:
-                if not ring(
-                    step, sr, found, pulses, push, drives, drive_body, signal, gain0, gain1, direction0, direction1, x,
-                    bank_body, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
-                    pass_weight, pass_sound, passed, strikes, phasors, free_strikes, hertz, source, pushed, sounds,
-                ):  # fmt: skip
-                    return done, BROKEN, found, drives
-                if pause:
-                    return done, PAUSED, found, drives
-            status = finish(
-                number, step, start, x, window_position, window_teleported, source, pushed, microphone_m,
-                aim_m[i : i + 2] if len(aim_m) > 0 else aim_m, samples_per_m, sources, places, lines, memory, taps,
-                reads, apart, pressure, out,
-            )  # fmt: skip
-            if status != DONE:
-                return done, status, found, drives
-        done += 1
-    return done, DONE, found, drives
+def has_room(new, window, pairs, bank, scratch):  # pragma: no cover - compiled
+    """Test whether the tables have room for a step of so many contacts."""
+    bound = pairs.count[0] + new
+    short = pairs.count[1] < new or len(window.row) // SPAN < new
+    short = short or len(scratch.pulse) < 2 * bound or len(scratch.slot) < bound
+    return not short and bank.free[0] >= 4 * bound
 
 
 @njit(nogil=True, error_model="numpy")
-def finish(
-    number, step, start, x, window_position, window_teleported, source, pushed, microphone_m, aim_m, samples_per_m,
-    sources, places, lines, memory, taps, reads, apart, pressure, out,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Write step ``number``, which rings in source and pushed, into out (channels, …), whose first sample is ``start``.
+def advance_steps(values):  # pragma: no cover - compiled
+    """Render the steps of the table from ``call.first`` on into ``frames.out`` (channels, samples of all of them).
+
+    Returns how many are done, and why it returned. Of the last one, its pulses and drives are in the scratch.
+
+    Parameters
+    ----------
+    values : flat, of all fields of `groups.Groups`
+    """
+    call, given, frames, window, table, pairs, supports, bank, scratch, path = grouped(values)
+    done, sr = 0, call.sr
+    for i in range(call.first, len(given.steps)):
+        step, number, far = given.steps[i], call.taken + i, call.resume if i == call.first else ANEW
+        if far == ANEW:
+            if not has_room(step.row[1] - step.row[0], window, pairs, bank, scratch):
+                return done, TO_GROW
+            take(i, number, given, window, pairs)
+        number -= LOOKAHEAD
+        if number >= 0:
+            n, dt_s = step.count, window.step[number % SPAN].dt_s
+            x = np.empty(n)
+            for k in range(n):
+                x[k] = min(max((k + step.offset) / (dt_s * sr), 0.0), 1.0)
+            if far == ANEW:
+                excite(number, step.quench, x, sr, window, table, pairs, scratch)
+                if len(supports.credit_s) > 0 and settle(number, window, table, pairs, supports, bank, scratch):
+                    return done, TO_SETTLE
+            if far != RINGS:
+                if not ring(step, x, sr, bank, scratch):
+                    return done, BROKEN
+                if call.pause:
+                    return done, PAUSED
+            status = finish(i, number, x, given, frames, window, scratch, path)
+            if status != DONE:
+                return done, status
+        done += 1
+    return done, DONE
+
+
+@njit(nogil=True, error_model="numpy")
+def finish(i, number, x, given, frames, window, scratch, path):  # pragma: no cover - compiled
+    """Write step ``number``, i of those given, which rings in the scratch, into frames.out.
 
     Returns DONE, or what is in the way.
     """
-    here, there, at = number % SPAN, (number + 1) % SPAN, step.sample - start
-    status = hear(
-        step.sample, number, step.count, np.int64(0), source[0], pushed, window_position[here], window_position[there],
-        window_teleported[there], x, microphone_m, aim_m, samples_per_m, sources, places, lines, memory, taps,
-        np.zeros(WORK), pressure, at, apart,
+    step, here, there = given.steps[i], number % SPAN, (number + 1) % SPAN
+    at, aim_m, out, reads = step.sample - frames.start, given.aim_m, frames.out, frames.reads
+    emission = Emission(scratch.source[0], scratch.pushed, np.int64(0))
+    course = Course(
+        window.position_m[here], window.position_m[there], window.teleported[there], x,
+        aim_m[i : i + 2] if len(aim_m) > 0 else aim_m,
     )  # fmt: skip
+    arrivals = Arrivals(frames.pressure, at, frames.apart)
+    status = hear(step.sample, number, step.count, emission, course, path, np.zeros(WORK), arrivals)
     if status != DONE:
         return status
-    if not sum_at_sensors(source, step.count, reads, out, at, apart):
+    if not sum_at_sensors(scratch.source, step.count, at, frames):
         return BROKEN
     m = 0
     for row in range(len(out)):
         if reads[row % len(reads)] == 0:
             for k in range(at, at + step.count):
-                out[row, k] = pressure[m, k]
+                out[row, k] = frames.pressure[m, k]
             m += 1
     return DONE

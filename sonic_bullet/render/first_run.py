@@ -1,6 +1,6 @@
 """Machine code of the run time, made before the first step: where none is cached, by two processes.
 
-arguments of driver.advance_steps -> types of those of its stages -> each stage compiled by one of the two
+values of driver.advance_steps -> types of its groups -> each stage compiled by one of the two
     -> the driver: linked with them, optimised, cached
 """
 
@@ -8,43 +8,41 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
 import numba
 from numba import types
 
+from sonic_bullet.machine.groups import group_types
 from sonic_bullet.machine.progress import show_stage
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.render import driver
+from sonic_bullet.render.groups import Groups
 
 STAGES = (driver.excite, driver.ring, driver.finish, driver.take, driver.settle)
 """Stages, the slowest to compile first. Whatever types they get here, the driver compiles those that it needs."""
-SAMPLES = types.Array(types.float64, 1, "C")
 INNER = {
-    **dict.fromkeys(("slot", "number", "quench", "found", "drives", "start"), types.int64),
-    "x": SAMPLES,
-    "force": SAMPLES.copy(ndim=2),
+    **dict.fromkeys(("i", "number", "quench"), types.int64),
+    "x": types.Array(types.float64, 1, "C"),
+    "sr": types.float64,
 }
-"""Arguments of stages that are not those of the driver with the same name."""
-OF_A_STEP = ("position", "quaternion", "teleported")
-"""Arguments of `take` for one step, of the driver for many."""
+"""Arguments of stages that are not groups."""
 
 
-def make_driver(arguments: Sequence[Any]) -> None:
-    """Load or compile the driver's machine code for such arguments."""
-    kinds = tuple(numba.typeof(one) for one in arguments)
+def make_driver(values: tuple[Any, ...]) -> None:
+    """Load or compile the driver's machine code for such values."""
+    kinds = numba.typeof(values)
     with show_stage("machine code of the run time"):
         with suppress(Exception):  # numba's inner parts have changed: one process compiles
             _make_stages(kinds)
-        driver.advance_steps.compile(kinds)
+        driver.advance_steps.compile((kinds,))
 
 
-def _make_stages(kinds: tuple[Any, ...]) -> None:
+def _make_stages(kinds: Any) -> None:
     from sonic_bullet.machine.linked_once import is_kept, name_apart, take_in, write, written
 
-    if is_kept(driver.advance_steps, kinds):
+    if is_kept(driver.advance_steps, (kinds,)):
         return
     process = os.getpid()
 
@@ -61,14 +59,8 @@ def _make_stages(kinds: tuple[Any, ...]) -> None:
             take_in(stage, content)
 
 
-def stage_types(stage: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return the types of a stage's arguments where the driver's have the types ``kinds``."""
-    known = dict(zip(_names(driver.advance_steps.py_func), kinds, strict=True))
-    known |= INNER | {"step": known["steps"].dtype}
-    if stage is driver.take:
-        known |= {name: known[name].copy(ndim=known[name].ndim - 1) for name in OF_A_STEP}
-    return tuple(known[name] for name in _names(stage.py_func))
-
-
-def _names(function: Callable[..., Any]) -> list[str]:
-    return list(inspect.signature(function).parameters)
+def stage_types(stage: Any, kinds: Any) -> tuple[Any, ...]:
+    """Return the types of a stage's arguments where the driver's values have the types ``kinds``."""
+    known = INNER | dict(zip(Groups._fields, group_types(Groups, kinds.types), strict=True))
+    known["step"] = known["given"].types[0].dtype
+    return tuple(known[name] for name in inspect.signature(stage.py_func).parameters)

@@ -20,6 +20,7 @@ from sonic_bullet.records import Body
 from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
 from sonic_bullet.render.strike_pulses import STEEPEST
 from sonic_bullet.synth.profile import given_octaves, height_octaves
+from sonic_bullet.synth.strikes import SPAN
 from sonic_bullet.synth.surface_kernel import FASTEST_M_S, contact_radius_m, damping_ratio, sound_voices
 
 FOLLOW_S = 0.02
@@ -41,81 +42,77 @@ def surface_seed(seed: int, body: Body) -> int:
 
 
 @njit(nogil=True, error_model="numpy")
-def advance_friction(
-    pairs, active, count, bodies, rows, row_count, faces, nodes, shapes, quaternion, dt_s, x, sr, gain, voices,
-    force, gain0, gain1, direction0, direction1, drive_body, drive_slot,
-):  # fmt: skip
-    """Compute the force signals of one step, a drive each; return their number d.
+def advance_friction(number, x, sr, window, table, pairs, voices, scratch):
+    """Compute the force signals of step ``number``, a drive each, and write how many into scratch.count[1].
 
     Parameters
     ----------
-    pairs : table of PAIR, support_n of this step filled in
-    active : active[:count] slots in use, by rising key
-    bodies, faces, nodes, shapes : the bodies' tables
-    rows : rows[:row_count] ROW of the step that follows, by key and arrival
-    quaternion : (b, 4) orientations of the step that follows
-    dt_s : of this step
+    window : with the step that follows: its rows by key and arrival, orientations of the bodies
+    table, pairs : support_n of this step filled in; gain (slots, 2, columns): Uᵀ per newton of either side, carried,
+        known where PAIR.gains says so
     x : (n,) position of each sample in the step, 0 … 1
     sr : float, in Hz
-    gain : (slots, 2, columns) Uᵀ per newton of either side, carried, known where PAIR.gains says so
     voices : scratch of VOICE, and room for as many drives as pairs are active
-    force : (d, n) in newton, on the lower body along the direction, its negative on the higher
-    gain0, gain1 : (d, 2, columns) Uᵀ on both bodies' columns a newton at the step's ends, linear between
-    direction0, direction1 : (d, 3) on the lower body, world, at the step's ends
-    drive_body, drive_slot : (d, 2), (d,)
+    scratch : force (d·n,) in newton, on the lower body along the direction, its negative on the higher; gain0, gain1
+        (d, 2, columns): Uᵀ on both bodies' columns a newton at the step's ends, linear between; direction0, direction1
+        (d, 3): on the lower body, world, at the step's ends; body, slot (d, 2), (d,)
     """
+    here, there, quaternion = window.step[number % SPAN], window.step[(number + 1) % SPAN], window.quaternion_xyzw
+    rows, turned, dt_s = window.row[there.row[0] : there.row[1]], quaternion[(number + 1) % SPAN], here.dt_s
+    force = scratch.force[: len(scratch.slot) * len(x)].reshape((len(scratch.slot), len(x)))
     follow = 1.0 - np.exp(-dt_s / FOLLOW_S)
     moving, drives, n = 0, 0, len(x)
-    for v in range(_voices(pairs, active, count, bodies, rows, row_count, follow, voices)):
+    for v in range(_voices(pairs, table.bodies, rows, follow, voices)):
         voice = voices[v]
         if voice.fresh:
-            _begin(pairs[voice.slot], bodies, rows, voice.begin, voice.end, faces, nodes, quaternion)
+            _begin(pairs.pair[voice.slot], table, rows, voice.begin, voice.end, turned)
         if voice.moves:
             voices[moving] = voice
             moving += 1
-    sound_voices(pairs, voices, moving, x, sr, force)
+    sound_voices(pairs.pair, voices, moving, x, sr, force)
     for v in range(moving):
         voice = voices[v]
         slot, begin, end = voice.slot, voice.begin, voice.end
-        pair = pairs[slot]
+        pair = pairs.pair[slot]
         if end == begin and not pair.gains:
             continue
         for r in range(begin, end):
-            touch(rows, r, bodies, faces, nodes)
+            touch(rows, r, table)
         for side in range(2):
-            start, aim, kept = gain0[drives, side], gain1[drives, side], gain[slot, side]
-            columns = bodies[pair.body[side]].columns
+            start, aim, kept = scratch.gain0[drives, side], scratch.gain1[drives, side], pairs.gain[slot, side]
+            columns = table.bodies[pair.body[side]].columns
             for c in range(columns):
                 aim[c] = 0.0
             for r in range(begin, end):
-                add_push(rows, r, side, 1.0 / voice.total_n_s, bodies, faces, shapes, aim)
+                add_push(rows, r, side, 1.0 / voice.total_n_s, table, aim)
             for c in range(columns):
                 start[c] = kept[c] if pair.gains else aim[c]
                 aim[c] = start[c] + follow * (aim[c] - start[c]) if end > begin else start[c]
                 kept[c] = aim[c]
-            drive_body[drives, side] = pair.body[side]
+            scratch.body[drives, side] = pair.body[side]
         pair.gains = 1
         for axis in range(3):
-            direction0[drives, axis], direction1[drives, axis] = voice.direction[0, axis], voice.direction[1, axis]
-        drive_slot[drives] = slot
+            scratch.direction0[drives, axis] = voice.direction[0, axis]
+            scratch.direction1[drives, axis] = voice.direction[1, axis]
+        scratch.slot[drives] = slot
         sounds = False
         for i in range(n):
             force[drives, i] = force[v, i]
             sounds = sounds or force[v, i] != 0.0
         drives += 1 if sounds else 0
-    return drives
+    scratch.count[1] = drives
 
 
 @njit(nogil=True, error_model="numpy")
-def _voices(pairs, active, count, bodies, rows, row_count, follow, voices):
+def _voices(pairs, bodies, rows, follow, voices):
     """Collect the voices that move or begin in this step in ``voices``; return their number.
 
     All pairs advance to the step's end.
     """
-    found, row = 0, 0
-    for i in range(count):
-        slot = active[i]
-        pair, voice = pairs[slot], voices[found]
+    found, row, row_count = 0, 0, len(rows)
+    for i in range(pairs.count[0]):
+        slot = pairs.active[i]
+        pair, voice = pairs.pair[slot], voices[found]
         low, high = bodies[pair.body[0]], bodies[pair.body[1]]
         target, voice.fresh = pair.support_n[1], 0
         if not pair.rubs:
@@ -179,12 +176,12 @@ def _aim(rows, begin, end, voice):
 
 
 @njit(nogil=True, error_model="numpy")
-def _begin(pair, bodies, rows, begin, end, faces, nodes, quaternion):
+def _begin(pair, table, rows, begin, end, quaternion):
     """Set the constants of a voice by the manifold with which it begins: effective mass, curvature, spread.
 
     The curvature is that where the load is highest. Without rows: as two flats of the bodies' size.
     """
-    low, high = pair.body
+    (low, high), bodies = pair.body, table.bodies
     pair.modulus_pa = contact_modulus(bodies[low].modulus_pa, bodies[high].modulus_pa)
     restitution, other = bodies[low].restitution, bodies[high].restitution
     pair.damping_ratio = damping_ratio(restitution if restitution < other else other)
@@ -220,7 +217,7 @@ def _begin(pair, bodies, rows, begin, end, faces, nodes, quaternion):
                 off = rows[r].point_m[0, axis] - point[axis]
                 square += rows[r].load_n_s / total * (off * off)
         pair.mass_kg = effective_mass(bodies, low, high, quaternion, arm_low, arm_high, normal)
-        touch(rows, strongest, bodies, faces, nodes)
+        touch(rows, strongest, table)
         bent = rows[strongest].curvature_per_m
         curvature = bent[0] + bent[1]
     area = flat_area_m2(bodies, low, high, np.sqrt(square), curvature, FRICTION_FLAT)

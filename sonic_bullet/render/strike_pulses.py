@@ -60,86 +60,53 @@ STRIKE = np.dtype(
 
 
 @njit(nogil=True, error_model="numpy")
-def find_pulses(
-    ahead,
-    number,
-    earliest_s,
-    dt_s,
-    gravity_m_s2,
-    quaternion,
-    rows,
-    window,
-    pairs,
-    active,
-    counts,
-    bodies,
-    faces,
-    nodes,
-    shapes,
-    frequency_hz,
-    spectrum,
-    strikes,
-    pulses,
-    push,
-    found,
-):
-    """Find the strikes that begin ``ahead`` steps (0 or 1) after the one being rendered.
+def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
+    """Find the strikes that begin in step ``number``, ``ahead`` steps (0 or 1) after the one being rendered.
 
-    They are written to pulses and push (pulses, 2, columns) from ``found`` on; returns the new number. Loads that they
-    use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving volume) are skipped,
-    and those of which neither moves.
+    They are written to scratch.pulse and push (pulses, 2, columns) from ``found`` on; returns the new number. Loads
+    that they use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving volume)
+    are skipped, and those of which neither moves. A strike is dated back, where the bodies overlap as the step starts,
+    to the start of the step being rendered at most.
 
     Parameters
     ----------
-    number, dt_s, gravity_m_s2, quaternion : of the step in which they begin; (3,), (b, 4)
-    earliest_s : not after 0, how far a strike is dated back at most where the bodies overlap as the step starts
-    window : (4, 2) rows of the step being rendered and of the three after it, first and the one after the last
-    counts, frequency_hz, spectrum : as of enter_loads, BODY.frequency_at, synth.pulse.spectrum_table
+    window : steps from the one being rendered to the third after it
     strikes : scratch of STRIKE, one for each active pair
     """
-    for i in range(counts[0]):
-        pair = pairs[active[i]]
+    bodies, here, turned = table.bodies, window.step[number % SPAN], window.quaternion_xyzw[number % SPAN]
+    dt_s, g = here.dt_s, here.gravity_m_s2
+    earliest_s = -window.step[(number - 1) % SPAN].dt_s if ahead else 0.0
+    for i in range(pairs.count[0]):
+        pair = pairs.pair[pairs.active[i]]
         if pair.force_n[NOW + ahead - 1] > 0:
             for side in range(2):
                 bodies[pair.body[side]].loaded = max(bodies[pair.body[side]].loaded, number - 1)
-    struck = split_loads(ahead, pairs, active, counts[0], rows, window, strikes)
+    struck = split_loads(ahead, number, window, pairs, strikes)
     if struck == 0:
         return found
     held = np.empty(len(bodies))
-    set_unheld_steps(ahead, number, pairs, active, counts[0], bodies, held)
-    g = gravity_m_s2
+    set_unheld_steps(ahead, number, pairs, bodies, held)
     gravity = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * dt_s
     caused = False
     for q in range(struck):
         strike = strikes[q]
-        _gather(strike, rows)
+        _gather(strike, window.row)
         n, low, high = strike.normal, strike.body[0], strike.body[1]
         # a tenth for a solver's remainder, a hundredth in every direction for wedged bodies
         fall = 1.1 * abs(n[0] * g[0] + n[1] * g[1] + n[2] * g[2]) * dt_s + 0.01 * gravity
         speed = max(strike.approach_m_s - max(held[low], held[high]) * fall, 0.0)
         if speed > 0 and not is_recreated(bodies, low, high, strike.approach_m_s, fall, number):
             arm = strike.arm_m
-            strike.budget_n_s = 2.0 * effective_mass(bodies, low, high, quaternion, arm[0], arm[1], n) * speed
+            strike.budget_n_s = 2.0 * effective_mass(bodies, low, high, turned, arm[0], arm[1], n) * speed
             caused = True
     if caused:
         accept(strikes, struck, bodies, held)
         for q in range(struck):
-            if strikes[q].accepted_n_s > 0 and _make(
-                strikes[q],
-                quaternion,
-                rows,
-                bodies,
-                faces,
-                nodes,
-                shapes,
-                frequency_hz,
-                spectrum,
-                pulses[found],
-                push[found],
-            ):
-                pulses[found].start_s = min(max(strikes[q].meets_s, earliest_s), dt_s)
-                pulses[found].ahead = ahead
-                found += 1
+            if strikes[q].accepted_n_s > 0:
+                pulse = scratch.pulse[found]
+                if _make(strikes[q], turned, window.row, table, pulse, scratch.push[found]):
+                    pulse.start_s, pulse.ahead = min(max(strikes[q].meets_s, earliest_s), dt_s), ahead
+                    found += 1
     return found
 
 
@@ -178,15 +145,15 @@ def is_recreated(bodies, low, high, approach_m_s, fall_m_s, number):
 
 
 @njit(nogil=True, error_model="numpy")
-def split_loads(ahead, pairs, active, count, rows, window, strikes):
-    """Find the strikes in the loads ``ahead`` steps after the one being rendered, and mark them as used.
+def split_loads(ahead, number, window, pairs, strikes):
+    """Find the strikes in the loads of step ``number``, ``ahead`` after the one being rendered; mark them as used.
 
     Returns the number of strikes; their bodies, fractions and rows are set. An opening that the future could still
     lower is taken as high as it may be, so that support is never struck; a later call gives a strike what it lacked.
     """
-    found = 0
-    for i in range(count):
-        pair, column = pairs[active[i]], NOW + ahead
+    found, rows = 0, window.row
+    for i in range(pairs.count[0]):
+        pair, column = pairs.pair[pairs.active[i]], NOW + ahead
         force = pair.force_n
         if not force[column] > force[column - 1]:
             continue
@@ -200,14 +167,15 @@ def split_loads(ahead, pairs, active, count, rows, window, strikes):
                 break
             pair.struck_n[column + j] += excess
             strike.share[j] = excess / load
-            first, stop = window[ahead + j, 0], window[ahead + j, 1]
+            first, last = window.step[(number + j) % SPAN].row
+            stop = last
             while first < stop:  # its first row: they are sorted
                 middle = (first + stop) // 2
                 if rows[middle].key < pair.key:
                     first = middle + 1
                 else:
                     stop = middle
-            while stop < window[ahead + j, 1] and rows[stop].key == pair.key:
+            while stop < last and rows[stop].key == pair.key:
                 stop += 1
             strike.row[j, 0], strike.row[j, 1] = first, stop
         if strike.share[0] > 0:
@@ -217,7 +185,7 @@ def split_loads(ahead, pairs, active, count, rows, window, strikes):
 
 
 @njit(nogil=True, error_model="numpy")
-def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
+def set_unheld_steps(ahead, number, pairs, bodies, held):
     """Set held (b,): steps for which gravity may have moved each mobile body although it rests.
 
     1 where it carried load on any pair within the STEPS before, SPAN where it was just placed: Bullet finds the corners
@@ -225,8 +193,8 @@ def set_unheld_steps(ahead, number, pairs, active, count, bodies, held):
     """
     for i in range(len(bodies)):
         held[i] = 0.0
-    for i in range(count):
-        pair = pairs[active[i]]
+    for i in range(pairs.count[0]):
+        pair = pairs.pair[pairs.active[i]]
         for column in range(NOW + ahead - STEPS, NOW + ahead):
             if pair.force_n[column] > 0:
                 held[pair.body[0]] = held[pair.body[1]] = 1.0
@@ -303,9 +271,9 @@ def accept(strikes, count, bodies, through):
 
 
 @njit(nogil=True, error_model="numpy")
-def _make(strike, quaternion, rows, bodies, faces, nodes, shapes, frequency_hz, spectrum, pulse, push):
+def _make(strike, quaternion, rows, table, pulse, push):
     """Make a strike's pulse, but for its start, and its Uᵀj in push (2, columns); False where it is not audible."""
-    low, high = strike.body[0], strike.body[1]
+    low, high, bodies = strike.body[0], strike.body[1], table.bodies
     j, raw, accepted = strike.impulse_n_s, max(strike.raw_n_s, 1e-300), strike.accepted_n_s
     mass = effective_mass(bodies, low, high, quaternion, strike.arm_m[0], strike.arm_m[1], strike.normal)
     sounds = bodies[low].modes + bodies[low].rigid + bodies[high].modes + bodies[high].rigid > 0
@@ -320,9 +288,9 @@ def _make(strike, quaternion, rows, bodies, faces, nodes, shapes, frequency_hz, 
         share = strike.share[delay]
         if share > 0:
             for r in range(strike.row[delay, 0], strike.row[delay, 1]):
-                touch(rows, r, bodies, faces, nodes)
+                touch(rows, r, table)
                 for side in range(2):
-                    add_push(rows, r, side, share * scale, bodies, faces, shapes, push[side])
+                    add_push(rows, r, side, share * scale, table, push[side])
                 load = rows[r].load_n_s * share
                 if load > most:
                     most, bent = load, rows[r].curvature_per_m[0] + rows[r].curvature_per_m[1]
@@ -336,7 +304,7 @@ def _make(strike, quaternion, rows, bodies, faces, nodes, shapes, frequency_hz, 
     given = 0.0
     for side in range(2):
         body = bodies[strike.body[side]]
-        given += compliance(push[side], frequency_hz, body.frequency_at, body.modes, length, spectrum[flat])
+        given += compliance(push[side], table.frequency_hz, body.frequency_at, body.modes, length, table.spectrum[flat])
         pulse.body[side] = strike.body[side]
     pulse.length_s, pulse.flat = length, flat
     # the square of an impulse below 1e-162 N·s is zero; it is inaudible

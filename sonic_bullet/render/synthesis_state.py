@@ -12,10 +12,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from sonic_bullet.machine.groups import gather, kinds_of
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor, channels_of
 from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
+from sonic_bullet.render.groups import Groups
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.render.space.space_state import SpaceState, is_spatial
@@ -26,9 +28,7 @@ from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
 from sonic_bullet.synth.clock import Clock
-from sonic_bullet.synth.fractional_delay import tap_polynomials
 from sonic_bullet.synth.path import Path, PathState
-from sonic_bullet.synth.pulse import pulse_table, spectrum_table
 from sonic_bullet.synth.strikes import SPAN
 
 
@@ -161,11 +161,12 @@ class TouchingPairs:
 class StepScratch:
     """Scratch of one step.
 
-    pulse (p,) PULSE with push (p, 2, columns); drives d: force (d·n,), gain0, gain1 (d, 2, columns), direction0,
-    direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), pushed (b, 3, n), sounds (b, 2): which rows of these
-    are not zero; passed (W, b, n): zeros.
+    count (2,): its pulses and drives. pulse (p,) PULSE with push (p, 2, columns); drives d: force (d·n,), gain0, gain1
+    (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), pushed (b, 3, n), sounds
+    (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
     """
 
+    count: Array = field(default_factory=lambda: np.zeros(2, np.int64))
     pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
     push: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
     force: Array = field(default_factory=lambda: np.zeros(0))
@@ -249,22 +250,14 @@ class State:
         self._tables = None
 
     def tables(self) -> tuple[Any, ...]:
-        """Return the driver's tables, in its order."""
+        """Return the driver's tables: all groups of `Groups` that are the state's, flat."""
         if self._tables is None:
-            window, pairs, bodies, room = self.window, self.pairs, self.table, self.scratch
-            bank, ringing, path_, travelling = self.bank, self.ringing, self.path, self.travelling
-            self._tables = (
-                window.step, window.position_m, window.quaternion_xyzw, window.teleported, window.row,
-                bodies.bodies, bodies.faces, bodies.nodes, bodies.shapes, bodies.frequency_hz, spectrum_table(),
-                pairs.pair, pairs.active, pairs.count, pairs.free, pairs.gain, pairs.held, self.stand, self.credit_s,
-                room.pulse, room.push, room.force, room.gain0, room.gain1, room.direction0, room.direction1,
-                room.body, room.slot, bank.body, ringing.law, bank.weight, bank.observed,
-                ringing.ringing, ringing.z, ringing.driven, ringing.sound, ringing.pole, ringing.block,
-                ringing.coming, ringing.passes, ringing.pass_weight, ringing.pass_sound, room.passed, ringing.strikes,
-                ringing.rows, ringing.free, pulse_table(), room.source, room.pushed, room.sounds,
-                path_.microphone_m, path_.samples_per_m, travelling.sources, travelling.places, travelling.lines,
-                travelling.memory, tap_polynomials(), self.reads,
-            )  # fmt: skip
+            holders = {
+                "window": (self.window,), "table": (self.table,), "pairs": (self.pairs,), "supports": (self,),
+                "bank": (self.ringing, self.bank), "scratch": (self.scratch,), "path": (self.path, self.travelling),
+            }  # fmt: skip
+            kinds = kinds_of(Groups).items()
+            self._tables = tuple(x for name, kind in kinds if name in holders for x in gather(kind, *holders[name]))
         return self._tables
 
     @property

@@ -21,6 +21,7 @@ from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
+from sonic_bullet.render.groups import Call, Frames, StepTables
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.ringing_on import with_tail
@@ -104,24 +105,23 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
-    done, resume, taken, found, drives = 0, driver.ANEW, state.taken, 0, 0
+    given, done, resume = StepTables(table, contacts, *poses, aim), 0, driver.ANEW
+    frames = Frames(begin, int(by_body), state.reads, pressure, out)
     while done < len(steps):
-        arguments = (
-            done, taken, begin, pause, resume, found, drives, float(sr), table, contacts, *poses, aim,
-            *state.tables(), int(by_body), pressure, out,
-        )  # fmt: skip
+        values = (*Call(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
         if not getattr(driver.advance_steps, "overloads", True):
-            make_driver(arguments)
-        more, status, found, drives = driver.advance_steps(*arguments)
+            make_driver(values)
+        more, status = driver.advance_steps(values)
         done, resume = done + more, driver.ANEW if status in (driver.TO_GROW, path_places.DONE) else driver.RINGS
         if status == path_places.DONE:
             continue
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
         elif status == driver.TO_SETTLE:
-            settle(state, taken + done - LOOKAHEAD)
+            settle(state, state.taken + done - LOOKAHEAD)
             resume = driver.EXCITED
         elif status == driver.PAUSED:
+            found, drives = state.scratch.count.tolist()
             if state.has_residual:
                 _add_residuals(setup, state, table[done], found, drives)
             if state.witness is not None:

@@ -208,23 +208,21 @@ def flush(typingctx, out, at, count):
 
 
 @intrinsic
-def emit(
-    typingctx, source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before
-):
+def emit(typingctx, arrays, stride, tail, count, geometry, emitted, delay):
     """Compute a and D of ``count`` samples into emitted and delay, whole groups of 8.
 
-    Returns 0 where no delay falls by more than MOST_FALL from one to the next; ``before`` is the delay before them.
+    Returns 0 where no delay falls by more than MOST_FALL from one to the next.
 
     Parameters
     ----------
-    source, pushed, x : arrays of any shape from element source_at … on, the axes of pushed ``stride`` elements apart
+    arrays : source, pushed and x, each an `At`, the axes of pushed ``stride`` elements apart
     tail : (5, 8) flat, source, pushed and x after the last whole group
     geometry : (8,) microphone - start, end - start (m), samples per metre, 1/radius
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before = e.args
+        source, source_at, pushed, pushed_at, x, x_at, stride, tail, count, geometry, emitted, delay = e.args
         known = [e.broadcast(geometry, e.index(k)) for k in range(8)]
         axes = [pushed_at, builder.add(pushed_at, stride), builder.add(pushed_at, builder.add(stride, stride))]
 
@@ -256,12 +254,10 @@ def emit(
             return [late, builder.or_(carried[1], falls)]
 
         none = ir.Constant(BITS, [False] * LANES)
-        falls = e.loop(count, LANES, [e.spread(before), none], body)[1]
+        falls = e.loop(count, LANES, [constant(-np.inf), none], body)[1]
         return builder.zext(builder.bitcast(falls, ir.IntType(LANES)), I64)
 
-    return types.int64(
-        source, source_at, pushed, pushed_at, stride, x, x_at, tail, count, geometry, emitted, delay, before
-    ), codegen
+    return types.int64(arrays, stride, tail, count, geometry, emitted, delay), codegen
 
 
 @intrinsic
@@ -287,8 +283,8 @@ def leading(typingctx, memory, late_at, gone):
 
 
 @intrinsic
-def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed, at):
-    """Write Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into observed[at …].
+def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed):
+    """Write Σ_k a[m - 7 + k] h_k of eight samples as in `leading` into observed, an `At`.
 
     memory[ring_at + k]: a[m - 7 + k]. kept (KEPT,): taps of the samples before, NaN at first.
     """
@@ -342,4 +338,4 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed, at):
                     e.store(t, kept, e.index(TAPS * LANES))
         return context.get_dummy_value()
 
-    return types.void(memory, ring_at, late_at, gone, taps, kept, observed, at), codegen
+    return types.void(memory, ring_at, late_at, gone, taps, kept, observed), codegen

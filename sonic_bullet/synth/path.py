@@ -23,6 +23,7 @@ import numpy as np
 
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.synth.fractional_delay import tap_polynomials
 from sonic_bullet.synth.path_places import (
     FARTHEST_M,
     LINE,
@@ -49,6 +50,11 @@ class Path:
     def samples_per_m(self) -> float:
         """Samples that sound needs for a metre."""
         return self.sr / self.air.sound_speed_m_s
+
+    @property
+    def taps(self) -> Array:
+        """Polynomials of the interpolation's taps."""
+        return tap_polynomials()
 
 
 @dataclass(slots=True, eq=False)

@@ -13,10 +13,13 @@ frames do not matter.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records import Array
 from sonic_bullet.synth.fractional_delay import (
     AHEAD,
     KEPT,
@@ -31,7 +34,7 @@ from sonic_bullet.synth.fractional_delay import (
     read,
 )
 from sonic_bullet.synth.path_places import BLOCK, DONE, MIRRORED, move_body, survey
-from sonic_bullet.synth.vector import LANES
+from sonic_bullet.synth.vector import LANES, At
 
 _HISTORY = 3 * AHEAD
 _SPAN = BLOCK + LANES
@@ -39,6 +42,26 @@ WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
 """Doubles of scratch that `hear` uses."""
 AT_REST = np.zeros((0, 0, 0, 3))
 """``aim_m`` where no microphone moves."""
+
+
+class _Work(NamedTuple):
+    """Scratch of `hear`, parts of WORK numbers: a block of one line, its geometry, what does not fill eight, taps."""
+
+    emitted: Array
+    delay: Array
+    observed: Array
+    geometry: Array
+    tail: Array
+    kept: Array
+
+
+class _Ring(NamedTuple):
+    """History of one line: memory, where the ring of what is emitted begins, where that of delays, size less one."""
+
+    memory: Array
+    at: int
+    late_at: int
+    mask: int
 
 
 @njit(nogil=True, error_model="numpy")
@@ -65,17 +88,16 @@ def _last(emitted, i, stop, newest, behind):  # pragma: no cover - compiled
 
 
 @njit(nogil=True, error_model="numpy")
-def _remember(
-    memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep
-):  # pragma: no cover - compiled
+def _remember(ring, at, start, n, work, before, steep):  # pragma: no cover - compiled
     """Write samples at + start … at + n - 1, which lie in one piece, into a line's history.
 
     before: the delay before them; steep: delays fall faster than MOST_FALL.
     """
+    memory, ring_at, late_at, mask, delay = ring.memory, ring.at, ring.late_at, ring.mask, work.delay
     place, count = (at + start) & mask, n - start
     again = MIRRORED - place
     again = count if count < again else again
-    move(emitted, start, memory, ring_at + place, count)
+    move(work.emitted, start, memory, ring_at + place, count)
     move(delay, start, memory, late_at + place, count)
     if steep or delay[start] < before - MOST_FALL:
         for i in range(start, n):
@@ -87,8 +109,9 @@ def _remember(
 
 
 @njit(nogil=True, error_model="numpy")
-def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compiled
+def _wake(ring, n, late):  # pragma: no cover - compiled
     """Fill the history before sample n with silence at that delay."""
+    memory, ring_at, late_at, mask = ring.memory, ring.at, ring.late_at, ring.mask
     for k in range(n - _HISTORY, n):
         place = k & mask
         memory[ring_at + place], memory[late_at + place] = 0.0, late
@@ -97,19 +120,18 @@ def _wake(memory, ring_at, late_at, mask, n, late):  # pragma: no cover - compil
 
 
 @njit(nogil=True, error_model="numpy")
-def _listen(
-    line, at, n, emitted, delay, observed, memory, ring_at, mask, taps, kept, steep
-):  # pragma: no cover - compiled
-    """Run one line over emitted (n,) and write its arrivals into observed (n,). False where nothing arrives.
+def _listen(line, at, n, steep, ring, taps, work):  # pragma: no cover - compiled
+    """Run one line over work.emitted (n,) and write its arrivals into observed (n,). False where nothing arrives.
 
     Samples count from ``at`` in here: i, m, newest.
     """
-    late_at = ring_at + mask + 1 + MIRRORED
+    memory, ring_at, late_at, mask = ring.memory, ring.at, ring.late_at, ring.mask
+    emitted, delay, observed = work.emitted, work.delay, work.observed
     awake, m, newest = line.awake != 0, line.cursor - at, line.newest - at
     start = np.int64(0)  # not a plain 0: see path_places.survey
     if awake:
         before = memory[late_at + ((at - 1) & mask)]
-        _remember(memory, ring_at, late_at, mask, at, start, n, emitted, delay, before, steep)
+        _remember(ring, at, start, n, work, before, steep)
     i, arrives, waits = 0, False, True
     while i < n:
         if not awake:
@@ -118,8 +140,8 @@ def _listen(
             if i == n:
                 break
             awake, waits, m, newest = True, True, i - AHEAD - 1, i
-            _wake(memory, ring_at, late_at, mask, at + i, delay[i])
-            _remember(memory, ring_at, late_at, mask, at, i, n, emitted, delay, -np.inf, steep)
+            _wake(ring, at + i, delay[i])
+            _remember(ring, at, i, n, work, -np.inf, steep)
         if waits:
             waits = False
             begin = m + int(np.ceil(memory[late_at + ((at + m) & mask)]))
@@ -138,8 +160,8 @@ def _listen(
             while (base + 1 - i) + memory[late_at + ((at + base + 1) & mask)] <= 0.0:
                 base += 1
             count = leading(memory, late_at + ((at + base) & mask), base - i)
-        ring, late = ring_at + ((at + base + 1 - AHEAD) & mask), late_at + ((at + base) & mask)
-        read(memory, ring, late, base - i, taps, kept, observed, i)
+        first, late = ring_at + ((at + base + 1 - AHEAD) & mask), late_at + ((at + base) & mask)
+        read(memory, first, late, base - i, taps, work.kept, At(observed, i))
         if count == LANES and i + LANES <= n and newest >= i - LANES and emitted[i + LANES - 1] != 0.0:
             newest = i + LANES - 1
             i, m = i + LANES, base + LANES - 1
@@ -156,68 +178,58 @@ def _listen(
 
 
 @njit(nogil=True, error_model="numpy")
-def _emit(b, first, n, source, pushed, x, fade, geometry, tail, emitted, delay):  # pragma: no cover - compiled
+def _emit(b, first, n, emission, x, fade, work):  # pragma: no cover - compiled
     """Compute a and D of body b as `fractional_delay.emit`, faded; return whether delays fall fast.
 
-    fade: 0 none, 1 in, -1 out, 2 silent from now on. tail (5·LANES,): scratch for the samples after the last whole
-    group.
+    fade: 0 none, 1 in, -1 out, 2 silent from now on. work.tail (5·LANES,): samples after the last whole group.
     """
+    source, pushed, tail = emission.source, emission.pushed, work.tail
     whole, long = n & -LANES, source.shape[1]
     for k in range(n - whole):
         i = first + whole + k
         tail[k], tail[4 * LANES + k] = source[b, i], x[i]
         for axis in range(3):
             tail[(1 + axis) * LANES + k] = pushed[b, axis, i]
-    source_at, pushed_at = b * long + first, 3 * b * long + first
-    steep = emit(source, source_at, pushed, pushed_at, long, x, first, tail, n, geometry, emitted, delay, -np.inf)
+    arrays = At(source, b * long + first), At(pushed, 3 * b * long + first), At(x, first)
+    steep = emit(arrays, long, tail, n, work.geometry, work.emitted, work.delay)
     if fade != 0:
         begin, slope = 1.0 if fade == -1 else 0.0, 0.0 if fade == 2 else float(fade)
         for i in range(n):
-            emitted[i] *= begin + slope * x[first + i]
-        flush(emitted, 0, n)
+            work.emitted[i] *= begin + slope * x[first + i]
+        flush(work.emitted, 0, n)
     return steep != 0
 
 
 @njit(nogil=True, error_model="numpy")
-def hear(  # noqa: PLR0912 - a branch a case, in one kernel
-    at, step, n, first, source, pushed, begin_m, end_m, teleported, x, microphone_m, aim_m, samples_per_m, sources,
-    places, lines, memory, taps, work, out, out_at, apart=0,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Compute the pressure (Pa) at samples at … at + n - 1 of the step into out (c, ·) from column out_at on.
+def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR0912  # pragma: no cover - compiled
+    """Compute the pressure (Pa) at samples at … at + n - 1 of the step into an `Arrivals`.
 
     Bodies are summed in order; below 1e-30 Pa: 0. Returns DONE, or what is in the way (`path_places`).
 
     Parameters
     ----------
-    source, pushed : (≥ b, ·) in Pa·m, (≥ b, 3, ·) in Pa·m along each axis, from column ``first`` on
-    x : (·) position of each sample between the step's ends, 0 … 1, from column ``first`` on
-    begin_m, end_m, teleported : (≥ b, 3), (≥ b, 3), (≥ b,)
-    aim_m : (2, b, c, 3) place of each microphone when it receives what a body emits at the step's ends; (0, …): as
-        microphone_m
     step : ≥ 0, number of the step that these samples are (part of)
-    sources, places, lines, memory : (b,) SOURCE, (t,) PLACE, (t·c,) LINE and histories, changed in place
-    taps : `tap_polynomials`
-    work : (WORK,) scratch
-    apart : 1: bodies are not summed, and out is (b·c, …), body by body
+    emission, course, path, arrivals : groups of `path_places`; the path's tables are changed in place
+    scratch : (WORK,)
     """
-    source, pushed, begin_m, end_m = borrowed(source), borrowed(pushed), borrowed(begin_m), borrowed(end_m)
-    sources, places, lines, memory = borrowed(sources), borrowed(places), borrowed(lines), borrowed(memory)
-    x, microphone_m, taps, aim_m = borrowed(x), borrowed(microphone_m), borrowed(taps), borrowed(aim_m)
-    work, out = borrowed(work), borrowed(out)
-    status = survey(
-        step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, aim_m, samples_per_m, sources, places,
-        lines,
-    )  # fmt: skip
+    emission, course, path, arrivals = borrowed(emission), borrowed(course), borrowed(path), borrowed(arrivals)
+    scratch = borrowed(scratch)
+    status = survey(step, n, emission, course, path)
     if status != DONE:
         return status
+    begin_m, end_m, aim_m, out, apart = course.begin_m, course.end_m, course.aim_m, arrivals.out, arrivals.apart
+    sources, places, microphone_m, first = path.sources, path.places, path.microphone_m, emission.first
     channels, moves = len(microphone_m), len(aim_m) > 0
     rows = channels * (len(sources) if apart else 1)
     for row in range(rows):
-        clear(out, row * out.shape[1] + out_at, n)
-    emitted, delay, observed = work[:_SPAN], work[_SPAN : 2 * _SPAN], work[2 * _SPAN : 3 * _SPAN]
-    geometry, tail, kept = work[3 * _SPAN : 3 * _SPAN + 8], work[3 * _SPAN + 8 : WORK - KEPT], work[WORK - KEPT : WORK]
-    kept[TAPS * LANES] = np.nan
-    geometry[6] = samples_per_m
+        clear(out, row * out.shape[1] + arrivals.at, n)
+    geometry = scratch[3 * _SPAN : 3 * _SPAN + 8]
+    work = _Work(
+        scratch[:_SPAN], scratch[_SPAN : 2 * _SPAN], scratch[2 * _SPAN : 3 * _SPAN], geometry,
+        scratch[3 * _SPAN + 8 : WORK - KEPT], scratch[WORK - KEPT : WORK],
+    )  # fmt: skip
+    work.kept[TAPS * LANES] = np.nan
+    geometry[6] = path.samples_per_m
     for b in range(len(sources)):
         body = sources[b]
         if body.fresh >= 0:
@@ -231,7 +243,7 @@ def hear(  # noqa: PLR0912 - a branch a case, in one kernel
             present, moved = p == body.main, body.left == step
             fade = (1 if present else (-1 if p == body.leaving else 2)) if moved else (0 if present else 2)
             for c in range(channels):
-                line = lines[p * channels + c]
+                line = path.lines[p * channels + c]
                 if line.awake == 0 and (fade == 2 or body.sounds == 0):
                     continue
                 for axis in range(3):
@@ -242,18 +254,17 @@ def hear(  # noqa: PLR0912 - a branch a case, in one kernel
                         here, there = aim_m[0, b, c, axis], aim_m[1, b, c, axis]
                         geometry[axis], geometry[3 + axis] = here - start, (stop - start) - (there - here)
                 ring_at, mask, lo = place.memory_at + c * 2 * (place.size + MIRRORED), place.size - 1, 0
+                ring = _Ring(path.memory, ring_at, ring_at + place.size + MIRRORED, mask)
                 while lo < n:  # a block that lies in one piece
                     count = place.size - ((at + lo) & mask)
                     count = count if count < BLOCK else BLOCK
                     count = count if count < n - lo else n - lo
-                    steep = _emit(b, first + lo, count, source, pushed, x, fade, geometry, tail, emitted, delay)
-                    if _listen(
-                        line, at + lo, count, emitted, delay, observed, memory, ring_at, mask, taps, kept, steep
-                    ):
+                    steep = _emit(b, first + lo, count, emission, course.x, fade, work)
+                    if _listen(line, at + lo, count, steep, ring, path.taps, work):
                         row = (b * channels if apart else 0) + c
-                        add(observed, out, row * out.shape[1] + out_at + lo, count)
+                        add(work.observed, out, row * out.shape[1] + arrivals.at + lo, count)
                     lo += count
             p = place.next
     for row in range(rows):
-        flush(out, row * out.shape[1] + out_at, n)
+        flush(out, row * out.shape[1] + arrivals.at, n)
     return DONE

@@ -9,9 +9,12 @@ rings of a power of two with their first MIRRORED elements repeated at their end
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records import Array
 from sonic_bullet.synth.fractional_delay import INFINITE, TAPS, greatest
 from sonic_bullet.synth.vector import LANES
 
@@ -58,6 +61,52 @@ LINE = np.dtype([("awake", "i8"), ("cursor", "i8"), ("newest", "i8")], align=Tru
 """awake: sound is under way; cursor: the emitted sample arrived last; newest: the last emitted that is not zero."""
 
 
+class PathTables(NamedTuple):
+    """The sound path: fields of `path.Path` (microphone_m, samples_per_m, taps) and of `path.PathState`."""
+
+    microphone_m: Array
+    samples_per_m: float
+    taps: Array
+    sources: Array
+    places: Array
+    lines: Array
+    memory: Array
+
+
+class Emission(NamedTuple):
+    """What bodies emit, from column ``first`` on: source (≥ b, ·) and pushed (≥ b, 3, ·), along each axis, in Pa·m."""
+
+    source: Array
+    pushed: Array
+    first: int
+
+
+class Course(NamedTuple):
+    """Where bodies and microphones are in a step.
+
+    Attributes
+    ----------
+    begin_m, end_m, teleported : (≥ b, 3), (≥ b, 3), (≥ b,)
+    x : (·) position of each sample between the step's ends, 0 … 1, from column `Emission.first` on
+    aim_m : (2, b, c, 3) place of each microphone when it receives what a body emits at the step's ends; (0, …): as
+        microphone_m
+    """
+
+    begin_m: Array
+    end_m: Array
+    teleported: Array
+    x: Array
+    aim_m: Array
+
+
+class Arrivals(NamedTuple):
+    """Where pressure goes: out (c, ·) from column ``at`` on; apart 1: bodies are not summed, out is (b·c, …)."""
+
+    out: Array
+    at: int
+    apart: int
+
+
 @njit(nogil=True, error_model="numpy")
 def _awake(lines, place, channels):  # pragma: no cover - compiled
     """Test whether sound of the place is under way to any microphone."""
@@ -98,17 +147,18 @@ def _free_place(places, lines, sources, step, p, channels):  # pragma: no cover 
 
 
 @njit(nogil=True, error_model="numpy")
-def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphone_m, aim_m, samples_per_m,
-           sources, places, lines):  # fmt: skip  # pragma: no cover - compiled
+def survey(step, n, emission, course, path):  # pragma: no cover - compiled
     """Mark which bodies emit, find new places for those teleported in this step, and return what is in the way.
 
     The distance of what emits is greatest at an end of the step. Silence needs no fade: a silent body keeps its place.
     """
-    channels, long = len(microphone_m), source.shape[1]
+    begin_m, end_m, aim_m, microphone_m = course.begin_m, course.end_m, course.aim_m, path.microphone_m
+    sources, places, lines, first = path.sources, path.places, path.lines, emission.first
+    channels, long = len(microphone_m), emission.source.shape[1]
     free, wrong = np.int64(0), DONE  # a plain 0 has its own type, and each callee would be compiled for it too
     for b in range(len(sources)):
         body = sources[b]
-        most = greatest(source, b * long + first, pushed, 3 * b * long + first, long, n)
+        most = greatest(emission.source, b * long + first, emission.pushed, 3 * b * long + first, long, n)
         if most >= INFINITE:
             return NOT_FINITE
         body.sounds, body.fresh, body.away_m = 1 if most > 0 else 0, -1, 0.0
@@ -127,7 +177,7 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
         if body.left == step:
             if body.sounds == 1 or _awake(lines, body.leaving, channels):
                 old = body.leaving
-        elif teleported[b] and observed:
+        elif course.teleported[b] and observed:
             main, old = _free_place(places, lines, sources, step, free, channels), main
             if main == len(places):
                 return PLACES_SHORT
@@ -137,7 +187,7 @@ def survey(step, n, first, source, pushed, begin_m, end_m, teleported, microphon
         for k in range(2):
             p = main if k == 0 else old
             if p >= 0 and (k == 1 or observed):
-                said = _fits(places[p], body, stop if k == 0 else start, samples_per_m)
+                said = _fits(places[p], body, stop if k == 0 else start, path.samples_per_m)
                 wrong = said if said > wrong else wrong
     return wrong
 

@@ -32,7 +32,7 @@ begins makes no difference. Coefficients and their growth until the step's end s
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -83,12 +83,24 @@ def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
         out[j] = height_m[j] * (fine * slow / np.sqrt(1.0 + patch_radius_m / WAVE_M[j]))
 
 
+class _Lattice(NamedTuple):
+    """Coefficients work[at] …, the first at the lattice point ``origin``, a whole number.
+
+    Their growth until the step's end lies ``change`` further on. inverse: lattice points a metre.
+    """
+
+    at: int
+    change: int
+    origin: float
+    inverse: float
+
+
 @intrinsic
-def _refine(typingctx, work, coarse, fine, change, pairs, first, height, growth):
+def _refine(typingctx, work, coarse, fine, change, pairs, first, heights):
     """Compute 2·pairs coefficients from work[fine] on: those of work[coarse] … on half the lattice, plus noise.
 
-    They take work[coarse] … work[coarse + pairs + 1], plus height times this octave's noise from ``first`` on; and the
-    same ``change`` further on, plus growth times it. Noise: values on ±1 by a 32-bit integer mix [Wellons 2018,
+    They take work[coarse] … work[coarse + pairs + 1], plus heights[0] times this octave's noise from ``first`` on; and
+    the same ``change`` further on, plus heights[1] times it. Noise: values on ±1 by a 32-bit integer mix [Wellons 2018,
     "lowbias32"]. Up to 14 values more are written.
     """
 
@@ -129,16 +141,15 @@ def _refine(typingctx, work, coarse, fine, change, pairs, first, height, growth)
         e.loop(pairs, LANES, [], body)
         return context.get_dummy_value()
 
-    return types.void(work, coarse, fine, change, pairs, first, height, growth), codegen
+    return types.void(work, coarse, fine, change, pairs, first, heights), codegen
 
 
 @intrinsic
-def _read(typingctx, work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out):
-    """Add dh/dt of ``count`` samples, a multiple of 8, to rate[out] ….
+def _read(typingctx, work, samples, lattice, pace, rate):
+    """Add dh/dt of samples to ``rate``, an `At`.
 
-    Places are work[where] … in m, fractions of the step work[share] …. Coefficients begin at work[lattice], the first
-    at the lattice point ``origin`` (a whole number). speed, gain: at the step's start, and growth until its end;
-    inverse: lattice points a metre.
+    samples: (where, share, count), a multiple of 8 of them: places work[where] … in m, fractions of the step
+    work[share] …. lattice: `_Lattice`. pace: speed at the step's start, and its growth until the end.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -188,24 +199,25 @@ def _read(typingctx, work, where, share, count, lattice, change, origin, inverse
         e.loop(count, LANES, [], body)
         return context.get_dummy_value()
 
-    return types.void(work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out), codegen
+    return types.void(work, samples, lattice, pace, rate), codegen
 
 
 @njit(nogil=True, error_model="numpy")
-def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s, work, rate, out):
-    """Add dh/dt of one side of one pair to rate[out] … rate[out + n - 1] in m/s.
+def sweep_profile(swept, speed, x, key, heights, per_sample_s, work, rate):
+    """Add dh/dt of one side of one pair to n samples of ``rate``, an `At`, in m/s.
 
     Returns the distance swept after the n samples, and the scratch, longer where it was too short.
 
     Parameters
     ----------
     swept : distance before
-    speed0, speed1 : at the step's ends
+    speed : two, at the step's ends
     x : (n,) fraction of the step
-    height0, height1 : (OCTAVES,) g·A at the step's ends
+    heights : two (OCTAVES,), g·A at the step's ends
     key : of this surface
     rate : as long as if n were the next multiple of 8
     """
+    (speed0, speed1), (height0, height1) = speed, heights
     n, gain = len(x), speed1 - speed0
     whole = (n + LANES - 1) & -LANES
     if len(work) < 2 * whole:
@@ -240,11 +252,13 @@ def sweep_profile(swept, speed0, speed1, x, key, height0, height1, per_sample_s,
     for j in range(coarsest, finest + 1):
         low, high = _lattice(first, last, finest - j)
         coarse, pairs = now + (low >> 1) - begin - 1, (high - low + 1) >> 1
-        _refine(work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height0[j], height1[j] - height0[j])
+        height = height0[j], height1[j] - height0[j]
+        _refine(work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height)
         now, new, begin = new, now, low
     # never below 0: a place less its origin then has no more digits than the place, and is exact
     origin = begin + 1 if begin >= 0 else 0
-    _read(work, 0, whole, whole, now + origin - begin - 1, change, float(origin), inverse, speed0, gain, rate, out)
+    lattice = _Lattice(now + origin - begin - 1, change, float(origin), inverse)
+    _read(work, (np.int64(0), whole, whole), lattice, (speed0, gain), rate)
     return swept, work
 
 

@@ -40,7 +40,7 @@ from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth.profile import OCTAVES, gained_heights, sweep_profile
-from sonic_bullet.synth.vector import F64, I32, LANES, VEC, Emit, Value, constant
+from sonic_bullet.synth.vector import F64, I32, LANES, VEC, At, Emit, Value, constant
 
 MOST_SUBSTEPS = 8.0
 FASTEST_M_S = 50.0
@@ -173,8 +173,8 @@ def sound_voices(pairs, voices, count, x, sr, force):
                     gained_heights(pair.height_m[side], begin, constants[at + _PATCH], sr, height0)
                     gained_heights(pair.height_m[side], end, constants[at + _PATCH + 1], sr, height1)
                     pair.swept_m[side], work = sweep_profile(
-                        pair.swept_m[side], begin, end, x, pair.seed[side], height0, height1, 1.0 / sr, work, rate,
-                        lane * whole,
+                        pair.swept_m[side], (begin, end), x, pair.seed[side], (height0, height1), 1.0 / sr, work,
+                        At(rate, lane * whole),
                     )  # fmt: skip
             if pair.substeps == 0:  # a new contact starts with the profile's velocity
                 constants[at + _LIFT] = rate[lane * whole] * constants[at + _RATE_UNIT]

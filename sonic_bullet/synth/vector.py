@@ -6,7 +6,7 @@ loops. Vectors are eight doubles (two or four registers where the machine has na
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba import types
@@ -22,17 +22,30 @@ Value = Any
 Pair = tuple[Value, Value]
 
 
+class At(NamedTuple):
+    """An array, read or written as if it were flat, from an element on."""
+
+    array: Any
+    at: int
+
+
+def _flat(context: Any, builder: Any, kind: Any, value: Value) -> list[Value]:
+    """Return the data pointer of an array, the value of a scalar; of a tuple those of its parts."""
+    if isinstance(kind, types.Array):
+        return [cgutils.create_struct_proxy(kind)(context, builder, value=value).data]
+    if isinstance(kind, types.BaseTuple):
+        parts = zip(kind.types, cgutils.unpack_tuple(builder, value, len(kind)), strict=True)
+        return [one for part_kind, part in parts for one in _flat(context, builder, part_kind, part)]
+    return [value]
+
+
 class Emit:
-    """Writer of vector instructions; arguments arrive as data pointers (arrays) or values (scalars)."""
+    """Writer of vector instructions; arguments arrive as data pointers (arrays) or values (scalars), tuples flat."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
         self.builder = builder
-        self.args = [
-            cgutils.create_struct_proxy(kind)(context, builder, value=arg).data
-            if isinstance(kind, types.Array)
-            else arg
-            for kind, arg in zip(signature.args, args, strict=True)
-        ]
+        pairs = zip(signature.args, args, strict=True)
+        self.args = [one for kind, arg in pairs for one in _flat(context, builder, kind, arg)]
         self._fma = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC] * 3), "llvm.fma.v8f64")
 
     def index(self, value: int) -> Value:

@@ -8,13 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from sonic_bullet.machine.groups import gather
 from sonic_bullet.records import Array
+from sonic_bullet.render.tables import PULSE
 from sonic_bullet.synth.bank import Bank, BankState, bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.synth.bank.instrument import flushed
-from sonic_bullet.synth.bank.layout import DRIVEN
-from sonic_bullet.synth.bank.strike_pool import enter_strike
-from sonic_bullet.synth.pulse import pulse_table
+from sonic_bullet.synth.bank.layout import DRIVEN, BankTables, BankWork, ScratchTables
+from sonic_bullet.synth.bank.strike_pool import ForcePulse, enter_strike
 from sonic_bullet.synth.vector import LANES
 
 NOWHERE = np.zeros(3)
@@ -69,34 +70,35 @@ def advance(
     Strikes and forces of a body are added in order of start and of the list.
     """
     along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)
-    drives, body, signal, gain, direction = _drives(bank, n, forces)
     _enter(bank, state, strikes)
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
     if pushed is None:
         pushed = np.zeros((bank.body_count, 3, n))
     pushed[...] = 0.0
-    bank_kernel.advance(
-        state.at, n, float(bank.sr), bank.body, state.law, bank.weight, bank.observed,
-        state.ringing, state.z, state.driven, state.sound, state.pole, state.block, *passed(bank, state, n),
-        state.strikes, state.rows, state.free, pulse_table(), drives, body, signal, gain[0], gain[1], direction[0],
-        direction[1], along, *room(bank.body_count, drives, n), out, pushed, np.zeros((bank.body_count, 2), np.int64),
-    )  # fmt: skip
+    scratch = step_scratch(bank, n, forces)._replace(source=out, passed=passed(bank, state, n), pushed=pushed)
+    work = room(bank.body_count, len(forces), n)
+    bank_kernel.advance(state.at, n, float(bank.sr), along, tables(bank, state), scratch, work)
     state.at += n
     return out
 
 
-def passed(bank: Bank, state: BankState, n: int) -> tuple[Array, ...]:
-    """Arguments of the kernel for what touching bodies do to each other."""
-    heard = np.zeros((*bank.observed.shape, n if state.passes.shape[1] else 0))
-    return state.coming, state.passes, state.pass_weight, state.pass_sound, heard
+def tables(bank: Bank, state: BankState) -> BankTables:
+    """The bank's group."""
+    group: BankTables = gather(BankTables, state, bank)
+    return group
+
+
+def passed(bank: Bank, state: BankState, n: int) -> Array:
+    """Room for what touching bodies transmit."""
+    return np.zeros((*bank.observed.shape, n if state.passes.shape[1] else 0))
 
 
 @lru_cache(maxsize=8)
-def room(bodies: int, drives: int, n: int) -> tuple[Array, ...]:
-    """Scratch of one call: first, side, signal, kick, plan, flat."""
+def room(bodies: int, drives: int, n: int) -> BankWork:
+    """Scratch of one call."""
     flat = np.zeros(max(DRIVE_SCRATCH, RING_SCRATCH) + LANES)
     skip = (-(flat.ctypes.data // 8)) % LANES
-    return (
+    return BankWork(
         np.zeros(bodies + 1, np.int64), np.zeros(2 * drives, np.int64), np.zeros((drives, 2, n + LANES)),
         np.zeros((6, n + LANES)), np.zeros((DRIVEN, 3), np.int64), flat[skip : skip + len(flat) - LANES],
     )  # fmt: skip
@@ -107,18 +109,14 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
     state.with_room(len(strikes))
     for strike in strikes:
         x, y, z = (float(value) for value in strike.shove_n_s)
-        enter_strike(
-            strike.body, float(strike.start), float(strike.length_s), int(strike.flat), 1.0, _padded(bank, strike.gain),
-            x, y, z, state.at, float(bank.sr), bank.body, state.law, state.ringing, state.strikes, state.rows,
-            state.free, pulse_table(),
-        )  # fmt: skip
+        gain, length = _padded(bank, strike.gain), float(strike.length_s) * float(bank.sr)
+        pulse = ForcePulse(float(strike.start), length, int(strike.flat), 1.0, gain, (x, y, z))
+        enter_strike(strike.body, pulse, state.at, tables(bank, state))
 
 
-def _drives(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[int, Array, Array, Array, Array]:
-    """Forces as the kernel takes them: how many, bodies (p, 2), signals (p, n), gains (2, p, 2, columns), directions
-    (2, p, 3).
-    """
-    count = len(forces)
+def step_scratch(bank: Bank, n: int, forces: Sequence[Force] = ()) -> ScratchTables:
+    """Tables of a step with these forces as drives, without pulses."""
+    count, b = len(forces), bank.body_count
     body = np.full((count, 2), -1, np.int64)
     gain, direction = np.zeros((2, count, 2, bank.columns)), np.zeros((2, count, 3))
     for i, force in enumerate(forces):
@@ -126,8 +124,13 @@ def _drives(bank: Bank, n: int, forces: Sequence[Force]) -> tuple[int, Array, Ar
         for end, (values, along) in enumerate(((force.gain0, force.direction0), (force.gain1, force.direction1))):
             gain[end, i, 0] = _padded(bank, values)
             direction[end, i] = along
-    signal = np.array([force.force_n for force in forces], float).reshape(count, n)
-    return count, body, signal, gain, direction
+    signal = np.array([force.force_n for force in forces], float).reshape(-1)
+    sets = bank.weight.shape[0]
+    return ScratchTables(
+        np.array([0, count]), np.zeros(0, PULSE), np.zeros((0, 2, bank.columns)), signal, gain[0], gain[1],
+        direction[0], direction[1], body, np.zeros(count, np.int64), np.zeros((sets, b, n)), np.zeros((sets, b, 0)),
+        np.zeros((b, 3, n)), np.zeros((b, 2), np.int64),
+    )  # fmt: skip
 
 
 def _padded(bank: Bank, gain: Array) -> Array:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.machine.groups import gather
 from sonic_bullet.records import Array
-from sonic_bullet.synth.fractional_delay import tap_polynomials
 from sonic_bullet.synth.path import Path, PathState, grow
 from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear
-from sonic_bullet.synth.path_places import DONE
+from sonic_bullet.synth.path_places import DONE, Arrivals, Course, Emission, PathTables
 
 
 def propagate(
@@ -37,11 +37,9 @@ def propagate(
     out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
     moved = np.ascontiguousarray(teleported, bool)
     while True:
-        status = hear(
-            state.at, step, n, 0, source, pushed, position0_m, position1_m, moved, progress, path.microphone_m,
-            AT_REST, path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(),
-            work, out, 0,
-        )  # fmt: skip
+        course = Course(position0_m, position1_m, moved, progress, AT_REST)
+        tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
+        status = hear(state.at, step, n, Emission(source, pushed, 0), course, tables, work, arrivals)
         if status == DONE:
             break
         grow(path, state, status)

@@ -6,15 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonic_bullet.machine.groups import gather
 from sonic_bullet.records import Air, Array, Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.contact_rows import enter_loads, orient
+from sonic_bullet.render.groups import BodyTables, PairTables, WindowTables
 from sonic_bullet.render.resonator import build_resonator
+from sonic_bullet.render.standing.held_contacts import HELD
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
-from sonic_bullet.render.tables import CONTACT, PAIR, PULSE, ROW
-from sonic_bullet.synth.pulse import spectrum_table
-from sonic_bullet.synth.strikes import LOOKAHEAD
+from sonic_bullet.render.tables import CONTACT, PAIR, PULSE, ROW, WINDOW
+from sonic_bullet.synth.bank.layout import ScratchTables
+from sonic_bullet.synth.strikes import LOOKAHEAD, SPAN
 
 
 def packed(contacts: Contacts) -> Array:
@@ -38,52 +41,47 @@ class Stages:
 
     def __init__(self, bodies: Sequence[Body], pairs: int = 64, rows: int = 256) -> None:
         self.table, self.number, self._most = body_table(bodies), 0, rows
-        self.rows, self.pairs = np.zeros((LOOKAHEAD + 1) * rows, ROW), np.zeros(pairs, PAIR)
-        self.active, self.free = np.zeros(pairs, np.int64), np.arange(pairs)
-        self.counts, self.window = np.array([0, pairs]), np.zeros((LOOKAHEAD + 1, 2), np.int64)
+        self.bodies, b = gather(BodyTables, self.table), len(bodies)
+        self.window = WindowTables(
+            np.zeros(SPAN, WINDOW), np.zeros((SPAN, b, 3)), np.zeros((SPAN, b, 4)), np.zeros((SPAN, b), bool),
+            np.zeros(SPAN * rows, ROW),
+        )  # fmt: skip
+        self.pairs = PairTables(
+            np.zeros(pairs, PAIR), np.zeros(pairs, np.int64), np.array([0, pairs]), np.arange(pairs),
+            np.zeros((pairs, 2, 0)), np.zeros(pairs, HELD),
+        )  # fmt: skip
         self.strikes, self.pulses = np.zeros(pairs, STRIKE), np.zeros(2 * pairs, PULSE)
         self.push = np.zeros((2 * pairs, 2, self.table.columns))
+        none = np.zeros((0, 2, 0))
+        self.scratch = ScratchTables(
+            np.zeros(2, np.int64), self.pulses, self.push, np.zeros(0), none, none, none[:, 0], none[:, 0],
+            np.zeros((0, 2), np.int64), np.zeros(0, np.int64), none, none, none, np.zeros((0, 2), np.int64),
+        )  # fmt: skip
         self._steps: list[Step] = []
 
     def enter(self, step: Step) -> None:
         """The newest step's rows and loads."""
-        first = self.number % (LOOKAHEAD + 1) * self._most
+        place = self.number % SPAN
+        first = place * self._most
         stop = first + len(step.contacts)
-        orient(packed(step.contacts), step.quaternion_xyzw, self.rows[first:stop])
-        self.window[:-1], self.window[-1] = self.window[1:].copy(), (first, stop)
-        enter_loads(self.rows, first, stop, step.dt_s, self.pairs, self.active, self.counts, self.free)
+        orient(packed(step.contacts), step.quaternion_xyzw, self.window.row[first:stop])
+        self.window.step[place] = step.dt_s, step.gravity_m_s2, (first, stop)
+        self.window.quaternion_xyzw[place] = step.quaternion_xyzw
+        enter_loads(self.window.row, first, stop, step.dt_s, self.pairs)
         self._steps = [*self._steps[-LOOKAHEAD:], step]
         self.number += 1
 
+    @property
+    def rendered(self) -> int:
+        """Number of the step being rendered."""
+        return self.number - 1 - LOOKAHEAD
+
     def pulses_of(self, ahead: int, found: int = 0) -> int:
         """Their number with those of the step ``ahead`` of the one being rendered; ask with 0 first."""
-        number, step = self.number - 1 - LOOKAHEAD + ahead, self._steps[ahead]
-        table = self.table
+        number = self.rendered + ahead
         return int(
-            find_pulses(
-                ahead,
-                number,
-                -self._steps[0].dt_s * ahead,
-                step.dt_s,
-                step.gravity_m_s2,
-                step.quaternion_xyzw,
-                self.rows,
-                self.window,
-                self.pairs,
-                self.active,
-                self.counts,
-                table.bodies,
-                table.faces,
-                table.nodes,
-                table.shapes,
-                table.frequency_hz,
-                spectrum_table(),
-                self.strikes,
-                self.pulses,
-                self.push,
-                found,
-            )
-        )
+            find_pulses(ahead, number, found, self.window, self.bodies, self.pairs, self.strikes, self.scratch)
+        )  # fmt: skip
 
     def take(self, step: Step) -> tuple[Array, Array]:
         """Pulses (q,) and their Uᵀj (q, 2, columns) of the step rendered when this one has come, and of the one after

@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.machine.groups import gather
 from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
+from sonic_bullet.render.groups import BodyTables
 from sonic_bullet.render.tables import ROW
 from sonic_bullet.synth import pulse
 from tests.made.models import GLASS, STEEL, ball_body, box_body, box_model, wall_body
@@ -39,7 +41,7 @@ def test_touch_is_the_nearest_point_and_is_found_once() -> None:
     rng = np.random.default_rng(0)
     for _ in range(50):
         rows = rows_at(rng.uniform(-0.15, 0.15, 3), rng.normal(size=3))
-        touch(rows, 0, table.bodies, table.faces, table.nodes)
+        touch(rows, 0, gather(BodyTables, table))
         _, weight, _ = closest_point(body.model.vertex_m, body.model.face, rows["point_m"][:, 0], rows["outward"][:, 0])
         vertex = table.faces["vertex"][rows["face"][0, 0]]
         assert rows["barycentric"][0, 0] == pytest.approx(weight[0], abs=0)
@@ -47,7 +49,7 @@ def test_touch_is_the_nearest_point_and_is_found_once() -> None:
         assert (np.sort(vertex) < 8).all() and rows["touched"][0] == 1
     before = rows.copy()
     rows["point_m"] = 7.0
-    touch(rows, 0, table.bodies, table.faces, table.nodes)
+    touch(rows, 0, gather(BodyTables, table))
     assert (rows["face"] == before["face"]).all() and (rows["barycentric"] == before["barycentric"]).all()
 
 
@@ -56,7 +58,7 @@ def test_faces_are_flat_edges_are_broken_and_a_sphere_is_round_everywhere() -> N
     size = np.cbrt(np.prod(EDGES_M))
     for outward, bent in (((0, 0, 1), 0.0), ((0, 0.3, 1), 0.0), ((0, 0.5, 1), 1 / (0.005 * size))):
         rows = rows_at((0.05, 0.0, 0.05), outward)
-        touch(rows, 0, table.bodies, table.faces, table.nodes)
+        touch(rows, 0, gather(BodyTables, table))
         assert rows["curvature_per_m"][0] == pytest.approx([bent, 1 / 0.03])
 
 
@@ -74,14 +76,14 @@ def test_pushes_are_the_shapes_linear_in_the_triangle_times_the_force() -> None:
     assert len(table.faces) == 2 * 12  # with lines and without
     assert table.bodies["shape_at"][1] == table.bodies["shape_at"][3] != table.bodies["shape_at"][2]
     rows = rows_at((0.04, -0.02, 0.05), (0, 0, 1), (0.2, -1.0, 3.0), body=3, other=0)
-    touch(rows, 0, table.bodies, table.faces, table.nodes)
+    touch(rows, 0, gather(BodyTables, table))
     face, weight = table.faces[table.bodies["face_at"][3] + rows["face"][0, 0]], rows["barycentric"][0, 0]
     expected = np.einsum("c,cxm,x->m", weight, resonator.shape[face["vertex"]].astype(float), rows["push_n_s"][0, 0])
     out = np.ones(table.columns)
-    add_push(rows, 0, 0, 0.5, table.bodies, table.faces, table.shapes, out)
+    add_push(rows, 0, 0, 0.5, gather(BodyTables, table), out)
     assert out[:21] == pytest.approx(1 + 0.5 * expected, rel=1e-12)
     assert (out[21:] == out[follows]).all()
-    add_push(rows, 0, 1, 0.5, table.bodies, table.faces, table.shapes, out[:0])  # a wall has no modes
+    add_push(rows, 0, 1, 0.5, gather(BodyTables, table), out[:0])  # a wall has no modes
 
 
 def test_a_table_grows_and_what_was_in_it_stays() -> None:

@@ -8,6 +8,8 @@ from scipy.spatial.transform import Rotation
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render.contact_rows import enter_loads, orient
+from sonic_bullet.render.groups import PairTables
+from sonic_bullet.render.standing.held_contacts import HELD
 from sonic_bullet.render.tables import HISTORY, PAIR, ROW
 from sonic_bullet.synth.strikes import SPAN
 from tests.made.stages import packed
@@ -54,6 +56,10 @@ def oriented(contacts: Contacts, quaternion: Array) -> Array:
     rows = np.zeros(len(contacts), ROW)
     orient(packed(contacts), quaternion, rows)
     return rows
+
+
+def group(pairs: Array, active: Array, counts: Array, free: Array) -> PairTables:
+    return PairTables(pairs, active, counts, free, np.zeros((0, 2, 0)), np.zeros(0, HELD))
 
 
 def test_rows_are_sorted_by_pair_and_within_it_as_they_came() -> None:
@@ -113,7 +119,7 @@ def test_histories_are_the_loads_of_the_last_steps() -> None:
             loads[-1][int(key)] = loads[-1].get(int(key), 0.0) + float(load)
         known = sorted({key for last in loads[-HISTORY:] for key, load in last.items() if load > 0})
         for pairs, active, counts, free in tables:
-            enter_loads(rows, 0, len(rows), DT, pairs, active, counts, free)
+            enter_loads(rows, 0, len(rows), DT, group(pairs, active, counts, free))
             here = pairs[active[: counts[0]]]
             assert here["key"].tolist() == known
             expected = [[last.get(key, 0.0) / DT for last in ([{}] * HISTORY + loads)[-HISTORY:]] for key in known]
@@ -129,11 +135,11 @@ def test_a_pair_with_a_voice_stays() -> None:
     pairs, active, counts, free = np.zeros(4, PAIR), np.zeros(4, np.int64), np.array([0, 4]), np.arange(4)
     rows = np.zeros(1, ROW)
     rows["key"], rows["load_n_s"] = 5, 1.0
-    enter_loads(rows, 0, 1, DT, pairs, active, counts, free)
+    enter_loads(rows, 0, 1, DT, group(pairs, active, counts, free))
     pairs["rubs"][active[0]] = 1
     for _ in range(2 * HISTORY):
-        enter_loads(rows, 0, 0, DT, pairs, active, counts, free)
+        enter_loads(rows, 0, 0, DT, group(pairs, active, counts, free))
     assert counts.tolist() == [1, 3] and not pairs["force_n"].any()
     pairs["rubs"] = 0
-    enter_loads(rows, 0, 0, DT, pairs, active, counts, free)
+    enter_loads(rows, 0, 0, DT, group(pairs, active, counts, free))
     assert counts.tolist() == [0, 4]

@@ -7,7 +7,11 @@ import pytest
 
 from sonic_bullet.records import Array
 from sonic_bullet.render.friction import FOLLOW_S, advance_friction
-from sonic_bullet.render.tables import BODY, FACE, NODE, PAIR, ROW
+from sonic_bullet.render.groups import BodyTables, PairTables, WindowTables
+from sonic_bullet.render.standing.held_contacts import HELD
+from sonic_bullet.render.tables import BODY, FACE, NODE, PAIR, PULSE, ROW, WINDOW
+from sonic_bullet.synth.bank.layout import ScratchTables
+from sonic_bullet.synth.strikes import SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
 
 SR, N, DT_S = 48000, 200, 1 / 240
@@ -47,20 +51,29 @@ class Table:
         """The drives of a step."""
         self.pairs["support_n"][0] = support_n
         out = {
-            "force": np.zeros((1, N)),
+            "force": np.zeros(N),
             "gain0": np.zeros((1, 2, COLUMNS)),
             "gain1": np.zeros((1, 2, COLUMNS)),
             "direction0": np.zeros((1, 3)),
             "direction1": np.zeros((1, 3)),
-            "drive_body": np.zeros((1, 2), np.int64),
-            "drive_slot": np.zeros(1, np.int64),
+            "body": np.zeros((1, 2), np.int64),
+            "slot": np.zeros(1, np.int64),
         }
-        count = advance_friction(
-            self.pairs, np.zeros(1, np.int64), 1, self.bodies, rows, len(rows), self.faces, self.nodes, self.shapes,
-            np.array([[0, 0, 0, 1.0]] * 2), DT_S, np.arange(N) / N, float(SR), self.gain, np.zeros(1, VOICE),
-            *out.values(),
+        window = WindowTables(
+            np.zeros(SPAN, WINDOW), np.zeros((SPAN, 2, 3)), np.tile([0, 0, 0, 1.0], (SPAN, 2, 1)),
+            np.zeros((SPAN, 2), bool), rows,
         )  # fmt: skip
-        return {name: values[:count] for name, values in out.items()}
+        window.step["dt_s"], window.step["row"] = DT_S, (0, len(rows))
+        table = BodyTables(self.bodies, self.faces, self.nodes, self.shapes, np.zeros(0), np.zeros((2, 0)))
+        pairs = PairTables(
+            self.pairs, np.zeros(1, np.int64), np.array([1, 0]), np.zeros(0, np.int64), self.gain, np.zeros(2, HELD)
+        )
+        none = np.zeros((0, 2, 0))
+        count, silence = np.zeros(2, np.int64), (none, none, none, np.zeros((0, 2), np.int64))
+        scratch = ScratchTables(count, np.zeros(0, PULSE), none, *out.values(), *silence)
+        advance_friction(0, np.arange(N) / N, float(SR), window, table, pairs, np.zeros(1, VOICE), scratch)
+        out["force"] = out["force"].reshape(1, N)
+        return {name: values[: count[1]] for name, values in out.items()}
 
 
 @pytest.mark.slow
@@ -81,7 +94,7 @@ def test_a_pair_that_slides_drives_both_bodies_and_ends_with_its_load() -> None:
     table = Table()
     table.step(table.row((0.0, 0.4), 0.3, 5.0), (0.0, 5.0))
     drives = table.step(table.row((0.0, 0.4), 0.3, 5.0), (5.0, 5.0))
-    assert drives["drive_body"].tolist() == [[0, 1]] and drives["drive_slot"].tolist() == [0]
+    assert drives["body"].tolist() == [[0, 1]] and drives["slot"].tolist() == [0]
     assert drives["force"].std() > 0
     assert (drives["force"] >= -5.0 * (1 + 1e-12)).all()  # surfaces do not pull
     assert drives["direction1"][0] == pytest.approx([0.3, 0.0, -1.0])

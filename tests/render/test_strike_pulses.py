@@ -79,19 +79,17 @@ def split_of(
         now = newest - LOOKAHEAD
         if now < 0:
             continue
-        active = stages.active[: stages.counts[0]]
+        pairs, active = stages.pairs.pair, stages.pairs.active[: stages.pairs.count[0]]
         for ahead in (0, 1):
-            force = {int(p["key"]): p["force_n"].copy() for p in stages.pairs[active]}
-            count = split_loads(
-                ahead, stages.pairs, stages.active, len(active), stages.rows, stages.window, stages.strikes
-            )
+            force = {int(p["key"]): p["force_n"].copy() for p in pairs[active]}
+            count = split_loads(ahead, stages.rendered + ahead, stages.window, stages.pairs, stages.strikes)
             for strike in stages.strikes[:count]:
                 key = pair_key(*strike["body"])
                 column = force[key][NOW + ahead :][: SPAN - 1]
                 found.append((now + ahead, key, float(np.dot(strike["share"], column)) * DT))
         for key, column in support.items():
-            at = np.flatnonzero(stages.pairs["key"][active] == key)
-            column.append(float(stages.pairs["support_n"][active[at[0]], 0]) if len(at) else 0.0)
+            at = np.flatnonzero(pairs["key"][active] == key)
+            column.append(float(pairs["support_n"][active[at[0]], 0]) if len(at) else 0.0)
     return found, support
 
 
@@ -229,7 +227,7 @@ def test_supported_are_mobile_bodies_that_carried_load() -> None:
         stages.enter(step(np.zeros((3, 3)).tolist(), contacts({pair: 2.0})))
     held = np.zeros(3)
     for number, expected in ((100, [0, 1, 0]), (3, [0, SPAN, SPAN])):
-        set_unheld_steps(1, number, stages.pairs, stages.active, stages.counts[0], stages.table.bodies, held)
+        set_unheld_steps(1, number, stages.pairs, stages.table.bodies, held)
         assert held.tolist() == expected
 
 

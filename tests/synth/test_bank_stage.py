@@ -9,8 +9,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.render.tables import PULSE
 from sonic_bullet.synth.bank import Bank, BankState, ModeSet, Translation, append, bank_kernel, empty_bank
 from sonic_bullet.synth.bank.strike_pool import enter_pulses
-from sonic_bullet.synth.pulse import pulse_table
-from tests.made.banks import Strike, advance, passed, room
+from tests.made.banks import Strike, advance, room, step_scratch, tables
 
 SR = 48_000
 
@@ -38,12 +37,8 @@ def pulses(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
 
 
 def enter(bank: Bank, state: BankState, table: Array, push: Array) -> int:
-    return int(
-        enter_pulses(
-            table, len(table), push, 0.0, 1 / 240, 0, float(SR), bank.body, bank.law, state.ringing, state.strikes,
-            state.rows, state.free, pulse_table(),
-        )
-    )  # fmt: skip
+    scratch = step_scratch(bank, 0)._replace(count=np.array([len(table), 0]), pulse=table, push=push)
+    return int(enter_pulses(0.0, 1 / 240, 0, float(SR), tables(bank, state), scratch))
 
 
 def test_a_table_of_pulses_strikes_both_bodies_as_strikes_do_one_by_one() -> None:
@@ -88,16 +83,11 @@ def test_rows_of_silent_bodies_are_zero_and_are_told_from_those_that_sound(dirty
     table["body"], table["start_s"] = [0, 0], 0.0
     enter(bank, state, table, push)
     source, pushed = np.full((1, 2, 300), float(dirty)), np.full((2, 3, 300), float(dirty))
-    sounds, scratch = np.full((2, 2), dirty), room(2, 0, 300)
-    none, gain, along = np.zeros((0, 2), np.int64), np.zeros((0, 2, bank.columns)), np.zeros((0, 3))
+    sounds, work, group = np.full((2, 2), dirty), room(2, 0, 300), tables(bank, state)
+    scratch = step_scratch(bank, 300)._replace(source=source, pushed=pushed, sounds=sounds)
     loud = []
     for step in range(600):
-        bank_kernel.advance(
-            step * 300, 300, float(SR), bank.body, bank.law, bank.weight, bank.observed, state.ringing, state.z,
-            state.driven, state.sound, state.pole, state.block, *passed(bank, state, 300), state.strikes,
-            state.rows, state.free, pulse_table(), 0, none, np.zeros((0, 300)), gain, gain, along, along, np.zeros(300),
-            *scratch, source, pushed, sounds,
-        )  # fmt: skip
+        bank_kernel.advance(step * 300, 300, float(SR), np.zeros(300), group, scratch, work)
         loud.append(sounds[0].copy())
         assert not source[0, 1].any()
         assert not pushed[1].any()

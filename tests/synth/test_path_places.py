@@ -7,12 +7,23 @@ import pytest
 
 from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.machine.groups import gather
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.synth.fractional_delay import AHEAD, KAISER_BETA, TAPS, tap_polynomials
+from sonic_bullet.synth.fractional_delay import AHEAD, KAISER_BETA, TAPS
 from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, grow
 from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear
-from sonic_bullet.synth.path_places import DONE, MEMORY_SHORT, NOT_FINITE, PLACES_SHORT, TOO_FAR
+from sonic_bullet.synth.path_places import (
+    DONE,
+    MEMORY_SHORT,
+    NOT_FINITE,
+    PLACES_SHORT,
+    TOO_FAR,
+    Arrivals,
+    Course,
+    Emission,
+    PathTables,
+)
 from tests.made.paths import propagate
 
 SR = 48_000
@@ -40,11 +51,9 @@ def called(
     n = source.shape[1]
     out = np.zeros((2, n))
     push = np.zeros((1, 3, n)) if pushed is None else pushed
-    status = hear(
-        state.at, step, n, 0, source, push, begin_m, end_m, np.array([moved]), np.arange(n) / n, path.microphone_m,
-        AT_REST, path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(),
-        np.zeros(WORK), out, 0,
-    )  # fmt: skip
+    course = Course(begin_m, end_m, np.array([moved]), np.arange(n) / n, AT_REST)
+    tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
+    status = hear(state.at, step, n, Emission(source, push, 0), course, tables, np.zeros(WORK), arrivals)
     return status, out
 
 
@@ -175,11 +184,9 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
     path, state = path_of(bodies)
     out, work, along = np.full((2, steps * n + 3), np.nan), np.full(WORK, np.nan), np.tile(x, steps)
     for k in range(steps):
-        status = hear(
-            k * n, k, n, k * n, source, pushed, place[k], place[k + 1], still, along, path.microphone_m,
-            AT_REST, path.samples_per_m, state.sources, state.places, state.lines, state.memory, tap_polynomials(),
-            work, out, k * n + 3,
-        )  # fmt: skip
+        course = Course(place[k], place[k + 1], still, along, AT_REST)
+        tables, arrivals = gather(PathTables, path, state), Arrivals(out, k * n + 3, 0)
+        status = hear(k * n, k, n, Emission(source, pushed, k * n), course, tables, work, arrivals)
         assert status == DONE
     assert np.isnan(out[:, :3]).all()
     assert np.ascontiguousarray(out[:, 3:]).tobytes() == np.concatenate(parts, axis=1).tobytes()

@@ -11,6 +11,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.synth import surface_kernel
 from sonic_bullet.synth.profile import sweep_profile
+from sonic_bullet.synth.vector import At
 from tests.made.surfaces import advance, octave_gains, octave_heights, surface_pairs
 
 SR, STEP = 48000, 200
@@ -253,7 +254,7 @@ def test_mean_of_the_force_is_the_load() -> None:
 
 @njit(nogil=True)
 def _swept(speed, x, key, height, per_sample_s, rate):  # type: ignore[no-untyped-def]
-    sweep_profile(0.0, speed, speed, x, key, height, height, per_sample_s, np.empty(0), rate, 0)
+    sweep_profile(0.0, (speed, speed), x, key, (height, height), per_sample_s, np.empty(0), At(rate, 0))
 
 
 def test_profile_is_self_affine_with_the_stated_rms() -> None:

@@ -73,16 +73,17 @@ AGAIN_S = 0.02
 
 
 @njit(nogil=True, error_model="numpy")
-def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, dt_s):
-    """Advance the contact patches of all pairs by the step whose rows are first … stop - 1.
+def hold_contacts(here, rows, table, pairs, stand):
+    """Advance the contact patches of all pairs by a step, a row of WINDOW.
 
     A patch without rows for SPAN steps is released.
     """
-    row, follow = first, 1.0 - np.exp(-dt_s / SMOOTH_S)
+    (row, stop), dt_s, bodies = here.row, here.dt_s, table.bodies
+    follow = 1.0 - np.exp(-dt_s / SMOOTH_S)
     target, place = np.empty(MOST), np.empty((MOST + 1, 2, 3))
-    for i in range(count):
-        slot = active[i]
-        pair, one = pairs[slot], held[slot]
+    for i in range(pairs.count[0]):
+        slot = pairs.active[i]
+        pair, one = pairs.pair[slot], pairs.held[slot]
         while row < stop and rows[row].key < pair.key:
             row += 1
         begin = row
@@ -103,7 +104,7 @@ def hold_contacts(pairs, active, count, held, stand, bodies, rows, first, stop, 
                 size = min(size, bodies[pair.body[side]].size_m)
         near = NEAR * size if size < np.inf else np.inf
         share = min(pair.support_n[0] / pair.force_n[NOW], 1.0) / dt_s if pair.force_n[NOW] > 0.0 else 0.0
-        _smooth(one, rows, begin, row, share, near, follow, target, place)
+        _smooth(one, rows[begin:row], share, near, follow, target, place)
         one.used_s += dt_s
         if _differs(one, near):
             one.used, one.used_s = one.count, 0.0
@@ -138,13 +139,13 @@ def _nearest(one, point, count):
 
 
 @njit(nogil=True, error_model="numpy")
-def _smooth(one, rows, begin, end, share, near, follow, target, place):
-    """Update the tracked points by rows begin … end - 1, whose loads in N·s times ``share`` are newtons.
+def _smooth(one, rows, share, near, follow, target, place):
+    """Update the tracked points by a pair's rows, whose loads in N·s times ``share`` are newtons.
 
     target (MOST,), place (MOST + 1, 2, 3): scratch for the rows' loads, and for their normals.
     """
     old = one.count
-    total = _take_rows(one, rows, begin, end, share, near, target, place)
+    total = _take_rows(one, rows, share, near, target, place)
     if total > 0.0:
         _lean(one, place[MOST], total, follow if old else 1.0)
     whole = 0.0
@@ -166,14 +167,14 @@ def _smooth(one, rows, begin, end, share, near, follow, target, place):
 
 
 @njit(nogil=True, error_model="numpy")
-def _take_rows(one, rows, begin, end, share, near, target, place):
+def _take_rows(one, rows, share, near, target, place):
     """Assign each row to the tracked point near it, or to a new one; return the sum of the loads in N.
 
     target (MOST,): loads; place (MOST + 1, 2, 3): their moments and, last, that of the normals.
     """
     target[:], place[:] = 0.0, 0.0
     old, total, most = one.count, 0.0, 0.0
-    for r in range(begin, end):
+    for r in range(len(rows)):
         load = rows[r].load_n_s * share
         if load <= 0.0:
             continue
@@ -243,13 +244,12 @@ def price_s(modes, points):
 
 
 @njit(nogil=True, error_model="numpy")
-def choose_bodies(
-    pairs, active, count, held, stand, bodies, ringing, pulses, found, drive_body, drives, dt_s, credit_s
-):
+def choose_bodies(dt_s, table, pairs, supports, bank, scratch):
     """Mark as wanted the bodies whose poles are to be computed before this step rings; return their number.
 
-    credit_s (1,): time left for it. Silent bodies wait.
+    Silent bodies wait.
     """
+    stand, credit_s, bodies = supports.stand, supports.credit_s, table.bodies
     credit_s[0] = min(credit_s[0] + SHARE * dt_s, SAVED_S)
     some = False
     for b in range(len(stand)):
@@ -262,14 +262,14 @@ def choose_bodies(
         return 0
     sounds, points = np.zeros(len(stand), np.int64), np.zeros(len(stand), np.int64)
     for side in range(2):
-        for i in range(found):
-            sounds[pulses[i].body[side]] = 1
-        for i in range(drives):
-            sounds[drive_body[i, side]] = 1
-        for i in range(count):
-            points[pairs[active[i]].body[side]] += held[active[i]].count
+        for i in range(scratch.count[0]):
+            sounds[scratch.pulse[i].body[side]] = 1
+        for i in range(scratch.count[1]):
+            sounds[scratch.body[i, side]] = 1
+        for i in range(pairs.count[0]):
+            points[pairs.pair[pairs.active[i]].body[side]] += pairs.held[pairs.active[i]].count
     for b in range(len(stand)):
-        now = ringing[b]
+        now = bank.ringing[b]
         sounds[b] |= now.ringing | now.driven | now.tiled | (now.strike >= 0)
         sounds[b] &= stand[b].stale & (stand[b].wait_s == 0.0) & (bodies[b].modes > 0)
     wanted = 0
@@ -302,17 +302,18 @@ def _longest_stale(stand, bodies, waits):
 
 
 @njit(nogil=True, error_model="numpy")
-def count_lifted(stand, bank_body, ringing, law, z, driven):
+def count_lifted(stand, bank):
     """Count the steps in which ringing may cause contact separation: Σ_k lift_k |z_k| > 1.
 
     law[6]: lift, newtons per unit of z over the load, of each mode at the point where it separates first. No step is
     missed, and some are counted in which modes separate at different points.
     """
+    ringing, law, z, driven = bank.ringing, bank.law, bank.z, bank.driven
     modes = law.shape[1]
     for b in range(len(stand)):
         if stand[b].points and (ringing[b].ringing or ringing[b].driven):
             total = 0.0
-            for m in range(bank_body[b].start, bank_body[b].stop):
+            for m in range(bank.body[b].start, bank.body[b].stop):
                 if law[6, m] > 0.0:
                     x, y = z[m] + driven[m], z[modes + m] + driven[modes + m]
                     total += law[6, m] * np.sqrt(x * x + y * y)

@@ -18,11 +18,11 @@ import numpy as np
 
 from sonic_bullet.synth.bank import drive, passing, poles, tile
 from sonic_bullet.synth.bank.kernels import uncounted
-from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM
+from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM, Lanes, Stretch
 from sonic_bullet.synth.bank.strike_pool import begins, plan_nodes, release_done
 from sonic_bullet.synth.bank.tile import BLOCK, CHUNK, ROW, ROWS
 from sonic_bullet.synth.bank.translation import translate
-from sonic_bullet.synth.vector import LANES
+from sonic_bullet.synth.vector import LANES, At
 
 RING_SCRATCH = (2 + 10 + 2 * ROW + 2 * ROWS) * CHUNK
 PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
@@ -30,40 +30,39 @@ DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
 @uncounted
-def _ring(
-    b, start, columns, z, pole, block, weight, modes, observed, sound, ringing, passes, pass_weight, pass_sound, scratch
-):  # pragma: no cover - compiled
+def _ring(b, bank, scratch):  # pragma: no cover - compiled
     """Compute the tiles of body b for the block that starts: sound (W, b, BLOCK), pass_sound (J·W, b, BLOCK).
 
-    Advances z to the next block. False where all modes are below the floor.
+    Advances z to the next block. False where all modes are below the floor. scratch: RING_SCRATCH numbers.
     """
     now, powers = scratch[: 2 * CHUNK], scratch[2 * CHUNK : 12 * CHUNK]
     table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
     column = scratch[(12 + 2 * ROW) * CHUNK : RING_SCRATCH]
-    alive, sets = False, len(observed)
+    start, columns, modes = bank.body[b].start, bank.body[b].columns, bank.law.shape[1]
+    alive, sets, partners = False, len(bank.observed), bank.passes.shape[1] if bank.ringing[b].passes else 0
     end = start + -(-columns // LANES) * LANES
     for lo in range(start, end, CHUNK):
-        count = min(CHUNK, end - lo)
-        if tile.turn(z, pole, block, modes, lo, count, FLOOR**2, now, powers) == 0:
+        lanes = Lanes(modes, lo, min(CHUNK, end - lo))
+        if tile.turn(bank.z, bank.pole, bank.block, lanes, FLOOR**2, now, powers) == 0:
             continue
         if not alive:
             alive = True
             for w in range(sets):
-                if observed[w, b]:
-                    sound[w, b, :] = 0.0
-            for j in range(passes.shape[1] if ringing[b].passes else 0):
-                pass_sound[j * sets : (j + 1) * sets, b, :] = 0.0
-        real = min(count, start + columns - lo)  # spare lanes need no table
+                if bank.observed[w, b]:
+                    bank.sound[w, b, :] = 0.0
+            for j in range(partners):
+                bank.pass_sound[j * sets : (j + 1) * sets, b, :] = 0.0
+        real = min(lanes.count, start + columns - lo)  # spare lanes need no table
         tile.rows(powers, real, table)
         for w in range(sets):
-            if observed[w, b]:
-                tile.columns(now, weight[w], modes, lo, powers, count, column)
-                tile.outer(column, table, real, sound[w, b])
-        for j in range(passes.shape[1] if ringing[b].passes else 0):
-            if passing.sounds(passes[b, j].phase):
+            if bank.observed[w, b]:
+                tile.columns(now, bank.weight[w], lanes, powers, column)
+                tile.outer(column, table, real, bank.sound[w, b])
+        for j in range(partners):
+            if passing.sounds(bank.passes[b, j].phase):
                 for w in range(j * sets, (j + 1) * sets):
-                    tile.columns(now, pass_weight[w], modes, lo, powers, count, column)
-                    tile.outer(column, table, real, pass_sound[w, b])
+                    tile.columns(now, bank.pass_weight[w], lanes, powers, column)
+                    tile.outer(column, table, real, bank.pass_sound[w, b])
     return alive
 
 
@@ -75,9 +74,10 @@ def _copy_flushed(values, out):  # pragma: no cover - compiled
 
 
 @uncounted
-def _close_block(z, driven, pole, modes, start, stop):  # pragma: no cover - compiled
+def _close_block(b, bank):  # pragma: no cover - compiled
     """End a block: what was driven within it is added to the free state of the next."""
-    for re in range(start, stop):
+    z, driven, pole, modes = bank.z, bank.driven, bank.pole, bank.law.shape[1]
+    for re in range(bank.body[b].start, bank.body[b].stop):
         im = re + modes
         x, y = driven[re], driven[im]
         z[re] += x * pole[re] - y * pole[im]
@@ -93,15 +93,13 @@ def _flush(values, count):  # pragma: no cover - compiled
 
 
 @uncounted
-def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - compiled
+def _part_force(d, n, progress, period, force, signal):  # pragma: no cover - compiled
     """Split a force's impulses between both ends of its gains; zeros behind."""
     stride, whole = signal.shape[2], n - n % LANES
     early, late = signal[d, 0], signal[d, 1]
-    drive.part_force(
-        force_n, d * force_n.shape[1], progress, period, whole, signal, 2 * d * stride, (2 * d + 1) * stride
-    )
+    drive.part_force(At(force, d * n), progress, period, whole, signal, 2 * d * stride, (2 * d + 1) * stride)
     for k in range(whole, n):
-        push = force_n[d, k] * period
+        push = force[d * n + k] * period
         push = push if push * push >= FLUSH**2 else 0.0
         early[k] = push * (1.0 - progress[k])
         late[k] = push * progress[k]
@@ -111,216 +109,185 @@ def _part_force(d, n, force_n, progress, period, signal):  # pragma: no cover - 
 
 
 @uncounted
-def list_forces(
-    n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal
-):  # pragma: no cover - compiled
-    """List forces by body: first (b+1,) where each body's begin in side, 2·drive + side each, in order of the drives.
+def list_forces(n, progress, period, bank, scratch, work):  # pragma: no cover - compiled
+    """List forces by body: work.first (b+1,) where each body's begin in side, 2·drive + side each, in their order.
 
-    drive_body (drives, 2): -1 for nobody. signal (drives, 2, stride): impulses at both ends, F·period·(1 - x) and
-    F·period·x, 0 behind the last. Gains and impulses below FLUSH become 0, the gains in place.
+    scratch.body (drives, 2): -1 for nobody; force: flat (drives, n). work.signal (drives, 2, stride): impulses at both
+    ends, F·period·(1 - x) and F·period·x, 0 behind the last. Gains and impulses below FLUSH become 0, the gains in
+    place.
     """
-    count = len(bodies)
+    first, count, drives, drive_body = work.first, len(bank.body), scratch.count[1], scratch.body
     for b in range(count + 1):
         first[b] = 0
-    for d in range(drive_count):
+    for d in range(drives):
         for s in range(2):
             if drive_body[d, s] >= 0:
                 first[drive_body[d, s] + 1] += 1
     for b in range(count):
         first[b + 1] += first[b]
     # counting sort: first advances to each body's end, and is shifted back afterwards
-    for d in range(drive_count):
+    for d in range(drives):
         for s in range(2):
             b = drive_body[d, s]
             if b >= 0:
-                side[first[b]] = 2 * d + s
+                work.side[first[b]] = 2 * d + s
                 first[b] += 1
-                _flush(gain0[d, s], bodies[b].columns)
-                _flush(gain1[d, s], bodies[b].columns)
-        _part_force(d, n, force_n, progress, period, signal)
+                _flush(scratch.gain0[d, s], bank.body[b].columns)
+                _flush(scratch.gain1[d, s], bank.body[b].columns)
+        _part_force(d, n, progress, period, scratch.force, work.signal)
     for b in range(count, 0, -1):
         first[b] = first[b - 1]
     first[0] = 0
 
 
 @uncounted
-def _press_strikes(
-    sample, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
-):  # pragma: no cover - compiled
-    """Add body b's strikes to ``lanes`` lanes from ``column`` on at ``count`` samples; return 1 where push is in use.
+def _press_strikes(b, stretch, column, keep, pushes, bank, work):  # pragma: no cover - compiled
+    """Add body b's strikes to COLUMNS lanes, or what is left, from ``column`` on; return 1 where push is in use.
 
-    pushes: 1 where push is in use already. keep, final: their phasors, and they themselves, advance.
+    pushes: 1 where push is in use already. keep: their phasors advance, and with the last lanes they themselves.
     """
-    width = rows.shape[2]
-    slot = ringing[b].strike
+    push, due = work.flat[:PUSH_SCRATCH], work.flat[DRIVE_SCRATCH - MOST_DUE : DRIVE_SCRATCH]
+    left, width, strikes = bank.body[b].stop - bank.body[b].start - column, bank.rows.shape[2], bank.strikes
+    lanes, final, sample = min(COLUMNS, left), keep and left <= COLUMNS, stretch.at + stretch.i
+    slot = bank.ringing[b].strike
     while slot >= 0:
-        if strikes[slot].modal and strikes[slot].first < sample + count:
+        if strikes[slot].modal and strikes[slot].first < sample + stretch.count:
             if not pushes:
-                drive.clear(push, lanes, count)
+                drive.clear(push, lanes, stretch.count)
                 pushes = 1
-            begin, end = plan_nodes(slot, sample, count, strikes, hertz, plan, due, final)
-            drive.strike_nodes(push, rows, slot * 8 * width + column, width, lanes, plan, due, begin, end, keep)
+            begin, end = plan_nodes(slot, sample, stretch.count, bank, work.plan, due, final)
+            rows, plan = At(bank.rows, slot * 8 * width + column), drive.Plan(work.plan, due, begin, end)
+            drive.strike_nodes(push, rows, width, lanes, plan, keep)
         slot = strikes[slot].next
     return pushes
 
 
 @uncounted
-def _drive(
-    at, i, count, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, passes, pass_weight,
-    pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Advance ``count`` samples from ``i`` on, within one of the DRIVEN; sum driven and free part."""
-    modes = law.shape[1]
-    push, partial = scratch[:PUSH_SCRATCH], scratch[PUSH_SCRATCH : PUSH_SCRATCH + DRIVEN * LANES]
-    total = scratch[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
-    due = scratch[PUSH_SCRATCH + DRIVEN * LANES + DRIVEN : DRIVE_SCRATCH]
-    ringing[b].driven = 1
-    sets, last = len(observed), passing.last_set(b, ringing, observed, passes)
+def _drive(b, stretch, bank, scratch, work):  # pragma: no cover - compiled
+    """Advance body b by a stretch within one of the DRIVEN; sum driven and free part."""
+    modes, ringing, count = bank.law.shape[1], bank.ringing[b], stretch.count
+    start, stop, f0, f1 = bank.body[b].start, bank.body[b].stop, work.first[b], work.first[b + 1]
+    push, partial = work.flat[:PUSH_SCRATCH], work.flat[PUSH_SCRATCH : PUSH_SCRATCH + DRIVEN * LANES]
+    total = work.flat[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
+    forces = drive.Forces(work.side, f0, f1, work.signal, work.signal.shape[2])
+    ringing.driven = 1
+    sets, last = len(bank.observed), passing.last_set(b, bank)
     for w in range(last + 1):  # each active weight set in turn: the state advances with the last
         j, v = w // sets - 1, w % sets  # of partner j, where it is 0 or above
-        if w > 0 and not (observed[v, b] if j < 0 else passing.sounds(passes[b, j].phase)):
+        if w > 0 and not (bank.observed[v, b] if j < 0 else passing.sounds(bank.passes[b, j].phase)):
             continue
         keep = w == last
         for k in range(count * LANES):
             partial[k] = 0.0
         for lo in range(start, stop, COLUMNS):
-            lanes, column, pushes = min(COLUMNS, stop - lo), lo - start, 0
+            lanes, column, pushes = Lanes(modes, lo, min(COLUMNS, stop - lo)), lo - start, 0
             if f1 > f0:
                 pushes = 1
-                drive.press(
-                    push, gain0, gain1, gain0.shape[2], side, f0, f1, signal, signal.shape[2], i,
-                    law, 2 * modes + lo, column, lanes, count,
-                )  # fmt: skip
-            final = keep and lo + COLUMNS >= stop
-            if ringing[b].strike >= 0:
-                pushes = _press_strikes(
-                    at + i, count, b, column, lanes, ringing, strikes, rows, hertz, pushes, keep, final, plan, due, push
-                )
+                gains = drive.Gains(scratch.gain0, scratch.gain1, scratch.gain0.shape[2], column)
+                drive.press(push, gains, forces, stretch.i, At(bank.law, 2 * modes + lo), lanes.count, count)
+            if ringing.strike >= 0:
+                pushes = _press_strikes(b, stretch, column, keep, pushes, bank, work)
             if not pushes:
                 for k in range(drive.STEP):
                     push[k] = 0.0
-            read = weight if j < 0 else pass_weight
-            at_w = w if j < 0 else w - sets
-            drive.run(driven, pole, modes, lo, lanes, read, 2 * at_w * modes + lo, push, pushes, count, partial, keep)
-        if j >= 0 or observed[w, b]:
+            weight = At(bank.weight if j < 0 else bank.pass_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
+            motion = drive.Motion(bank.driven, bank.pole)
+            drive.run(motion, lanes, weight, drive.Pushes(push, pushes), count, partial, keep)
+        if j >= 0 or bank.observed[w, b]:
             drive.across(partial, count, total)
-            free = sound[w, b] if j < 0 else pass_sound[w - sets, b]
-            for k in range(count if ringing[b].tiled else 0):
+            free, place = bank.sound[w, b] if j < 0 else bank.pass_sound[w - sets, b], (stretch.at + stretch.i) % BLOCK
+            for k in range(count if ringing.tiled else 0):
                 total[k] += free[place + k]
             if j < 0:
-                _copy_flushed(total, source[w, b, i : i + count])
+                _copy_flushed(total, scratch.source[w, b, stretch.i : stretch.i + count])
             else:
-                passing.pass_on(b, j, v, i, place, total, count, passes, ringing, passed)
+                passing.pass_on(b, j, v, stretch, total, bank, scratch.passed)
 
 
 @uncounted
-def _sound_free(
-    b, i, end, place, observed, ringing, sound, passes, pass_sound, passed, source
-):  # pragma: no cover - compiled
-    """Compute samples i … end - 1 of a body that only rings, or is silent."""
-    for w in range(len(observed)):
-        if observed[w, b]:
-            if ringing[b].tiled:
-                _copy_flushed(sound[w, b, place : place + end - i], source[w, b, i:end])
+def _sound_free(b, stretch, bank, scratch):  # pragma: no cover - compiled
+    """Compute a stretch of a body that only rings, or is silent."""
+    sets, i, end = len(bank.observed), stretch.i, stretch.i + stretch.count
+    place, ringing = (stretch.at + i) % BLOCK, bank.ringing[b]
+    for w in range(sets):
+        if bank.observed[w, b]:
+            if ringing.tiled:
+                _copy_flushed(bank.sound[w, b, place : place + end - i], scratch.source[w, b, i:end])
             else:
-                source[w, b, i:end] = 0.0
-    sets = len(observed)
-    for j in range(passes.shape[1] if ringing[b].passes and ringing[b].tiled else 0):
-        if passing.sounds(passes[b, j].phase):
+                scratch.source[w, b, i:end] = 0.0
+    for j in range(bank.passes.shape[1] if ringing.passes and ringing.tiled else 0):
+        if passing.sounds(bank.passes[b, j].phase):
             for w in range(sets):
-                free = pass_sound[j * sets + w, b, place : place + end - i]
-                passing.pass_on(b, j, w, i, place, free, end - i, passes, ringing, passed)
+                free = bank.pass_sound[j * sets + w, b, place : place + end - i]
+                passing.pass_on(b, j, w, stretch, free, bank, scratch.passed)
 
 
 @uncounted
-def _open_block(
-    b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
-    pass_sound, scratch,
-):  # fmt: skip  # pragma: no cover - compiled
+def _open_block(b, bank, scratch):  # pragma: no cover - compiled
     """Begin a block: take new poles and those that depend on the level, and compute its free sound."""
-    poles.take_coming(b, start, stop, ringing, law, pole, block, coming)
-    passing.move_on(b, ringing, passes)
-    if bodies[b].bent and ringing[b].ringing:
-        poles.bend_poles(z, driven, np.int64(BLOCK), law, start, stop, pole, block)
-    alive = ringing[b].ringing != 0 and _ring(
-        b, start, bodies[b].columns, z, pole, block, weight, law.shape[1], observed, sound, ringing, passes,
-        pass_weight, pass_sound, scratch,
-    )  # fmt: skip
-    ringing[b].tiled = ringing[b].ringing = 1 if alive else 0
+    body, ringing = bank.body[b], bank.ringing[b]
+    poles.take_coming(b, body.start, body.stop, bank.ringing, bank.law, bank.pole, bank.block, bank.coming)
+    passing.move_on(b, bank)
+    if body.bent and ringing.ringing:
+        poles.bend_poles(b, np.int64(BLOCK), bank)
+    alive = ringing.ringing != 0 and _ring(b, bank, scratch)
+    ringing.tiled = ringing.ringing = 1 if alive else 0
 
 
 @uncounted
-def _advance_modes(
-    at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
-    pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan, scratch, source,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Compute samples at … at + n - 1 of body b's modes into source (W, b, n or more)."""
-    start, stop, modes = bodies[b].start, bodies[b].stop, law.shape[1]
+def _advance_modes(at, n, b, bank, scratch, work):  # pragma: no cover - compiled
+    """Compute samples at … at + n - 1 of body b's modes into scratch.source (W, b, n or more)."""
+    ringing, pressed = bank.ringing[b], work.first[b + 1] > work.first[b]
     i = np.int64(0)  # a literal has its own type, and its callees would be compiled twice
     while i < n:
         place = (at + i) % BLOCK
         if place == 0:
-            _open_block(
-                b, start, stop, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
-                pass_weight, pass_sound, scratch,
-            )  # fmt: skip
+            _open_block(b, bank, work.flat)
         end = min(n, i + BLOCK - place)
-        if ringing[b].driven or f1 > f0 or ringing[b].strike >= 0:
+        if ringing.driven or pressed or ringing.strike >= 0:
             end = min(end, i + DRIVEN - (at + i) % DRIVEN)
-        if ringing[b].driven or f1 > f0 or begins(b, at + end, ringing, strikes):
+        stretch = Stretch(at, i, end - i)
+        if ringing.driven or pressed or begins(b, at + end, bank):
             # driven motion begins with the poles of the free ringing
-            if bodies[b].bent and (not ringing[b].driven or (at + i) % DRIVEN == 0):
-                poles.bend_poles(z, driven, np.int64(DRIVEN), law, start, stop, pole, block)
-            _drive(
-                at, i, end - i, b, place, start, stop, law, weight, observed, ringing, driven, sound, pole, passes,
-                pass_weight, pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan,
-                scratch, source,
-            )  # fmt: skip
+            if bank.body[b].bent and (not ringing.driven or (at + i) % DRIVEN == 0):
+                poles.bend_poles(b, np.int64(DRIVEN), bank)
+            _drive(b, stretch, bank, scratch, work)
         else:
-            _sound_free(b, i, end, place, observed, ringing, sound, passes, pass_sound, passed, source)
+            _sound_free(b, stretch, bank, scratch)
         if place + end - i == BLOCK:
-            ringing[b].tiled = 0
-            if ringing[b].driven:
-                _close_block(z, driven, pole, modes, start, stop)
-                ringing[b].ringing = 1
-                ringing[b].driven = 0
+            ringing.tiled = 0
+            if ringing.driven:
+                _close_block(b, bank)
+                ringing.ringing = 1
+                ringing.driven = 0
         i = end
 
 
 @uncounted
-def advance(
-    at, n, sr, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes, pass_weight,
-    pass_sound, passed, strikes, rows, free, hertz, drive_count, drive_body, force_n, gain0, gain1, direction0,
-    direction1, progress, first, side, signal, kick, plan, scratch, source, pushed, sounds,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Compute samples at … at + n - 1 into source (W, b, n or more) and pushed (b, 3, n or more).
+def advance(at, n, sr, progress, bank, scratch, work):  # pragma: no cover - compiled
+    """Compute samples at … at + n - 1 into scratch: source (W, b, n or more) and pushed (b, 3, n or more).
 
-    sounds (b, 2): 1 where a body's rows of source, of pushed are not zero. On entry it must hold for the rows passed
-    in: rows that stay silent are cleared only where it is 1. See layout.py for the tables; all in place.
+    scratch.sounds (b, 2): 1 where a body's rows of source, of pushed are not zero. On entry it must hold for the rows
+    passed in: rows that stay silent are cleared only where it is 1. progress (n,): where between its gains each sample
+    of a drive lies. See layout.py for the tables; all in place.
     """
-    period = 1.0 / sr
-    list_forces(n, drive_count, drive_body, force_n, gain0, gain1, progress, period, bodies, first, side, signal)
-    for b in range(len(bodies)):
-        f0, f1 = first[b], first[b + 1]
-        loud = ringing[b].ringing or ringing[b].driven or ringing[b].tiled or f1 > f0
-        loud = bodies[b].columns > 0 and (loud or begins(b, at + n, ringing, strikes))
+    sounds = scratch.sounds
+    list_forces(n, progress, 1.0 / sr, bank, scratch, work)
+    for b in range(len(bank.body)):
+        body, ringing = bank.body[b], bank.ringing[b]
+        loud = ringing.ringing or ringing.driven or ringing.tiled or work.first[b + 1] > work.first[b]
+        loud = body.columns > 0 and (loud or begins(b, at + n, bank))
         if loud:
-            _advance_modes(
-                at, n, b, bodies, law, weight, observed, ringing, z, driven, sound, pole, block, coming, passes,
-                pass_weight, pass_sound, passed, strikes, rows, hertz, f0, f1, side, gain0, gain1, signal, plan,
-                scratch, source,
-            )  # fmt: skip
+            _advance_modes(at, n, b, bank, scratch, work)
         elif sounds[b, 0]:
-            for w in range(len(observed)):
-                source[w, b, :] = 0.0
+            for w in range(len(bank.observed)):
+                scratch.source[w, b, :] = 0.0
         sounds[b, 0] = 1 if loud else 0
-        moves = bodies[b].rigid != 0 and translate(
-            at, n, b, bodies, ringing, strikes, hertz, f0, f1, side, signal, direction0, direction1, kick, pushed[b]
-        )
+        moves = body.rigid != 0 and translate(at, n, b, bank, scratch, work)
         if not moves and sounds[b, 1]:
-            pushed[b, :, :] = 0.0
+            scratch.pushed[b, :, :] = 0.0
         sounds[b, 1] = 1 if moves else 0
-        if ringing[b].strike >= 0:
-            release_done(b, ringing, strikes, free)
-    if passes.shape[1]:
-        passing.add_passed(n, ringing, observed, source, passed, sounds)
+        if ringing.strike >= 0:
+            release_done(b, bank)
+    if bank.passes.shape[1]:
+        passing.add_passed(n, bank, scratch)

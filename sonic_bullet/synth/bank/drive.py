@@ -12,7 +12,7 @@ State, poles and weights are flat (2·modes), real parts first. A body's lanes c
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from llvmlite import binding, ir
 from numba import types
@@ -27,15 +27,64 @@ STEP = VECTORS * LANES  # numbers a sample and pair
 TILE = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # samples whose sums fit the registers
 
 
+class Forces(NamedTuple):
+    """Forces of a body: side[first … last - 1], 2·drive + side of each, in order.
+
+    signal: flat (drives, 2, stride), impulses a0 and a1.
+    """
+
+    side: Any
+    first: int
+    last: int
+    signal: Any
+    stride: int
+
+
+class Gains(NamedTuple):
+    """Gains at both ends of a step, flat (2·drives, columns), read from ``column`` on."""
+
+    gain0: Any
+    gain1: Any
+    columns: int
+    column: int
+
+
+class Motion(NamedTuple):
+    """State and poles, flat (2·modes)."""
+
+    state: Any
+    pole: Any
+
+
+class Pushes(NamedTuple):
+    """Impulses by lane and sample; filled 0: one sample of zeros stands for all."""
+
+    push: Any
+    filled: int
+
+
+class Plan(NamedTuple):
+    """Nodes of a strike at the samples first … last - 1.
+
+    plan: flat (samples, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many of their places are empty behind the
+    last. due: impulses, node after node.
+    """
+
+    plan: Any
+    due: Any
+    first: int
+    last: int
+
+
 def _halves(e: Emit, array: Value, place: Value) -> list[Value]:
     return [e.load(array, place), e.load(array, e.shifted(place, LANES))]
 
 
 @intrinsic
-def part_force(typingctx, force_n, at, progress, period, count, signal, early, late):
+def part_force(typingctx, force, progress, period, count, signal, early, late):
     """Compute a0 and a1 of ``count`` samples, whole vectors: force·period·(1 - progress), force·period·progress.
 
-    force_n: flat from ``at`` on; signal: flat, a0 from early and a1 from late on. Impulses below FLUSH are 0.
+    force: `At`, in newton; signal: flat, a0 from early and a1 from late on. Impulses below FLUSH are 0.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -54,37 +103,19 @@ def part_force(typingctx, force_n, at, progress, period, count, signal, early, l
         e.loop(count, LANES, [], vector)
         return context.get_dummy_value()
 
-    return types.void(force_n, at, progress, period, count, signal, early, late), codegen
+    return types.void(force, progress, period, count, signal, early, late), codegen
 
 
 @intrinsic
-def press(
-    typingctx,
-    push,
-    gain0,
-    gain1,
-    columns,
-    side,
-    first,
-    last,
-    signal,
-    stride,
-    at,
-    law,
-    quadrature_at,
-    column,
-    lanes,
-    count,
-):
-    """Set push to all forces of a body on ``lanes`` lanes from column ``column`` on, ``count`` samples from ``at`` on.
+def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
+    """Set push to all forces of a body on ``lanes`` lanes, ``count`` samples from ``at`` on.
 
-    side[first … last - 1]: 2·drive + side of each force, in order. gain0, gain1: flat (2·drives, columns). signal: flat
-    (drives, 2, stride), a0 and a1. law: flat, d/ω of the first lane at quadrature_at.
+    gains: `Gains`; forces: `Forces`; quadrature: `At`, d/ω of the first lane.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        push, gain0, gain1, columns, side, first, last, signal, stride, at, law, quadrature_at, column, lanes, count = (
+        push, gain0, gain1, columns, column, side, first, last, signal, stride, at, law, quadrature_at, lanes, count = (
             e.args
         )
         forces, both = builder.sub(last, first), builder.shl(stride, e.index(1))
@@ -121,8 +152,7 @@ def press(
         e.loop(lanes, PAIR, [], pair)
         return context.get_dummy_value()
 
-    arguments = push, gain0, gain1, columns, side, first, last, signal, stride, at, law, quadrature_at, column, lanes
-    return types.void(*arguments, count), codegen
+    return types.void(push, gains, forces, at, quadrature, lanes, count), codegen
 
 
 @intrinsic
@@ -150,12 +180,11 @@ def clear(typingctx, push, lanes, count):
 
 
 @intrinsic
-def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last, keep):
-    """Add a strike's impulses of the samples first … last - 1: r <- r·E, push += r·Horner(due, D).
+def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
+    """Add a strike's impulses of the samples of a `Plan`: r <- r·E, push += r·Horner(due, D).
 
-    rows: flat, phasors r, D, E0, E1 of ``lanes`` lanes from ``at`` on, real and imaginary in turn, ``width`` apart.
-    plan: flat (samples, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many of their places are empty behind the
-    last. due: impulses, node after node. keep: False leaves r as it was.
+    rows: `At`, phasors r, D, E0, E1 of ``lanes`` lanes, real and imaginary in turn, ``width`` apart. keep: False leaves
+    r as it was.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -217,15 +246,14 @@ def strike_nodes(typingctx, push, rows, at, width, lanes, plan, due, first, last
         e.loop(lanes, PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(push, rows, at, width, lanes, plan, due, first, last, keep), codegen
+    return types.void(push, rows, width, lanes, plan, keep), codegen
 
 
 @intrinsic
-def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep):
-    """Advance ``lanes`` lanes by ``count`` samples: f <- f p + push, partial += Re(w f).
+def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
+    """Advance lanes (`layout.Lanes`) of a `Motion` by ``count`` samples: f <- f p + push, partial += Re(w f).
 
-    weight: flat, that of lane ``start`` at weight_at. pushes: 0 where push is one sample of zeros for all. keep: False
-    leaves the state as it was.
+    weight: `At`, that of the first lane. pushes: `Pushes`. keep: False leaves the state as it was.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -263,14 +291,14 @@ def run(typingctx, state, pole, modes, start, lanes, weight, weight_at, push, pu
         e.loop(lanes, PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep), codegen
+    return types.void(motion, lanes, weight, pushes, count, partial, keep), codegen
 
 
 @intrinsic
-def shove(typingctx, kick, width, side, first, last, signal, stride, direction0, direction1, count):
+def shove(typingctx, kick, width, forces, direction0, direction1, count):
     """Sum the impulses of all forces along each axis: rows 0, 2, 4 of kick (6, width) = Σ ± (a0 d0 + a1 d1).
 
-    In whole vectors. side, signal: as in `press`; direction0, direction1: flat (drives, 3), on the lower body, the
+    In whole vectors. forces: `Forces`; direction0, direction1: flat (drives, 3), on the lower body, the
     negative on the higher.
     """
 
@@ -302,7 +330,7 @@ def shove(typingctx, kick, width, side, first, last, signal, stride, direction0,
         e.loop(count, LANES, [], vector)
         return context.get_dummy_value()
 
-    return types.void(kick, width, side, first, last, signal, stride, direction0, direction1, count), codegen
+    return types.void(kick, width, forces, direction0, direction1, count), codegen
 
 
 @intrinsic

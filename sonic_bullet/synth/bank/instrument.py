@@ -17,6 +17,7 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.bank.layout import BANK_BODY, FLUSH, PAIR, RINGING, STRIKE
 from sonic_bullet.synth.bank.passing import OFF, PASS, SILENCED
 from sonic_bullet.synth.bank.tile import BLOCK
+from sonic_bullet.synth.pulse import pulse_table
 
 FASTEST_DECAY_PER_SAMPLE = 2.0
 SLOWEST_TURN = 1e-3
@@ -70,6 +71,11 @@ class Bank:
     law: Array
     weight: Array
     observed: Array
+
+    @property
+    def hertz(self) -> Array:
+        """Table of the pulse of Hertz' law."""
+        return pulse_table()
 
     @property
     def body_count(self) -> int:

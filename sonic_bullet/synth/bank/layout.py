@@ -13,8 +13,11 @@ groups of PAIR lanes; spare lanes are zero. m lanes of all bodies:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from sonic_bullet.records import Array
 from sonic_bullet.synth.vector import LANES
 
 PAIR = 2 * LANES
@@ -93,3 +96,76 @@ STRIKE = np.dtype(
     ],
     align=True,
 )
+
+
+class BankTables(NamedTuple):
+    """Bank and its state: fields of `instrument.Bank` (body … hertz) and of `instrument.BankState`."""
+
+    body: Array
+    weight: Array
+    observed: Array
+    hertz: Array
+    ringing: Array
+    law: Array
+    z: Array
+    driven: Array
+    sound: Array
+    pole: Array
+    block: Array
+    coming: Array
+    passes: Array
+    pass_weight: Array
+    pass_sound: Array
+    strikes: Array
+    rows: Array
+    free: Array
+
+
+class ScratchTables(NamedTuple):
+    """Tables of one step: pulses and drives in, sound out; see `render.synthesis_state.StepScratch`."""
+
+    count: Array
+    pulse: Array
+    push: Array
+    force: Array
+    gain0: Array
+    gain1: Array
+    direction0: Array
+    direction1: Array
+    body: Array
+    slot: Array
+    source: Array
+    passed: Array
+    pushed: Array
+    sounds: Array
+
+
+class BankWork(NamedTuple):
+    """Scratch of one call of the bank, for d drives and n samples.
+
+    first (b + 1,), side (2·d,): forces by body; signal (d, 2, n + LANES): their impulses at both ends of the gains;
+    kick (6, n + LANES): of a translation; plan (DRIVEN, 3): of a strike; flat: DRIVE_SCRATCH or RING_SCRATCH numbers.
+    """
+
+    first: Array
+    side: Array
+    signal: Array
+    kick: Array
+    plan: Array
+    flat: Array
+
+
+class Stretch(NamedTuple):
+    """Samples i … i + count - 1 of a call that begins at sample ``at``, within one of the DRIVEN or one block."""
+
+    at: int
+    i: int
+    count: int
+
+
+class Lanes(NamedTuple):
+    """Lanes start … start + count - 1 of arrays with ``modes`` real parts, then as many imaginary ones."""
+
+    modes: int
+    start: int
+    count: int

@@ -36,10 +36,10 @@ SILENCED = np.array([OFF, STEADY, STEADY, STEADY, OFF, OFF, OFF])
 
 
 @uncounted
-def move_on(b, ringing, passes):  # pragma: no cover - compiled
+def move_on(b, bank):  # pragma: no cover - compiled
     """Advance the passes of body b at the begin of its block."""
-    left = 0
-    for j in range(passes.shape[1] if ringing[b].passes else 0):
+    left, passes = 0, bank.passes
+    for j in range(passes.shape[1] if bank.ringing[b].passes else 0):
         phase = passes[b, j].phase
         if phase == COMING:
             phase = RISING
@@ -51,7 +51,7 @@ def move_on(b, ringing, passes):  # pragma: no cover - compiled
             phase = OFF
         passes[b, j].phase = phase
         left += phase != OFF
-    ringing[b].passes = left
+    bank.ringing[b].passes = left
 
 
 @uncounted
@@ -61,41 +61,39 @@ def sounds(phase):  # pragma: no cover - compiled
 
 
 @uncounted
-def last_set(b, ringing, observed, passes):  # pragma: no cover - compiled
+def last_set(b, bank):  # pragma: no cover - compiled
     """Return the last set of weights that reads body b; 0 where none does."""
-    last, sets = 0, len(observed)
+    last, sets = 0, len(bank.observed)
     for w in range(sets):
-        if observed[w, b]:
+        if bank.observed[w, b]:
             last = w
-    if ringing[b].passes:
-        for j in range(passes.shape[1]):
-            if sounds(passes[b, j].phase):
+    if bank.ringing[b].passes:
+        for j in range(bank.passes.shape[1]):
+            if sounds(bank.passes[b, j].phase):
                 last = (j + 2) * sets - 1
     return last
 
 
 @uncounted
-def pass_on(b, j, w, i, place, values, count, passes, ringing, passed):  # pragma: no cover - compiled
-    """Add ``count`` values of body b's j-th pass, set w, to its partner from sample i on.
-
-    place: of the first value within its block.
-    """
-    phase, to = passes[b, j].phase, passes[b, j].to
-    ringing[to].passed_to = 1
-    out = passed[w, to, i : i + count]
-    for k in range(count):
+def pass_on(b, j, w, stretch, values, bank, passed):  # pragma: no cover - compiled
+    """Add the values of a `layout.Stretch` of body b's j-th pass, set w, to its partner."""
+    phase, to = bank.passes[b, j].phase, bank.passes[b, j].to
+    bank.ringing[to].passed_to = 1
+    place, out = (stretch.at + stretch.i) % BLOCK, passed[w, to, stretch.i : stretch.i + stretch.count]
+    for k in range(stretch.count):
         x = (place + k) / BLOCK
         ramp = x if phase in (RISING, BRIEF) else (1.0 - x if phase == FALLING else 1.0)
         out[k] += ramp * values[k]
 
 
 @uncounted
-def add_passed(n, ringing, observed, source, passed, loud):  # pragma: no cover - compiled
-    """Add what was transmitted to the bodies' own sound; loud (b, 2): those now active."""
-    for b in range(len(ringing)):
-        if ringing[b].passed_to:
-            ringing[b].passed_to, loud[b, 0] = 0, 1
-            for w in range(len(observed)):
+def add_passed(n, bank, scratch):  # pragma: no cover - compiled
+    """Add what was transmitted to the bodies' own sound; their rows of scratch.sounds become 1."""
+    source, passed = scratch.source, scratch.passed
+    for b in range(len(bank.ringing)):
+        if bank.ringing[b].passed_to:
+            bank.ringing[b].passed_to, scratch.sounds[b, 0] = 0, 1
+            for w in range(len(bank.observed)):
                 for k in range(n):
                     value = source[w, b, k] + passed[w, b, k]
                     source[w, b, k] = value if abs(value) >= FLUSH else 0.0

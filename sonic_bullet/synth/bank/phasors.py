@@ -34,11 +34,11 @@ def _exponential(e: Emit, s: Pair, times: Value) -> Pair:
 
 
 @intrinsic
-def fill_phasors(typingctx, rows, at, width, law, modes, start, lanes, gain, share, phase, delta, stay, less):
+def fill_phasors(typingctx, rows, width, law, lanes, gain, share, times):
     """Fill rows with r = gain·share·(1 + i d/ω) e^{s·phase}, D = e^{s·delta}, E0 = e^{s·stay}, E1 = e^{s·less}.
 
-    ``lanes`` lanes from ``at`` on, real and imaginary parts in turn, rows ``width`` apart. law: flat (6, modes); gain
-    (lanes,).
+    rows: `At`, real and imaginary parts in turn, ``width`` apart. law: flat (6, modes); lanes: `layout.Lanes` of it;
+    gain: one a lane; times: (phase, delta, stay, less).
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -66,5 +66,4 @@ def fill_phasors(typingctx, rows, at, width, law, modes, start, lanes, gain, sha
         e.loop(lanes, LANES, [], body)
         return context.get_dummy_value()
 
-    arguments = rows, at, width, law, modes, start, lanes, gain, share, phase, delta, stay, less
-    return types.void(*arguments), codegen
+    return types.void(rows, width, law, lanes, gain, share, times), codegen

@@ -35,16 +35,17 @@ def take_coming(b, start, stop, ringing, law, pole, block, coming):  # pragma: n
 
 
 @uncounted
-def bend_poles(z, driven, span, law, start, stop, pole, block):  # pragma: no cover - compiled
-    """Compute the poles of a level-dependent body for the ``span`` samples to come: means over the unforced decay.
+def bend_poles(b, span, bank):  # pragma: no cover - compiled
+    """Compute the poles of body b, bent by level, for the ``span`` samples to come: means over the unforced decay.
 
     a = |z|:  ȧ = −d a (1 + (ca)^p)  ->  a(T)/a = ((1 + (ca)^p) e^{pdT} − (ca)^p)^{−1/p};   ω <- ω (1 + b ⟨a²⟩),
         ⟨a²⟩ = a² (1 − e^{−2d'T})/2d'T
     (Nayfeh & Mook 1979, eq. 2.3.35 and section 3.3), d' the block's mean decay; exact in amplitude, and in phase for c
     = 0.
     """
+    z, driven, law, pole, block = bank.z, bank.driven, bank.law, bank.pole, bank.block
     modes = law.shape[1]
-    for m in range(start, stop):
+    for m in range(bank.body[b].start, bank.body[b].stop):
         bend, damping_growth, power = law[3, m], law[4, m], law[5, m]
         if bend == 0.0 and damping_growth == 0.0:
             continue

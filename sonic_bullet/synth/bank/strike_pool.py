@@ -15,11 +15,15 @@ free: how many rows of the pool are free, then their numbers.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from sonic_bullet.records import Array
 from sonic_bullet.synth.bank.kernels import uncounted
-from sonic_bullet.synth.bank.layout import FLUSH
+from sonic_bullet.synth.bank.layout import FLUSH, Lanes
 from sonic_bullet.synth.bank.phasors import fill_phasors
+from sonic_bullet.synth.vector import At
 
 NODES_PER_PULSE = 24
 CELLS_PER_RADIAN = 4.0
@@ -30,6 +34,27 @@ AT_ONCE = 1e-3
 """Samples: a shorter pulse acts whole at the first sample that any of it has come to."""
 SHORTEST = 1e-12
 """Shortest length of a pulse, in samples; shorter ones get it."""
+
+
+class ForcePulse(NamedTuple):
+    """One pulse on one body.
+
+    Attributes
+    ----------
+    start : absolute, in samples
+    length : in samples
+    flat : 1 for a half-sine, 0 for Hertz'
+    share : factor of gain and impulse
+    gain : (columns,) φᵀĵ of the body's modes in N·s/√kg, whole groups of PAIR lanes (spare ones finite)
+    impulse_n_s : three numbers, world
+    """
+
+    start: float
+    length: float
+    flat: int
+    share: float
+    gain: Array
+    impulse_n_s: tuple[float, float, float]
 
 
 @uncounted
@@ -44,71 +69,49 @@ def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
 
 
 @uncounted
-def enter_strike(
-    b,
-    start,
-    length_s,
-    flat,
-    share,
-    gain,
-    shove_x,
-    shove_y,
-    shove_z,
-    at,
-    sr,
-    bodies,
-    law,
-    ringing,
-    strikes,
-    rows,
-    free,
-    hertz,
-):  # pragma: no cover - compiled
-    """Enter one pulse on body b: 0, or 1 where the pool is full (nothing has changed then).
+def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
+    """Enter a `ForcePulse` on body b: 0, or 1 where the pool is full (nothing has changed then).
 
-    start: absolute, in samples, at or after sample ``at``. share: factor of gain and shove. gain (columns,): φᵀĵ of the
-    body's modes in N·s/√kg, whole groups of PAIR lanes (spare ones finite). shove: impulse in N·s, world.
+    It starts at or after sample ``at``.
     """
+    strikes, free, share = bank.strikes, bank.free, pulse.share
     modal, rigid = False, False
-    for k in range(bodies[b].columns):
-        modal = modal or abs(gain[k] * share) >= FLUSH
-    if bodies[b].rigid:
-        rigid = shove_x != 0.0 or shove_y != 0.0 or shove_z != 0.0
+    for k in range(bank.body[b].columns):
+        modal = modal or abs(pulse.gain[k] * share) >= FLUSH
+    if bank.body[b].rigid:
+        rigid = pulse.impulse_n_s[0] != 0.0 or pulse.impulse_n_s[1] != 0.0 or pulse.impulse_n_s[2] != 0.0
     if not (modal or rigid):
         return 0
     if free[0] == 0:
         return 1
     slot = free[free[0]]
     free[0] -= 1
-    length = max(length_s * sr, SHORTEST)
+    length = max(pulse.length, SHORTEST)
     count = max(NODES_PER_PULSE, int(np.ceil(2.0 * length)))
     delta = length / count
-    node_start = start + 0.5 * delta
-    strikes[slot].start = start
+    node_start = pulse.start + 0.5 * delta
+    strikes[slot].start = pulse.start
     strikes[slot].node_start = node_start
     strikes[slot].length = length
-    strikes[slot].flat = flat
+    strikes[slot].flat = pulse.flat
     strikes[slot].modal = 1 if modal else 0
     strikes[slot].rigid = 1 if rigid else 0
     if modal:
-        _enter_nodes(slot, b, at, count, delta, share, gain, bodies, law, strikes, rows, hertz)
+        _enter_nodes(slot, b, at, count, delta, pulse, bank)
     if rigid:
-        _enter_cells(slot, b, sr, bodies, strikes)
-        strikes[slot].shove_n_s[0] = share * shove_x
-        strikes[slot].shove_n_s[1] = share * shove_y
-        strikes[slot].shove_n_s[2] = share * shove_z
-    _link(slot, b, ringing, strikes)
+        _enter_cells(slot, b, bank)
+        for axis in range(3):
+            strikes[slot].shove_n_s[axis] = share * pulse.impulse_n_s[axis]
+    _link(slot, b, bank)
     return 0
 
 
 @uncounted
-def _enter_nodes(
-    slot, b, at, count, delta, share, gain, bodies, law, strikes, rows, hertz
-):  # pragma: no cover - compiled
-    strike = strikes[slot]
+def _enter_nodes(slot, b, at, count, delta, pulse, bank):  # pragma: no cover - compiled
+    strike = bank.strikes[slot]
     total = 0.0
     for i in range(count):
-        total += pulse_force((i + 0.5) / count, strike.flat, hertz)
+        total += pulse_force((i + 0.5) / count, strike.flat, bank.hertz)
     first = max(int(np.ceil(strike.node_start)), at)
     within = count - 1
     if strike.length > AT_ONCE:
@@ -117,21 +120,19 @@ def _enter_nodes(
     whole = int(np.floor(1.0 / delta))
     strike.count, strike.spacing, strike.whole, strike.force_sum = count, delta, whole, total
     strike.first, strike.within, strike.upcoming, strike.phase = first, within + 1, 0, phase
-    width = rows.shape[2]
-    lanes = bodies[b].stop - bodies[b].start
-    fill_phasors(
-        rows, slot * 8 * width, width, law, law.shape[1], bodies[b].start, lanes, gain, share, phase, delta,
-        1.0 - whole * delta, 1.0 - (whole + 1) * delta,
-    )  # fmt: skip
+    width = bank.rows.shape[2]
+    lanes = Lanes(bank.law.shape[1], bank.body[b].start, bank.body[b].stop - bank.body[b].start)
+    times = phase, delta, 1.0 - whole * delta, 1.0 - (whole + 1) * delta
+    fill_phasors(At(bank.rows, slot * 8 * width), width, bank.law, lanes, pulse.gain, pulse.share, times)
 
 
 @uncounted
-def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
+def _enter_cells(slot, b, bank):  # pragma: no cover - compiled
     """Divide the pulse into cells of the sample grid, which no sample cuts through, and compute a cell's response.
 
     (1 + i d/ω) (e^{s/cells} - 1)/(s/cells): an impulse that acts evenly over the cell, at the cell's end.
     """
-    strike, body = strikes[slot], bodies[b]
+    strike, body = bank.strikes[slot], bank.body[b]
     s = complex(body.rigid_log_pole[0], body.rigid_log_pole[1])
     least = int(np.ceil(CELLS_PER_RADIAN * -s.real))
     cells = max(least, int(np.ceil(min(NODES_PER_PULSE / strike.length, 1.0 * MOST_CELLS))))
@@ -146,8 +147,9 @@ def _enter_cells(slot, b, sr, bodies, strikes):  # pragma: no cover - compiled
 
 
 @uncounted
-def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
+def _link(slot, b, bank):  # pragma: no cover - compiled
     """Put a strike behind those of its body that start before it or with it."""
+    ringing, strikes = bank.ringing, bank.strikes
     before, after = -1, ringing[b].strike
     while after >= 0 and strikes[after].node_start <= strikes[slot].node_start:
         before, after = after, strikes[after].next
@@ -159,8 +161,9 @@ def _link(slot, b, ringing, strikes):  # pragma: no cover - compiled
 
 
 @uncounted
-def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
+def release_done(b, bank):  # pragma: no cover - compiled
     """Free the rows of body b's strikes that have acted."""
+    ringing, strikes, free = bank.ringing, bank.strikes, bank.free
     before, slot = -1, ringing[b].strike
     while slot >= 0:
         after = strikes[slot].next
@@ -177,24 +180,24 @@ def release_done(b, ringing, strikes, free):  # pragma: no cover - compiled
 
 
 @uncounted
-def begins(b, end, ringing, strikes):  # pragma: no cover - compiled
+def begins(b, end, bank):  # pragma: no cover - compiled
     """Return whether a strike on the modes of body b has nodes to come before sample ``end``."""
-    slot = ringing[b].strike
+    slot = bank.ringing[b].strike
     while slot >= 0:
-        if strikes[slot].modal and strikes[slot].first < end:
+        if bank.strikes[slot].modal and bank.strikes[slot].first < end:
             return True
-        slot = strikes[slot].next
+        slot = bank.strikes[slot].next
     return False
 
 
 @uncounted
-def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no cover - compiled
+def plan_nodes(slot, at, count, bank, plan, due, final):  # pragma: no cover - compiled
     """Plan which nodes of a strike act at the samples at … at + count - 1.
 
     Fills plan (count, 3) and due as `drive.strike_nodes` reads them; returns the samples they begin and end with.
     final: the strike advances.
     """
-    strike = strikes[slot]
+    strike = bank.strikes[slot]
     upcoming, phase, filled = strike.upcoming, strike.phase, 0
     begin = max(strike.first - at, 0)
     k = begin
@@ -209,7 +212,7 @@ def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no
         real = min(nodes, strike.count - upcoming)
         plan[k, 1], plan[k, 2] = real, nodes - real
         for i in range(upcoming, upcoming + real):
-            due[filled] = pulse_force((i + 0.5) / strike.count, strike.flat, hertz) / strike.force_sum
+            due[filled] = pulse_force((i + 0.5) / strike.count, strike.flat, bank.hertz) / strike.force_sum
             filled += 1
         upcoming += real
         k += 1
@@ -220,25 +223,23 @@ def plan_nodes(slot, at, count, strikes, hertz, plan, due, final):  # pragma: no
 
 
 @uncounted
-def enter_pulses(
-    pulses, count, push, begin_s, after_s, at, sr, bodies, law, ringing, strikes, rows, free, hertz
-):  # pragma: no cover - compiled
+def enter_pulses(begin_s, after_s, at, sr, bank, scratch):  # pragma: no cover - compiled
     """Enter a step's pulses on both bodies of each, in order; return how many, fewer where the pool is full.
 
-    pulses: PULSE rows of render.tables; push (pulses, 2, columns): Uᵀj of the whole impulse. begin_s, after_s: of the
-    rendered step, absolute: those found in the step after it count from there. at: the next sample.
+    They stand in scratch: pulse, PULSE rows of render.tables, and push (pulses, 2, columns), Uᵀj of the whole impulse.
+    begin_s, after_s: of the rendered step, absolute: those found in the step after it count from there. at: the next
+    sample.
     """
+    count = scratch.count[0]
     for i in range(count):
-        if free[0] < 2:
+        if bank.free[0] < 2:
             return i
-        pulse = pulses[i]
+        pulse = scratch.pulse[i]
         begin = after_s if pulse.ahead else begin_s
         start = max((begin + pulse.start_s) * sr, float(at))
         for side in range(2):
-            sign = 1.0 - 2.0 * side
-            enter_strike(
-                pulse.body[side], start, pulse.length_s, pulse.flat, pulse.share, push[i, side],
-                sign * pulse.impulse_n_s[0], sign * pulse.impulse_n_s[1], sign * pulse.impulse_n_s[2],
-                at, sr, bodies, law, ringing, strikes, rows, free, hertz,
-            )  # fmt: skip
+            sign, j = 1.0 - 2.0 * side, pulse.impulse_n_s
+            impulse = sign * j[0], sign * j[1], sign * j[2]
+            one = ForcePulse(start, pulse.length_s * sr, pulse.flat, pulse.share, scratch.push[i, side], impulse)
+            enter_strike(pulse.body[side], one, at, bank)
     return count

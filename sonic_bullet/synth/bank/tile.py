@@ -28,11 +28,11 @@ _TILE_ROWS = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  
 
 
 @intrinsic
-def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  # type: ignore[no-untyped-def]
+def turn(typingctx, z, pole, block, lanes, floor, now, powers):  # type: ignore[no-untyped-def]
     """Take the state at a block's start: now = z (0 where |z|² < floor), z <- now·p^256, powers = p, p², p⁴, p⁸, p¹⁶.
 
-    Returns the active lanes. z, pole, block: flat (2·modes), real parts first; now (2·CHUNK); powers (10·CHUNK). start,
-    count: the chunk, count a multiple of LANES.
+    Returns the active lanes. z, pole, block: flat (2·modes), real parts first; now (2·CHUNK); powers (10·CHUNK). lanes:
+    the chunk, `layout.Lanes`, its count a multiple of LANES.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -61,7 +61,7 @@ def turn(typingctx, z, pole, block, modes, start, count, floor, now, powers):  #
         (alive,) = e.loop(count, LANES, [ir.Constant(BITS, [0] * LANES)], body)
         return builder.zext(builder.bitcast(alive, ir.IntType(LANES)), I64)
 
-    return types.int64(z, pole, block, modes, start, count, floor, now, powers), codegen
+    return types.int64(z, pole, block, lanes, floor, now, powers), codegen
 
 
 @intrinsic
@@ -102,12 +102,12 @@ def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def columns(typingctx, now, weight, modes, start, powers, count, column):  # type: ignore[no-untyped-def]
+def columns(typingctx, now, weight, lanes, powers, column):  # type: ignore[no-untyped-def]
     """Fill column (2·ROWS, CHUNK) with Re u s^q, then -Im u s^q, q = 0 … 15, u = weight·now. weight: flat (2·modes)."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        now, weight, modes, start, powers, count, column = e.args
+        now, weight, modes, start, count, powers, column = e.args
 
         def body(k: Value, carried: list[Value]) -> list[Value]:
             re = builder.add(start, k)
@@ -128,7 +128,7 @@ def columns(typingctx, now, weight, modes, start, powers, count, column):  # typ
         e.loop(count, LANES, [], body)
         return context.get_dummy_value()
 
-    return types.void(now, weight, modes, start, powers, count, column), codegen
+    return types.void(now, weight, lanes, powers, column), codegen
 
 
 @intrinsic

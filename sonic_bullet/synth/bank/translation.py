@@ -32,9 +32,9 @@ def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
 
 
 @uncounted
-def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - compiled
+def _strike_cells(at, n, slot, bank, kick):  # pragma: no cover - compiled
     """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
-    strike = strikes[slot]
+    strike, hertz = bank.strikes[slot], bank.hertz
     cells = strike.cells
     first, last = strike.cell_first // cells + 1, (strike.cell_stop - 1) // cells + 1
     turn = complex(strike.cell_turn[0], strike.cell_turn[1])
@@ -56,10 +56,10 @@ def _strike_cells(at, n, slot, strikes, hertz, kick):  # pragma: no cover - comp
 
 
 @uncounted
-def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - compiled
+def _run_axes(at, n, b, bank, kick, pushed):  # pragma: no cover - compiled
     """Run the recursion on all axes through the samples at … at + n - 1."""
-    p_re, p_im, weight = bodies[b].rigid_pole[0], bodies[b].rigid_pole[1], bodies[b].rigid_weight
-    motion = ringing[b].motion
+    body, motion = bank.body[b], bank.ringing[b].motion
+    p_re, p_im, weight = body.rigid_pole[0], body.rigid_pole[1], body.rigid_weight
     x, xi, y, yi, z, zi = motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1], motion[2, 0], motion[2, 1]
     floor = FLOOR**2
     k = 0
@@ -87,31 +87,30 @@ def _run_axes(at, n, b, bodies, ringing, kick, pushed):  # pragma: no cover - co
                 row[i] = 0.0
     motion[0, 0], motion[0, 1], motion[1, 0], motion[1, 1], motion[2, 0], motion[2, 1] = x, xi, y, yi, z, zi
     moves = x != 0.0 or xi != 0.0 or y != 0.0 or yi != 0.0 or z != 0.0 or zi != 0.0
-    ringing[b].moving = 1 if moves else 0
+    bank.ringing[b].moving = 1 if moves else 0
 
 
 @uncounted
-def translate(
-    at, n, b, bodies, ringing, strikes, hertz, first, last, side, signal, direction0, direction1, kick, pushed
-):  # pragma: no cover - compiled
-    """Compute samples at … at + n - 1 of body b's translations into pushed (3, n). False where they rest.
+def translate(at, n, b, bank, scratch, work):  # pragma: no cover - compiled
+    """Compute samples at … at + n - 1 of body b's translations into scratch.pushed[b]. False where they rest.
 
-    side[first … last - 1]: 2·drive + side of its forces; signal (drives, 2, more than n): their impulses at both ends;
-    kick (6, n and a vector more): scratch.
+    work: its forces are listed (`bank_kernel.list_forces`).
     """
+    strikes, kick, first, last = bank.strikes, work.kick, work.first[b], work.first[b + 1]
     struck = False
-    slot = ringing[b].strike
+    slot = bank.ringing[b].strike
     while slot >= 0:
         struck = struck or (strikes[slot].rigid != 0 and strikes[slot].start < at + n)
         slot = strikes[slot].next
-    if not (struck or last > first or ringing[b].moving):
+    if not (struck or last > first or bank.ringing[b].moving):
         return False
-    drive.shove(kick, kick.shape[1], side, first, last, signal, signal.shape[2], direction0, direction1, n)
-    _gather_forces(n, bodies[b].rigid_onset[0], bodies[b].rigid_onset[1], kick)
-    slot = ringing[b].strike
+    forces = drive.Forces(work.side, first, last, work.signal, work.signal.shape[2])
+    drive.shove(kick, kick.shape[1], forces, scratch.direction0, scratch.direction1, n)
+    _gather_forces(n, bank.body[b].rigid_onset[0], bank.body[b].rigid_onset[1], kick)
+    slot = bank.ringing[b].strike
     while struck and slot >= 0:
         if strikes[slot].rigid:
-            _strike_cells(at, n, slot, strikes, hertz, kick)
+            _strike_cells(at, n, slot, bank, kick)
         slot = strikes[slot].next
-    _run_axes(at, n, b, bodies, ringing, kick, pushed)
+    _run_axes(at, n, b, bank, kick, scratch.pushed[b])
     return True
