@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -50,6 +50,13 @@ def named(values):  # type: ignore[no-untyped-def]
 
 def state_of() -> State:
     return start(Setup(48_000, (Microphone(np.zeros(3)),), 0, Air()))
+
+
+def is_same(value: Any, other: Any) -> bool:
+    """Whether arrays are the same memory, or numbers equal."""
+    if isinstance(value, np.ndarray):
+        return bool(value.__array_interface__ == other.__array_interface__)
+    return bool(value == other)
 
 
 def test_a_kernel_finds_each_value_under_the_name_of_its_field() -> None:
