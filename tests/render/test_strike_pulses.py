@@ -293,7 +293,7 @@ def test_a_pulse_is_its_rows_sum() -> None:
     assert pulse["start_s"] == pytest.approx(1e-3)
     assert box.model is not None
     expected = np.zeros(12)
-    for r in stages.rows[stages.rows["key"] == 1]:
+    for r in stages.window.row[stages.window.row["key"] == 1]:
         weight, face = r["barycentric"][0], table.faces[table.bodies["face_at"][0] + r["face"][0]]
         shape = box.model.shape[face["vertex"]].astype(float)
         expected += scale * np.einsum("c,cxm,x->m", weight, shape, r["push_n_s"][0])
@@ -355,7 +355,7 @@ def test_bits_hang_on_no_place_in_a_table() -> None:
     rng = np.random.default_rng(5)
     bodies = [box_body((0.1, 0.08, 0.05), np.linspace(300, 9000, 9), body_id=i) for i in range(5)] + [wall_body()]
     small, large = Stages(bodies, pairs=16, rows=24), Stages(bodies, pairs=99, rows=200)
-    large.free[:] = rng.permutation(99)
+    large.pairs.free[:] = rng.permutation(99)
     count = 0
     for _ in range(80):
         rows = [
