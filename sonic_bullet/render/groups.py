@@ -83,7 +83,7 @@ class PairTables(NamedTuple):
 
     pair: Array
     active: Array
-    count: Array
+    count: Array  # type: ignore[assignment]
     free: Array
     gain: Array
     held: Array

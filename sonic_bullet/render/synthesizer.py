@@ -105,7 +105,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
-    given, done, resume = StepTables(table, contacts, *poses, aim), 0, driver.ANEW
+    given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.ANEW
     frames = Frames(begin, int(by_body), state.reads, pressure, out)
     while done < len(steps):
         values = (*Call(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())

@@ -78,7 +78,7 @@ class Emission(NamedTuple):
 
     source: Array
     pushed: Array
-    first: int
+    first: int | np.int64
 
 
 class Course(NamedTuple):

@@ -124,7 +124,7 @@ class BankTables(NamedTuple):
 class ScratchTables(NamedTuple):
     """Tables of one step: pulses and drives in, sound out; see `render.synthesis_state.StepScratch`."""
 
-    count: Array
+    count: Array  # type: ignore[assignment]
     pulse: Array
     push: Array
     force: Array
@@ -159,8 +159,8 @@ class Stretch(NamedTuple):
     """Samples i … i + count - 1 of a call that begins at sample ``at``, within one of the DRIVEN or one block."""
 
     at: int
-    i: int
-    count: int
+    i: int | np.int64
+    count: int | np.int64  # type: ignore[assignment]
 
 
 class Lanes(NamedTuple):
@@ -168,4 +168,4 @@ class Lanes(NamedTuple):
 
     modes: int
     start: int
-    count: int
+    count: int  # type: ignore[assignment]
