@@ -19,7 +19,7 @@ from struct import Struct
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.groups import grouping
+from sonic_bullet.machine.grouping import grouping
 from sonic_bullet.render.contact_rows import enter_loads, orient
 from sonic_bullet.render.friction import advance_friction
 from sonic_bullet.render.groups import Groups

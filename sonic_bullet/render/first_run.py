@@ -14,7 +14,7 @@ from typing import Any
 import numba
 from numba import types
 
-from sonic_bullet.machine.groups import group_types
+from sonic_bullet.machine.grouping import group_types
 from sonic_bullet.machine.progress import show_stage
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.render import driver

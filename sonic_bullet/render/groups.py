@@ -3,7 +3,7 @@
     State -> `gather` -> window, table, pairs, supports, bank, scratch, path  ┐
     steps at hand -> call, given, frames                                      ┴ one flat tuple -> driver.advance_steps
 
-The driver makes the groups of it (`machine.groups`). tests/render/test_groups.py holds that nothing is left out.
+The driver makes the groups of it (`machine.grouping`). tests/render/test_groups.py holds that nothing is left out.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sonic_bullet.synth.bank.layout import BankTables, ScratchTables
 from sonic_bullet.synth.path_places import PathTables
 
 
-class Call(NamedTuple):
+class DriverCall(NamedTuple):
     """What is asked of the driver in this call.
 
     first: the first step of the table that is not done; taken: number of the table's first; pause: return before `hear`
@@ -99,7 +99,7 @@ class SupportTables(NamedTuple):
 class Groups(NamedTuple):
     """All that the driver takes, in this order."""
 
-    call: Call
+    call: DriverCall
     given: StepTables
     frames: Frames
     window: WindowTables

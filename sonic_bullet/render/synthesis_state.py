@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from sonic_bullet.machine.groups import gather, kinds_of
+from sonic_bullet.machine.grouping import gather, kinds_of
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor, channels_of
 from sonic_bullet.records.contacts import first_bodies
 from sonic_bullet.render.body_table import BodyTable

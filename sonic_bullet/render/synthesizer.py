@@ -21,7 +21,7 @@ from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
-from sonic_bullet.render.groups import Call, Frames, StepTables
+from sonic_bullet.render.groups import DriverCall, Frames, StepTables
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.ringing_on import with_tail
@@ -108,7 +108,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.ANEW
     frames = Frames(begin, int(by_body), state.reads, pressure, out)
     while done < len(steps):
-        values = (*Call(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
+        values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
         if not getattr(driver.advance_steps, "overloads", True):
             make_driver(values)
         more, status = driver.advance_steps(values)

@@ -8,14 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.machine.groups import gather
+from sonic_bullet.machine.grouping import gather
 from sonic_bullet.records import Array
 from sonic_bullet.render.tables import PULSE
 from sonic_bullet.synth.bank import Bank, BankState, bank_kernel
 from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.synth.bank.instrument import flushed
 from sonic_bullet.synth.bank.layout import DRIVEN, BankTables, BankWork, ScratchTables
-from sonic_bullet.synth.bank.strike_pool import ForcePulse, enter_strike
+from sonic_bullet.synth.bank.strike_pool import BodyPulse, enter_strike
 from sonic_bullet.synth.vector import LANES
 
 NOWHERE = np.zeros(3)
@@ -110,7 +110,7 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
     for strike in strikes:
         x, y, z = (float(value) for value in strike.shove_n_s)
         gain, length = _padded(bank, strike.gain), float(strike.length_s) * float(bank.sr)
-        pulse = ForcePulse(float(strike.start), length, int(strike.flat), 1.0, gain, (x, y, z))
+        pulse = BodyPulse(float(strike.start), length, int(strike.flat), 1.0, gain, (x, y, z))
         enter_strike(strike.body, pulse, state.at, tables(bank, state))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.machine.groups import gather
+from sonic_bullet.machine.grouping import gather
 from sonic_bullet.records import Array
 from sonic_bullet.synth.path import Path, PathState, grow
 from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.machine.groups import gather
+from sonic_bullet.machine.grouping import gather
 from sonic_bullet.records import Air, Array, Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render.body_table import BodyTable

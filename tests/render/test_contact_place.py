@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.groups import gather
+from sonic_bullet.machine.grouping import gather
 from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
 from sonic_bullet.render.groups import BodyTables
 from sonic_bullet.render.tables import ROW

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.groups import gather, grouping, kinds_of
+from sonic_bullet.machine.grouping import gather, grouping, kinds_of
 from sonic_bullet.records import Air, Microphone
-from sonic_bullet.render.groups import Call, Frames, Groups, StepTables
+from sonic_bullet.render.groups import DriverCall, Frames, Groups, StepTables
 from sonic_bullet.render.synthesis_state import Setup, State, StepScratch, TouchingPairs, Window, start
 from sonic_bullet.synth.bank import BankState
 from sonic_bullet.synth.path import PathState
@@ -73,7 +73,7 @@ def test_a_kernel_refuses_other_counts() -> None:
 def test_values_of_the_state_stand_in_the_order_of_the_groups_fields() -> None:
     """The first three groups are the call's, all others the state's: each value is the attribute of that name."""
     state, kinds = state_of(), kinds_of(Groups)
-    assert tuple(kinds) == Groups._fields and list(kinds.values())[:3] == [Call, StepTables, Frames]
+    assert tuple(kinds) == Groups._fields and list(kinds.values())[:3] == [DriverCall, StepTables, Frames]
     values = iter(state.tables())
     holders = {
         "window": [state.window], "table": [state.table], "pairs": [state.pairs], "supports": [state],

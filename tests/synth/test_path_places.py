@@ -7,7 +7,7 @@ import pytest
 
 from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.groups import gather
+from sonic_bullet.machine.grouping import gather
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.fractional_delay import AHEAD, KAISER_BETA, TAPS

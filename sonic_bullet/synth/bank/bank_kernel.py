@@ -156,7 +156,7 @@ def _press_strikes(b, stretch, column, keep, pushes, bank, work):  # pragma: no 
                 drive.clear(push, lanes, stretch.count)
                 pushes = 1
             begin, end = plan_nodes(slot, sample, stretch.count, bank, work.plan, due, final)
-            rows, plan = At(bank.rows, slot * 8 * width + column), drive.Plan(work.plan, due, begin, end)
+            rows, plan = At(bank.rows, slot * 8 * width + column), drive.NodePlan(work.plan, due, begin, end)
             drive.strike_nodes(push, rows, width, lanes, plan, keep)
         slot = strikes[slot].next
     return pushes
@@ -191,7 +191,7 @@ def _drive(b, stretch, bank, scratch, work):  # pragma: no cover - compiled
                 for k in range(drive.STEP):
                     push[k] = 0.0
             weight = At(bank.weight if j < 0 else bank.pass_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
-            motion = drive.Motion(bank.driven, bank.pole)
+            motion = drive.DrivenModes(bank.driven, bank.pole)
             drive.run(motion, lanes, weight, drive.Pushes(push, pushes), count, partial, keep)
         if j >= 0 or bank.observed[w, b]:
             drive.across(partial, count, total)

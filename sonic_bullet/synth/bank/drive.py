@@ -49,7 +49,7 @@ class Gains(NamedTuple):
     column: int
 
 
-class Motion(NamedTuple):
+class DrivenModes(NamedTuple):
     """State and poles, flat (2·modes)."""
 
     state: Any
@@ -63,12 +63,8 @@ class Pushes(NamedTuple):
     filled: int
 
 
-class Plan(NamedTuple):
-    """Nodes of a strike at the samples first … last - 1.
-
-    plan: flat (samples, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many of their places are empty behind the
-    last. due: impulses, node after node.
-    """
+class NodePlan(NamedTuple):
+    """Nodes of a strike at the samples first … last - 1; plan, due: see `strike_pool.plan_nodes`."""
 
     plan: Any
     due: Any
@@ -181,7 +177,7 @@ def clear(typingctx, push, lanes, count):
 
 @intrinsic
 def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
-    """Add a strike's impulses of the samples of a `Plan`: r <- r·E, push += r·Horner(due, D).
+    """Add a strike's impulses of the samples of a `NodePlan`: r <- r·E, push += r·Horner(due, D).
 
     rows: `At`, phasors r, D, E0, E1 of ``lanes`` lanes, real and imaginary in turn, ``width`` apart. keep: False leaves
     r as it was.
@@ -251,7 +247,7 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
 
 @intrinsic
 def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
-    """Advance lanes (`layout.Lanes`) of a `Motion` by ``count`` samples: f <- f p + push, partial += Re(w f).
+    """Advance lanes (`layout.Lanes`) of a `DrivenModes` by ``count`` samples: f <- f p + push, partial += Re(w f).
 
     weight: `At`, that of the first lane. pushes: `Pushes`. keep: False leaves the state as it was.
     """

@@ -178,19 +178,14 @@ def empty_bank(sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0) -> t
     """
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
-    bank = Bank(
-        int(sr),
-        np.zeros(0, BANK_BODY),
-        np.zeros((6, 0)),
-        np.zeros((weight_sets, 0)),
-        np.zeros((weight_sets, 0), bool),
-    )
+    none = np.zeros((weight_sets, 0))
+    bank = Bank(int(sr), np.zeros(0, BANK_BODY), np.zeros((6, 0)), none, none.astype(bool))
     z, driven, pole, block = np.zeros((4, 0))
-    silent, none = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
+    silent, strikes = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
     rows, free = np.zeros((0, 8, PAIR)), np.zeros(1, np.int64)
     state = BankState(
         int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)), np.zeros((0, passes), PASS),
-        np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)), np.zeros(0, RINGING), none,
+        np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)), np.zeros(0, RINGING), strikes,
         rows, free,
     )  # fmt: skip
     return bank, state

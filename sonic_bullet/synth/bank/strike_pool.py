@@ -36,7 +36,7 @@ SHORTEST = 1e-12
 """Shortest length of a pulse, in samples; shorter ones get it."""
 
 
-class ForcePulse(NamedTuple):
+class BodyPulse(NamedTuple):
     """One pulse on one body.
 
     Attributes
@@ -70,7 +70,7 @@ def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
 
 @uncounted
 def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
-    """Enter a `ForcePulse` on body b: 0, or 1 where the pool is full (nothing has changed then).
+    """Enter a `BodyPulse` on body b: 0, or 1 where the pool is full (nothing has changed then).
 
     It starts at or after sample ``at``.
     """
@@ -194,7 +194,8 @@ def begins(b, end, bank):  # pragma: no cover - compiled
 def plan_nodes(slot, at, count, bank, plan, due, final):  # pragma: no cover - compiled
     """Plan which nodes of a strike act at the samples at … at + count - 1.
 
-    Fills plan (count, 3) and due as `drive.strike_nodes` reads them; returns the samples they begin and end with.
+    Fills plan (count, 3): 0 for E0, 1 for E1, -1 for none; nodes; and how many of their places are empty behind the
+    last; and due: impulses, node after node. Returns the samples they begin and end with.
     final: the strike advances.
     """
     strike = bank.strikes[slot]
@@ -240,6 +241,6 @@ def enter_pulses(begin_s, after_s, at, sr, bank, scratch):  # pragma: no cover -
         for side in range(2):
             sign, j = 1.0 - 2.0 * side, pulse.impulse_n_s
             impulse = sign * j[0], sign * j[1], sign * j[2]
-            one = ForcePulse(start, pulse.length_s * sr, pulse.flat, pulse.share, scratch.push[i, side], impulse)
+            one = BodyPulse(start, pulse.length_s * sr, pulse.flat, pulse.share, scratch.push[i, side], impulse)
             enter_strike(pulse.body[side], one, at, bank)
     return count
