@@ -34,6 +34,7 @@ FIELD = re.compile(
 
 API = (
     ("sonic_bullet", "What `import sonic_bullet` offers.", None),
+    ("sonic_bullet.listener.world", "What a simulator implements to be listened to.", ("World",)),
     ("sonic_bullet.records.simulated", "What a simulator says, as a contact log holds it.", ("Body", "Change")),
     (
         "sonic_bullet.comparing.comparison_record",

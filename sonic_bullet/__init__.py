@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from sonic_bullet.records.errors import SonicBulletError
     from sonic_bullet.render import render_log
     from sonic_bullet.session import Listener, attach
+    from sonic_bullet.session.log_writer import LogWriter
 
 __version__ = "0.1.0"
 
@@ -53,6 +54,7 @@ _HOME = {
     "Contacts": "records.contacts",
     "Head": "records",
     "Listener": "session",
+    "LogWriter": "session.log_writer",
     "Material": "records",
     "Microphone": "records",
     "MicrophonePath": "records",
@@ -87,6 +89,7 @@ __all__ = [
     "Contacts",
     "Head",
     "Listener",
+    "LogWriter",
     "Material",
     "Microphone",
     "MicrophonePath",

@@ -1,6 +1,7 @@
-"""Triangle surfaces: areas, volumes, normals, curvature (triangles) and the nearest point on one (nearest_point)."""
+"""Triangle surfaces: areas, normals, curvature (triangles), the nearest point on one; inertia of shapes (solids)."""
 
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, closest_point, nearest, surface_index
+from sonic_bullet.geometry.solids import shape_volume_m3, solid_of
 from sonic_bullet.geometry.triangles import (
     CREASE_RAD,
     HEAVIEST_KG,
@@ -30,6 +31,8 @@ __all__ = [
     "nearest",
     "outward_normals",
     "oversize",
+    "shape_volume_m3",
+    "solid_of",
     "surface_index",
     "volume_m3",
     "welded",

@@ -6,15 +6,18 @@ roster -> START.index, START.pose, and the indices (b,) of those whose poses a s
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from sonic_bullet.listener.frames import Roster, rows_of
 from sonic_bullet.listener.start import start_table
-from sonic_bullet.records import Array, Body
+from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import first_bodies
+from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mounting import Mounting, usual_mounting
 
 
 class KnownBodies:
@@ -86,3 +89,38 @@ def alike(first: Body, second: Body) -> bool:
     """Tell whether two records can be of one body: same mass, inertia and curvature."""
     same = first.mass_kg == second.mass_kg and np.array_equal(first.inertia_kg_m2, second.inertia_kg_m2)
     return same and np.array_equal(first.curvature_per_m, second.curvature_per_m, equal_nan=True)
+
+
+def sounding_body(
+    record: Body,
+    *,
+    material: Material | None,
+    model: ModalModel | None,
+    volume_m3: float | None = None,
+    shapes: Sequence[Shape] = (),
+    options: ModalOptions | None = None,
+    mounting: Mounting | None = None,
+) -> Body:
+    """Return the record of a link with what it is made of.
+
+    Parameters
+    ----------
+    record
+        Of the silent link.
+    volume_m3
+        None: the model's, or 0.
+    shapes
+        In place of its own; a single sphere determines the curvature.
+    mounting
+        How it is held; None: the usual mounting of its mass.
+    """
+    volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
+    held = usual_mounting(record.mass_kg) if mounting is None else mounting
+    record = replace(record, material=material, model=model, volume_m3=volume, options=options, mounting=held)
+    return replace(record, curvature_per_m=only_curvature(shapes)) if shapes else record
+
+
+def only_curvature(shapes: Sequence[Shape]) -> float:
+    """Return the curvature of a body that is one sphere, else NaN."""
+    ball = len(shapes) == 1 and shapes[0].kind == "sphere" and shapes[0].size_m[0] > 0
+    return 1 / float(shapes[0].size_m[0]) if ball else math.nan

@@ -201,6 +201,30 @@ def scene_file(_: Any, folder: Path) -> Made:
     return scene.render_scene, {"path": folder / "scene.py", **rest}
 
 
+BALL = {"name": "ball", "mesh": sb.Shape("sphere", size_m=(0.02, 0, 0)), "material": None}
+CONTACT = {"pair": [[0, 1]], "point_m": [[0, 0, 0]], "normal": [[0, 0, 1]], "impulse_n_s": [[0, 0, 1]], "gap_m": [0]}
+TWISTS = {"velocity_m_s": np.zeros((2, 3)), "spin_rad_s": np.zeros((2, 3))}
+
+
+def log_adding(*_: Any) -> Made:
+    solid = {"mass_kg": 0.1, "inertia_kg_m2": [1e-5] * 3, "centre_m": [0, 0, 0]}
+    return sb.LogWriter().add, {**BALL, **solid}
+
+
+def log_step(*_: Any) -> Made:
+    writer = sb.LogWriter()
+    for name in ("ball", "other"):
+        writer.add(**{**BALL, "name": name}, mass_kg=0.1)
+    poses = {name: STEP[name] for name in ("dt_s", "position_m", "quaternion_xyzw", "gravity_m_s2")}
+    return writer.step, {**poses, **CONTACT, **TWISTS, "moved": ()}
+
+
+def log_save(_: Any, folder: Path) -> Made:
+    writer = sb.LogWriter()
+    writer.step(0.01, np.zeros((0, 3)), np.zeros((0, 4)))
+    return writer.save, {"path": folder / "a.npz", "models": "included"}
+
+
 def reading_audio(_: Any, folder: Path) -> Made:
     sb.write_audio(folder / "a.wav", np.zeros((1, 10)), 8000)
     return sb.read_audio, {"path": folder / "a.wav"}
@@ -249,6 +273,13 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Listener.add": adding,
     "Listener.add_all": adding_all,
     "Listener.write": writing,
+    "LogWriter": lambda *_: (
+        sb.LogWriter,
+        {"sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None, "supports": True},
+    ),
+    "LogWriter.add": log_adding,
+    "LogWriter.step": log_step,
+    "LogWriter.save": log_save,
     "Material": lambda *_: (sb.Material, MATERIAL),
     "Material.isotropic": lambda *_: (
         sb.Material.isotropic,
@@ -404,6 +435,35 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "subtype": [5, b"PCM_16", object()],
         "tail_db": [*OPTIONAL, 3, -1e9],
     },
+    "LogWriter": {
+        "sr": [*NUMBER, 0],
+        "microphone": ["here", 5, None, object(), {}, [(0, 0)], (0, 0, math.nan)],
+        "seed": [*WHOLE, -1],
+        "air": RECORD,
+        "supports": FLAG,
+    },
+    "LogWriter.add": {
+        "name": [5, None, b"cup", ["cup"], "", "a\nb"],
+        "mesh": [5, None, object(), {}, [5], b"a.obj"],
+        "material": [5, b"steel", object(), ["steel"], {}],
+        "mass_kg": [*OPTIONAL, -1, 1e300],
+        "inertia_kg_m2": [value for value in ARRAY if value is not None] + [[-1, 1, 1], [[1, 2], [3, 4]], 5],
+        "centre_m": [value for value in ARRAY if value is not None] + [5, [0, 0]],
+    },
+    "LogWriter.step": {
+        "dt_s": [*[value for value in NUMBER if value is not True], 0, -1, 2],
+        "position_m": [*ARRAY, 5, [[0, 0, 0]]],
+        "quaternion_xyzw": [*ARRAY, 5, [[0, 0, 0, 0]] * 2, [[0, 0, 0, 2]] * 2],
+        "pair": ["x", 5, None, object(), {}, [[0, 2]], [[1, 1]], [[-1, 0]], [[0.5, 1]], [0, 1], [[0, 1]] * 2],
+        "point_m": [*ARRAY, 5, [0, 0, 0]],
+        "normal": [*ARRAY, 5, [[0, 0, 0]], [[0, 0, 2]]],
+        "impulse_n_s": [*ARRAY, 5, [0, 0, 0]],
+        "gap_m": [value for value in ARRAY if value is not None] + [5, [0, 0]],
+        **{name: [*ARRAY, 5, [[0, 0, 0]]] for name in TWISTS},
+        "gravity_m_s2": [*ARRAY, 5],
+        "moved": ["x", 5, None, object(), [2], [-1], [0.5], ["ball"]],
+    },
+    "LogWriter.save": {"path": PATH, "models": ["x", None, 5, object(), b"reference"]},
     "Material": {
         "name": TEXT,
         "density_kg_m3": [*NUMBER, 0],

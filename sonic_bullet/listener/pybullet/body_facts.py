@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Hashable, Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pybullet
 
 from sonic_bullet.listener.frames import NO_NUMBER, Roster, decode, encode, link_words
+from sonic_bullet.listener.known_bodies import sounding_body
 from sonic_bullet.listener.memory import make_ready
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces, described_pieces
@@ -25,7 +26,7 @@ from sonic_bullet.records.coerce import LISTED, shown
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
-from sonic_bullet.records.mounting import Mounting, usual_mounting
+from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.simulated import Simulator, Values, finite, with_body_id
 
 HEAVIEST_KG = 1e12
@@ -227,25 +228,16 @@ def added_body(
     options: ModalOptions | None,
     mounting: Mounting | None = None,
 ) -> Body:
-    """Return the record of a link that exists, with what it is made of; SceneError on absurd mass or inertia.
-
-    Parameters
-    ----------
-    volume_m3
-        None: the model's, or 0.
-    shapes
-        In place of its collision shape; a single sphere determines the curvature.
-    mounting
-        How it is held; None: the usual mounting of its mass.
-    """
-    record = describe(client_id, body, link, epoch)
-    volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
-    held = usual_mounting(record.mass_kg) if mounting is None else mounting
-    record = replace(record, material=material, model=model, volume_m3=volume, options=options, mounting=held)
-    if shapes:
-        alone = shapes[0] if len(shapes) == 1 and shapes[0].kind == "sphere" else None
-        record = replace(record, curvature_per_m=1 / float(alone.size_m[0]) if alone is not None else math.nan)
-    return record
+    """Return the record of a link that exists (`sounding_body`); SceneError on absurd mass or inertia."""
+    return sounding_body(
+        describe(client_id, body, link, epoch),
+        material=material,
+        model=model,
+        volume_m3=volume_m3,
+        shapes=shapes,
+        options=options,
+        mounting=mounting,
+    )
 
 
 def likeness(client_id: int, body: int, link: int) -> Hashable:

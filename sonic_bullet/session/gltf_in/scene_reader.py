@@ -14,11 +14,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.reading import reading
-from sonic_bullet.geometry import volume_m3
+from sonic_bullet.geometry import shape_volume_m3
 from sonic_bullet.records import Shape
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.file_endings import GLTF_ENDINGS
@@ -111,18 +109,4 @@ def _body(nodes: Nodes, index: int, colliders: list[int], modelled: bool, notes:
 
 def _solid_mass(shapes: Sequence[Shape], bulk: Mapping[str, Any]) -> float:
     """Of shapes without a model: their volume by their material's density, or water's."""
-    return float(sum(map(_volume_m3, shapes)) * bulk.get("density", 1000.0))
-
-
-def _volume_m3(shape: Shape) -> float:
-    size = shape.size_m
-    match shape.kind:
-        case "box":
-            return float(np.prod(size))
-        case "mesh":
-            return abs(volume_m3(shape.vertex_m, shape.face))
-        case "plane":
-            return 0.0
-    length = 0.0 if shape.kind == "sphere" else float(size[1])
-    ends = 0.0 if shape.kind == "cylinder" else 4 / 3 * float(size[0])
-    return float(np.pi * size[0] ** 2 * (length + ends))
+    return float(sum(map(shape_volume_m3, shapes)) * bulk.get("density", 1000.0))

@@ -1,0 +1,224 @@
+"""A `World` whose steps are tables: poses and twists at the start of a step, and what touched during it.
+
+    who derives: described(body, link) -> Body        made_step(Motion, Touches) -> Step
+    Motion (n links) + TOUCH (k contacts) -> START -> records of links in their first contact
+                                             START -> CONTACT rows in body frames -> Step
+
+The same tables as PyBullet's (listener.memory, known_bodies, start, rows). A contact given is a contact: nothing is
+taken for asleep or made inside another.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, encode
+from sonic_bullet.listener.known_bodies import KnownBodies, sounding_body
+from sonic_bullet.listener.memory import Memory, make_ready
+from sonic_bullet.listener.polling import Touches
+from sonic_bullet.listener.properties import Properties
+from sonic_bullet.listener.start import LEFT_OUT, hooked_start
+from sonic_bullet.listener.world import World
+from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.contacts import Step
+from sonic_bullet.records.modal_options import ModalOptions
+from sonic_bullet.records.mounting import Mounting
+from sonic_bullet.records.simulated import Simulator, Values, with_body_id
+
+
+class MotionWorld(World):
+    """Records, names and steps of a world that is read as tables; no body is ever removed."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Clear all state, as before the first step."""
+        self.step_count = 0
+        self.stepped = False
+        self._known = KnownBodies()
+        self._memory = Memory()
+        self._added: dict[int, dict[str, Any]] = {}
+        self.properties = Properties(self.dynamics_of, self.engine)
+        self._past: Motion | None = None
+
+    @property
+    @abstractmethod
+    def roster(self) -> Roster:
+        """The links in the world."""
+
+    @abstractmethod
+    def described(self, body: int, link: int) -> Body:
+        """Return the silent record of a link.
+
+        Raises
+        ------
+        SceneError
+            There is no such link.
+        """
+
+    def dynamics_of(self, body: int, link: int) -> Values:
+        """Return the properties of a link under the simulator's names."""
+        return self.described(body, link).dynamics
+
+    def engine(self) -> Values:
+        """Return the settings of the simulator."""
+        return {}
+
+    def versions(self) -> dict[str, str]:
+        """Return the versions of the simulator, by name."""
+        return {}
+
+    @property
+    def simulator(self) -> Simulator:
+        """Settings and versions of the simulator, and what changed."""
+        return self.properties.simulator(self.versions())
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies ever met, as Contacts.a and Contacts.b count them."""
+        return tuple(self._known.records.values())
+
+    @property
+    def records(self) -> Mapping[int, Body]:
+        """The same by index."""
+        return self._known.records
+
+    @property
+    def living(self) -> tuple[Body, ...]:
+        """Those of `bodies` whose records have not ended."""
+        return tuple(self._known.records[index] for index in self._known.live.values())
+
+    @property
+    def untouched(self) -> frozenset[int]:
+        """Ids of the bodies in the world that have had no contact yet."""
+        return frozenset(one for one, _, _ in self.roster.bodies) - {one.body_id for one in self.living}
+
+    @property
+    def has_bodies(self) -> bool:
+        """Whether there is any body in the world."""
+        return bool(self.roster.bodies)
+
+    def all_links(self) -> tuple[tuple[int, int], ...]:
+        """List (body, link) of every link in the world."""
+        return tuple(decode(code) for code in self.roster.code.tolist())
+
+    def name_of(self, body: int, link: int = -1) -> str:
+        """Return a link's name and its body's id for messages; raises SceneError."""
+        own = self.described(body, link).name
+        return with_body_id(self.properties.names.called(int(encode(body, link)), own), body)
+
+    def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
+        """Return the names that records of links (body, link, given name) would have if all were added now."""
+        return self.properties.names.expected(
+            [(int(encode(body, link)), self.described(body, link).name, given) for body, link, given in links]
+        )
+
+    def silence(self, names: Collection[str]) -> None:
+        """Mark as `silent`, from now on, records of links, or of all links of bodies, of these names."""
+        self.properties.names.silent = frozenset(names)
+
+    def call(self, body: int, link: int, name: str) -> None:
+        """Give a link a name; raises SceneError where another link has it."""
+        self.properties.names.call(int(encode(body, link)), name)
+
+    def add(
+        self,
+        body: int,
+        link: int = -1,
+        *,
+        material: Material | None = None,
+        model: ModalModel | None = None,
+        shapes: Sequence[Shape] = (),
+        options: ModalOptions | None = None,
+        mounting: Mounting | None = None,
+    ) -> Body:
+        """Register a link with its material or model; return its record. See `World.add`."""
+        how: dict[str, Any] = {"material": material, "model": model, "shapes": tuple(shapes)}
+        how |= {"options": options, "mounting": mounting}
+        code = int(encode(body, link))
+        record = replace(sounding_body(self.described(body, link), **how), since_step=self.step_count)
+        self._close([code])
+        self._added.pop(code, None)
+        self._added[code] = how
+        return self._append(code, record)
+
+    def reset(self) -> None:
+        """Restart with the links added: see `World.reset`."""
+        added, before = self._added, self.properties
+        self.begin()
+        before.names.hand_over(added, self.properties.names)
+        self._added = added
+        for code, how in added.items():
+            self._append(code, sounding_body(self.described(*decode(code)), **how))
+
+    def make_ready(self) -> None:
+        """Compile, or load, the machine code for which the first step would else wait."""
+        make_ready()
+
+    def unhook(self) -> None:
+        """Do nothing: there is no hook."""
+
+    def made_step(
+        self,
+        now: Motion,
+        touches: Touches,
+        dt_s: float,
+        gravity_m_s2: tuple[float, ...],
+        moved: Collection[int] = (),
+    ) -> Step:
+        """Return the record of a step.
+
+        Parameters
+        ----------
+        now
+            At its start.
+        touches
+            Loaded contacts; all numbers are finite.
+        dt_s, gravity_m_s2
+            Its length, and gravity during it.
+        moved
+            Ids of bodies set elsewhere by hand since the step before.
+        """
+        memory, known = self._memory, self._known
+        if self._past is None:
+            self.properties.first_step()
+        start = hooked_start(self._past, now, moved, dt_s)
+        start["born"] = 0
+        known.enter(start)
+        row, made = memory.made(known, start, touches, None, dt_s)
+        if made < 0:
+            for code in start["code"][start["met"] != 0].tolist():
+                self._append(code, replace(self.described(*decode(code)), since_step=self.step_count))
+            known.enter(start)
+            start["index"][start["index"] < 0] = LEFT_OUT
+            row, made = memory.made(known, start, touches, None, dt_s)
+        step = memory.unusual(known, start, row, made, dt_s, gravity_m_s2)
+        self._past, self.stepped = now, True
+        self.step_count += 1
+        return step
+
+    def nothing(self, dt_s: float, gravity_m_s2: tuple[float, ...]) -> Step:
+        """Return a step in which nothing happened, and say that there was none (`stepped`)."""
+        self.stepped = False
+        return self._memory.nothing(dt_s, gravity_m_s2)
+
+    def _close(self, codes: Collection[int]) -> None:
+        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
+        self._known.close(codes, self.step_count, keep=self.logged)
+
+    def _append(self, code: int, record: Body) -> Body:
+        record = self.properties.begin(code, self._known.count, record)
+        self._known.append(code, record)
+        return record
+
+
+def roster_of(code: Sequence[int], static: Sequence[bool]) -> Roster:
+    """Make a roster of links, ascending in code; static: mass 0."""
+    bodies = tuple((one, 0, False) for one in dict.fromkeys(one // LINK_SPAN for one in code))
+    return Roster(bodies, np.array(code, np.int64), np.array(static, bool), count=len(bodies))
