@@ -78,6 +78,7 @@ def render_scene(
     supports: bool = True,
     progress: Progress | None = None,
     say: Say | None = None,
+    at_start: Callable[[Listener], object] | None = None,
     at_end: Callable[[Listener], object] | None = None,
     tail_db: float | None = None,
 ) -> RenderResult:
@@ -87,8 +88,9 @@ def render_scene(
     that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those that
     no sensor receives, though they touch and vibrate. residual: whether the non-modal sound of materials is added.
     supports: whether resting contacts damp and transmit, as in `attach`. progress gets the fraction done, say the
-    current task. at_end: called with the listener while its world exists. tail_db: level below the peak at which the
-    decay after the last step ends, -60 say, at most 10 s; None, 0: no decay. Raises SonicBulletError; where the scene
+    current task. at_start, at_end: called with the listener before the first step, and after the last while its world
+    exists. tail_db: level below the peak at which the decay after the last step ends, -60 say, at most 10 s; None, 0:
+    no decay. Raises SonicBulletError; where the scene
     fails or is interrupted, the exception carries the sound so far as ``partial``.
     """
     asked: dict[str, Any] = {
@@ -98,6 +100,7 @@ def render_scene(
         "choice": as_choice(material, materials, silent),
         "residual": as_flag(residual, "residual"),
         "supports": as_flag(supports, "supports"),
+        "at_start": as_call(at_start, "at_start"),
     }
     seconds = None if seconds is None else as_seconds(seconds, "seconds")
     as_call(progress, "progress"), as_call(say, "say"), as_call(at_end, "at_end")
@@ -170,6 +173,7 @@ class _Stage:
     residual: bool = True
     supports: bool = True
     begin: Callable[[Listener], object] | None = None
+    at_start: Callable[[Listener], object] | None = None
     listener: Listener | None = None
     adds: bool = False
     client: Any = None
@@ -204,10 +208,11 @@ class _Stage:
         return attach(client, sr=self.sr, seed=self.seed, microphone=microphones, **how, supports=self.supports)
 
     def ready(self) -> None:
-        """Call `begin`, once, with the listener that has its bodies."""
-        begin, self.begin = self.begin, None
-        if begin is not None:
-            begin(self.need_listener())
+        """Call `begin` and `at_start`, once, with the listener that has its bodies."""
+        waiting, self.begin, self.at_start = (self.begin, self.at_start), None, None
+        for call in waiting:
+            if call is not None:
+                call(self.need_listener())
 
     def need_listener(self) -> Listener:
         if self.listener is None:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties
+from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties, Row
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.residual.code import ResidualForm, form_of, residual_of
@@ -54,6 +54,8 @@ class BakedMaterialForm(_Part, frozen=True):
     restitution: float | None = None
     roughness_m: float | None = None
     hurst: float | None = None
+    octave_rms_m: tuple[float, ...] | None = None
+    stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
 
 
 class MassForm(_Part, frozen=True):
@@ -130,6 +132,8 @@ ABOUT: dict[str, dict[str, str]] = {
         "restitution": "of an impact against a rigid wall",
         "roughness_m": "rms height of the surface, m",
         "hurst": "Hurst exponent of its profile",
+        "octave_rms_m": "rms heights by wavelength, 100 mm and its halves, in place of both, m",
+        "stiffness_pa": "Voigt stiffness xx yy zz yz xz xy, Pa, of a material with a grain",
     },
     "MassForm": {
         "mass_kg": "kg, of the solid by which shapes are normalised",

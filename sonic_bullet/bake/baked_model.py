@@ -18,6 +18,9 @@ import numpy as np
 from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number, as_text, shown
+from sonic_bullet.records.roughness import OCTAVES
+
+Row = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +36,10 @@ class BakedMaterial:
     contact_modulus_pa
         E/(1-ν²) where it is touched, of its softest axis. Two bodies in contact have 1/E* = Σ 1/contact_modulus
         [Johnson 1985, eq. 4.24].
-    restitution, roughness_m, hurst
+    restitution, roughness_m, hurst, octave_rms_m
         As of `Material`.
+    stiffness_pa : six rows of six
+        As of `Material`, of one with a grain; None where it is the same in every direction.
     """
 
     name: str = ""
@@ -47,6 +52,8 @@ class BakedMaterial:
     restitution: float | None = None
     roughness_m: float | None = None
     hurst: float | None = None
+    octave_rms_m: tuple[float, ...] | None = None
+    stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -66,6 +73,9 @@ class BakedMaterial:
             value = getattr(self, name)
             if value is not None:
                 store(self, **{name: as_number(value, f"{where}: {name}", f"give a number {_words(bound)}", **bound)})
+        for name, size in (("octave_rms_m", (OCTAVES,)), ("stiffness_pa", (6, 6))):
+            if getattr(self, name) is not None:
+                frozen_array(getattr(self, name), float, size, f"{where}: {name}")
 
 
 def _words(bound: dict[str, Any]) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from sonic_bullet.bake.sample_points import sample_points
 from sonic_bullet.geometry import SurfaceIndex, inertia, nearest, volume_m3
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel
 from sonic_bullet.records.arrays import store
+from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
 
@@ -173,7 +175,7 @@ def bake_body(
         point_m=point,
         face=face,
         pressure_pa_m=pressure[keep],
-        material=_material_of(material),
+        material=bake_material(material),
         mass=_solid_of(model, material.density_kg_m3),
         bend_s2_m2=None if bend is None else (bend / fastest**2)[keep],
         damping_growth_s_m=None if growth is None else (growth / fastest)[keep],
@@ -210,7 +212,8 @@ def _coarse(
     )
 
 
-def _material_of(material: Material) -> BakedMaterial:
+def bake_material(material: Material) -> BakedMaterial:
+    """Return what a baked file holds of a material."""
     from sonic_bullet.render.body_table import pressed_pa
     from sonic_bullet.support import ContactSide
 
@@ -225,7 +228,17 @@ def _material_of(material: Material) -> BakedMaterial:
         restitution=material.restitution,
         roughness_m=material.roughness_m,
         hurst=material.hurst,
+        octave_rms_m=None if material.octave_rms_m is None else tuple(material.octave_rms_m.tolist()),
+        stiffness_pa=_grain(material),
     )
+
+
+def _grain(material: Material) -> Any:
+    """Rows of a stiffness that is not the same in every direction, else None."""
+    even = isotropic_stiffness_pa(material.youngs_pa, material.poisson)
+    if np.allclose(material.stiffness_pa, even, rtol=1e-9, atol=1e-9 * float(even.max())):
+        return None
+    return tuple(tuple(row) for row in material.stiffness_pa.tolist())
 
 
 def _solid_of(model: ModalModel, density_kg_m3: float) -> MassProperties | None:

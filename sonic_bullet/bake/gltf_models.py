@@ -1,8 +1,7 @@
 """BakedModel <-> glTF 2.0 with the draft extension KHR_audio_rigid_bodies.
 
     frequencies, decayRates (m,); positions (p, 3); shapes (m·p, 3) mode-major; indices (3f,)    accessors, float32
-    massProperties, acousticMaterials (bulk), acousticSurfaces (roughness; slope of the spectrum -(1 + 2·hurst))
-    a node and a mesh for each model; two nodes of one model are two bodies
+    gltf_audio writes them; a node and a mesh for each model; two nodes of one model are two bodies
     extras.sonic_bullet of a model: doubles, pressure at 1 m, contact constants, residual (baked_form.ExtrasForm)
 
 [KHR_audio_rigid_bodies, draft of 2026: Accessor Requirements, Mass Properties, Acoustic Surfaces.] `extras` count where
@@ -19,102 +18,38 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.bake.baked_form import FORMAT, ExtrasForm, common_form, model_of
+from sonic_bullet.bake.baked_form import FORMAT, ExtrasForm, model_of
 from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties
+from sonic_bullet.bake.gltf_audio import BULK, EXTENSION, GltfAudio
 from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_values
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
-from sonic_bullet.files.gltf.gltf_writer import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GltfBuffer, write_gltf
+from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.session.gltf_in.own_words import EXTRAS
 
-EXTENSION = "KHR_audio_rigid_bodies"
-EXTRAS = "sonic_bullet"
 REMEDY = "write it again as glTF 2.0 with that extension"
-BULK = {
-    "density": "density_kg_m3",
-    "youngsModulus": "youngs_pa",
-    "poissonRatio": "poisson",
-    "alpha": "alpha_per_s",
-    "beta": "beta_s",
-}
-"""The draft's names of a material's numbers -> ours."""
 
 
 def write_gltf_models(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> None:
     """Write models as a .glb or .gltf, a node each, whole or not at all. Raises FileError."""
     buffer = GltfBuffer()
-    audio: dict[str, Any] = {"modalModels": [], "acousticMaterials": [], "acousticSurfaces": []}
+    audio = GltfAudio(buffer)
     nodes: list[dict[str, Any]] = []
-    meshes: list[dict[str, Any]] = []
-    for number, model in enumerate(models):
-        entry, primitive = _model_entry(model, buffer, number)
-        audio["modalModels"].append(entry)
-        bulk = {key: getattr(model.material, name) for key, name in BULK.items()}
-        audio["acousticMaterials"].append({"name": model.material.name} | _present(bulk))
-        audio["acousticSurfaces"].append(_surface_entry(model.material) | {"material": number})
-        node: dict[str, Any] = {"name": model.name}
-        if primitive is not None:
-            node["mesh"] = len(meshes)
-            meshes.append({"name": model.name, "primitives": [primitive]})
-        node["extensions"] = {EXTENSION: {"modalModel": number, "acousticSurface": number}}
-        nodes.append(node)
+    for model in models:
+        made = audio.add_model(model)
+        shown_as = {} if made.mesh is None else {"mesh": made.mesh}
+        nodes.append({"name": model.name, **shown_as, "extensions": {EXTENSION: made.node_entry}})
     tree: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "sonic_bullet"},
         "extensionsUsed": [EXTENSION],
         "scene": 0,
         "scenes": [{"nodes": list(range(len(nodes)))}],
         "nodes": nodes,
-        "extensions": {EXTENSION: audio},
+        "extensions": {EXTENSION: audio.document()},
     }
-    write_gltf(path, tree | ({"meshes": meshes} if meshes else {}), buffer)
-
-
-def _present(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
-
-
-def _surface_entry(material: BakedMaterial) -> dict[str, Any]:
-    entry: dict[str, Any] = {"name": material.name}
-    if material.roughness_m:
-        entry["roughness"] = material.roughness_m
-    if material.hurst is not None:
-        entry["spectralSlope"] = -(1 + 2 * material.hurst)
-    return entry
-
-
-def _model_entry(model: BakedModel, buffer: GltfBuffer, number: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Write a model's entry, and the mesh primitive of its surface, None where it has no triangle."""
-    positions = buffer.append(model.point_m, target=ARRAY_BUFFER)
-    entry: dict[str, Any] = {
-        "name": model.name,
-        "frequencies": buffer.append(model.freq_hz),
-        "decayRates": buffer.append(model.decay_per_s),
-        "positions": positions,
-        "shapes": buffer.append(model.shape.transpose(2, 0, 1).reshape(-1, 3)),
-        "material": number,
-    }
-    primitive = None
-    if len(model.face):
-        entry["indices"] = buffer.append(model.face.ravel(), target=ELEMENT_ARRAY_BUFFER)
-        primitive = {"attributes": {"POSITION": positions}, "indices": entry["indices"]}
-    if model.mass is not None:
-        entry["massProperties"] = _mass_entry(model.mass)
-    entry["extras"] = {EXTRAS: ExtrasForm(format=FORMAT, **common_form(model))}
-    return entry, primitive
-
-
-def _mass_entry(mass: MassProperties) -> dict[str, Any]:
-    from scipy.spatial.transform import Rotation
-
-    moment, axes = np.linalg.eigh((mass.inertia_kg_m2 + mass.inertia_kg_m2.T) / 2)
-    axes = axes * np.where(np.linalg.det(axes) < 0, -1, 1)
-    return {
-        "mass": mass.mass_kg,
-        "centerOfMass": mass.centre_m.tolist(),
-        "inertiaDiagonal": np.maximum(moment, 0).tolist(),
-        "inertiaOrientation": Rotation.from_matrix(axes).as_quat().tolist(),
-    }
+    write_gltf(path, tree | ({"meshes": audio.meshes} if audio.meshes else {}), buffer)
 
 
 def read_gltf_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:

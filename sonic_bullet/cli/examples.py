@@ -25,7 +25,7 @@ Examples:
   sonic-bullet bake mug.obj --material ceramic-mug -o mug.dsp   (faust2jack mug.dsp)
   sonic-bullet bake mug.obj --material porcelain -o mug.h
   sonic-bullet bake bar.obj --material brass --strike 0.1,0,0.005 --impulse 0.02 -o tap.wav
-  sonic-bullet bake scenes/tabletop.py -o bodies.glb            (all its bodies)
+  sonic-bullet bake scenes/tabletop.py -o scene.glb             (bodies, physics, motion, sound)
   sonic-bullet bake table.npz --body mug -o mug.h"""
 
 FIT_EPILOG = """\b

@@ -1,6 +1,7 @@
 """What a file says of a scene of rigid bodies, by value, before any simulator knows of it.
 
-    glTF -> RigidScene -> bodies, drives and settings of a simulator; materials and models of a listener
+    glTF -> RigidScene -> bodies, joints, drives and settings of a simulator; materials and models of a listener
+    simulator, contact log -> RigidScene -> glTF
 
 Frames: the world has z up; a body's origin is its centre of mass, its axes are its principal ones.
 """
@@ -15,8 +16,10 @@ import numpy as np
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.bodies import Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_number, as_text, as_whole, shown
+from sonic_bullet.records.mounting import Mounting, as_mounting
 
 CombineRule = Literal["average", "minimum", "maximum", "multiply"]
+JointKind = Literal["fixed", "point", "hinge", "slider"]
 HEAVIEST_KG, FASTEST = 1e9, 1e6
 
 
@@ -48,7 +51,8 @@ class RigidBody:
     shapes: its colliders, body frame. mass_kg: 0 for what does not move; inertia_kg_m2 (3,): principal moments, zeros:
     those of its shapes. position_m (3,), quaternion_xyzw (4,), velocity_m_s (3,), spin_rad_s (3,): at the start, world.
     gravity_factor: how much of gravity it feels. material: what its contacts are of; None: a silent, rigid partner.
-    model: its modes; None: solved where ``solved``, else it does not ring. gain: of its sound.
+    model: its modes; None: solved where ``solved``, else it does not ring. gain: of its sound. mounting: of the model,
+    whose decays are without its loss.
     """
 
     name: str
@@ -65,6 +69,7 @@ class RigidBody:
     model: ModalModel | None = None
     solved: bool = False
     gain: float = 1.0
+    mounting: Mounting = "free"
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -81,6 +86,7 @@ class RigidBody:
             self,
             mass_kg=as_number(self.mass_kg, f"{where}: mass", "give kilograms", least=0, most=HEAVIEST_KG),
             gravity_factor=as_number(self.gravity_factor, f"{where}: gravityFactor", "give a number"),
+            mounting=as_mounting(self.mounting, f"{where}: mounting"),
             gain=as_number(self.gain, f"{where}: gain", "give a factor, 0 or more", least=0, most=1e10),
         )
         require(len(self.shapes) > 0, f"{where} has no collider", "give it one")
@@ -118,14 +124,74 @@ class SpeedDrive:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RigidJoint:
+    """What holds two bodies together, in one frame of the world at the start.
+
+    kind: which motions are left: none, all turns (point), the turn about the axis (hinge), the way along it (slider).
+    body, partner: numbers of the bodies, partner -1: the world. position_m (3,), axis (3,): unit, world. range: least
+    and most angle in rad, or way in m, from the start; None: endless. collides: whether both bodies touch each other.
+    """
+
+    kind: JointKind
+    body: int
+    partner: int
+    position_m: Array
+    axis: Array
+    range: tuple[float, float] | None = None
+    collides: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        kinds = get_args(JointKind)
+        require(self.kind in kinds, f"a joint is {shown(self.kind)}", f"one of {', '.join(kinds)}")
+        store(
+            self,
+            body=as_whole(self.body, "body of a joint", "give its number", least=0),
+            partner=as_whole(self.partner, "partner of a joint", "give its number, or -1", least=-1),
+            position_m=frozen_array(self.position_m, float, (3,), "position of a joint"),
+            axis=frozen_array(self.axis, float, (3,), "axis of a joint"),
+        )
+        require(abs(float(np.linalg.norm(self.axis)) - 1) < 1e-6, "the axis of a joint is no unit", "divide it")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPath:
+    """Poses of a body by time, on the line and the shorter arc between: recorded, or prescribed to a body of mass 0.
+
+    body: its number. time_s (t,), ascending; position_m (t, 3), quaternion_xyzw (t, 4): world.
+    """
+
+    body: int
+    time_s: Array
+    position_m: Array
+    quaternion_xyzw: Array
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        time = frozen_array(self.time_s, float, (None,), "times of a path")
+        store(
+            self,
+            body=as_whole(self.body, "body of a path", "give its number", least=0),
+            time_s=time,
+            position_m=frozen_array(self.position_m, float, (len(time), 3), "positions of a path"),
+            quaternion_xyzw=frozen_array(self.quaternion_xyzw, float, (len(time), 4), "orientations of a path"),
+        )
+        require(len(time) > 0 and bool((np.diff(time) > 0).all()), "the times of a path do not rise", "sort its keys")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RigidScene:
-    """Bodies, drives, gravity (3,), and notes: what the file asks for and nobody does, by name."""
+    """Bodies, drives, gravity (3,), joints, paths; notes: what is asked for and nobody does, by name."""
 
     bodies: tuple[RigidBody, ...]
     drives: tuple[SpeedDrive, ...]
     gravity_m_s2: Array
     notes: tuple[str, ...] = ()
+    joints: tuple[RigidJoint, ...] = ()
+    paths: tuple[BodyPath, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the fields."""
         store(self, gravity_m_s2=frozen_array(self.gravity_m_s2, float, (3,), "gravity"))
+        for number in (*(joint.body for joint in self.joints), *(path.body for path in self.paths)):
+            require(number < len(self.bodies), "a joint or a path of a body that is none", "give its number")

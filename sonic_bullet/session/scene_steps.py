@@ -40,6 +40,7 @@ class SceneStage(Protocol):
     microphones: tuple[Sensor, ...] | None
     choice: MaterialChoice
     begin: Callable[[Listener], object] | None
+    at_start: Callable[[Listener], object] | None
     listener: Listener | None
     adds: bool
     client: Any
@@ -106,8 +107,8 @@ def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | Non
 
         def look(_: int) -> None:
             stage.listener = stage.listener or _listener_in(names)
-            if stage.begin is not None and stage.listener is not None:
-                if stage.microphones is not None:
+            if (stage.begin or stage.at_start) is not None and stage.listener is not None:
+                if stage.begin is not None and stage.microphones is not None:
                     raise SceneError(f"scene '{stage.path.name}' has microphones of its own", "leave yours out")
                 stage.ready()
 

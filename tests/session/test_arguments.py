@@ -195,6 +195,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "supports": True,
         "progress": None,
         "say": None,
+        "at_start": None,
         "at_end": None,
         "tail_db": None,
     }
@@ -583,6 +584,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "supports": FLAG,
         "progress": CALL,
         "say": CALL,
+        "at_start": CALL,
         "at_end": CALL,
         "tail_db": [*OPTIONAL, 3, -1e9],
     },
@@ -706,7 +708,7 @@ def test_whatever_is_passed_is_taken_or_refused(
     tried = 0
     for argument in good:
         for value in MENU:
-            if argument not in ("progress", "say", "at_end") or not callable(
+            if argument not in ("progress", "say", "at_start", "at_end") or not callable(
                 value
             ):  # a user's function raises what it likes
                 refusal(call, {**good, argument: value})

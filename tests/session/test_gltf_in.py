@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
-from sonic_bullet.listener.pybullet.rigid_world import combined_friction, pair_factors
+from sonic_bullet.listener.pybullet.rigid.rigid_world import combined_friction, pair_factors
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.records.rigid_scene import PhysicsMaterial, RigidBody
 from sonic_bullet.records.roughness import OCTAVES, WAVE_M, finish_octaves, track_octaves

@@ -17,7 +17,8 @@ from sonic_bullet.cli.parameters import Numbers, json_option
     "--output",
     required=True,
     metavar="NAME.EXT",
-    help="What for: .glb .gltf (KHR_audio_rigid_bodies), .json, .dsp (Faust), .h (C), .wav (one strike).",
+    help="What for: .glb .gltf (KHR_audio_rigid_bodies; of scenes also KHR_physics_rigid_bodies), .json, .dsp (Faust), "
+    ".h (C), .wav (one strike).",
 )
 @click.option(
     "--material",
@@ -42,6 +43,12 @@ from sonic_bullet.cli.parameters import Numbers, json_option
     "64 for .dsp and .h]",
 )
 @click.option("--body", metavar="NAME", help="That body of a scene or log alone.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0, min_open=True),
+    metavar="S",
+    help="Of a scene or log as .glb or .gltf: how much of its motion. [default: all; a scene's own SECONDS, or 4]",
+)
 @click.option(
     "--scale",
     type=float,
@@ -73,7 +80,10 @@ from sonic_bullet.cli.parameters import Numbers, json_option
 )
 @json_option
 def bake(**options: Any) -> None:
-    """Write the modal sound of a mesh, or of a scene's bodies, for another engine."""
+    """Write the modal sound of a mesh, or of a scene's bodies, for another engine.
+
+    A scene or log as .glb or .gltf has its physics and its recorded motion, too.
+    """
     from sonic_bullet.cli.solids.bake_outputs import run_bake
 
     run_bake(**options)

@@ -13,11 +13,13 @@ from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, nearest
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, MaterialError
+from sonic_bullet.records.file_endings import GLTF_ENDINGS
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 
 if TYPE_CHECKING:
     from sonic_bullet.bake import BakedModel, PruningOptions
     from sonic_bullet.files import ContactLog
+    from sonic_bullet.session import Listener
 
 MESH_MATERIAL = "steel"
 PROGRAMS, FEW_POINTS = (".dsp", ".h"), 64
@@ -76,6 +78,7 @@ def run_bake(
     below_db: float | None,
     points: int | None,
     body: str | None,
+    seconds: float | None,
     scale: float,
     thickness_m: float | None,
     to_hz: float | None,
@@ -97,21 +100,31 @@ def run_bake(
         )
     if not scene and body is not None:
         raise FileError("--body is of a scene or a contact log", "leave it out: a mesh is one body")
+    whole = scene and end in GLTF_ENDINGS and body is None
+    if seconds is not None and not whole:
+        raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
+    notes: tuple[str, ...] = ()
     with clean_stdout(json_to) as say:
         from sonic_bullet.bake import PruningOptions, write_baked
 
         pruning = PruningOptions(modes, below_db, points or (FEW_POINTS if end in PROGRAMS else None))
-        if scene:
+        if whole:
+            from sonic_bullet.cli.solids.scene_outputs import write_whole_scene
+
+            models, line, notes = write_whole_scene(to, source, WantedMaterials.read(material, ()), pruning, seconds)
+            say("\n".join([*map(_line, models), line]))
+        elif scene:
             models = _scene_models(source, material, body, pruning, one=end in ONE)
         else:
             models = [_mesh_model(source, material, scale, thickness_m, to_hz, pruning)]
         if end == ".wav":
             say(_line(models[0]) + "\n" + wish.write(to, models[0]))
-        else:
+        elif not whole:
             write_baked(to, models)
             say("\n".join(map(_line, models)))
-        warn(f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note)
-    write_json(json_to, {"output": output, "bodies": [_described(model) for model in models]})
+        warn([*(f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note), *notes])
+    described = {"output": output, "bodies": [_described(model) for model in models]}
+    write_json(json_to, described | ({"notes": list(notes)} if whole else {}))
 
 
 def _mesh_model(
@@ -146,16 +159,7 @@ def _scene_models(
     """Return the models of a scene's or log's bodies with modes, each once. one: the format holds a single body."""
     from sonic_bullet.bake import bake_body
 
-    materials = WantedMaterials.read(material, ())
-    if is_log(source):
-        from sonic_bullet.files import read_log
-        from sonic_bullet.session.chosen_in_log import with_choice
-
-        with status(source) as say:
-            log, _ = with_choice(read_log(source), materials.choice(), source, say)
-    else:
-        with progress_bar(Path(source).name) as (progress, tell):
-            log = _log_of_scene(source, materials, progress, tell)
+    log = scene_log(source, WantedMaterials.read(material, ()), SCENE_S)
     bodies: dict[str, Body] = {}
     for body in log.bodies:
         if body.model is not None and body.model.mode_count and body.material is not None:
@@ -179,15 +183,28 @@ def _scene_models(
     return made
 
 
-def _log_of_scene(
-    source: str, materials: WantedMaterials, progress: Callable[[float], None], say: Callable[[str], None]
+def scene_log(
+    source: str,
+    materials: WantedMaterials,
+    seconds: float | None,
+    at_start: Callable[[Listener], object] | None = None,
 ) -> ContactLog:
-    """Run the first moments of a scene, without sound."""
-    with quiet_stderr():
-        from sonic_bullet.scene import render_scene
+    """Return a log as it is to be baked, or that of a scene's first seconds, run without sound.
 
-    asked: dict[str, Any] = {"seconds": SCENE_S, "microphones": (), **materials.options}
-    return render_scene(source, **asked, progress=progress, say=say).log
+    seconds None: the scene's own. at_start: called with a scene's listener before its first step.
+    """
+    if is_log(source):
+        from sonic_bullet.files import read_log
+        from sonic_bullet.session.chosen_in_log import with_choice
+
+        with status(source) as say:
+            return with_choice(read_log(source), materials.choice(), source, say)[0]
+    with progress_bar(Path(source).name) as (progress, tell):
+        with quiet_stderr():
+            from sonic_bullet.scene import render_scene
+
+        asked: dict[str, Any] = {"seconds": seconds, "microphones": (), "at_start": at_start, **materials.options}
+        return render_scene(source, **asked, progress=progress, say=tell).log
 
 
 def _line(model: BakedModel) -> str:

@@ -21,14 +21,22 @@ from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_val
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.geometry.triangles import face_curvature, is_closed, welded
 from sonic_bullet.presets import load_material
-from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.records import Array, Material, ModalModel, Residual
 from sonic_bullet.records.coerce import as_number
+from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.rigid_scene import PhysicsMaterial
 from sonic_bullet.session.gltf_in.finishes import relief_octaves, surface_octaves
 from sonic_bullet.session.gltf_in.node_frames import Nodes
-from sonic_bullet.session.gltf_in.physics import BodyFrame
+from sonic_bullet.session.gltf_in.own_words import (
+    FREE,
+    OwnSurface,
+    own_model,
+    own_surface,
+    with_grain,
+    without_mounting,
+)
+from sonic_bullet.session.gltf_in.physics import AUDIO, BodyFrame
 
-AUDIO = "KHR_audio_rigid_bodies"
 OTHERWISE = "steel"
 """Whose elastic constants a body has that rings and does not say what it is made of."""
 
@@ -79,14 +87,16 @@ def material_of(
         elastic |= {key: usual[key] for key in missing}
         notes.append(f"{name} says no {' and no '.join(missing)}: that of {OTHERWISE} is taken")
     called = str(surface.get("name") or f"surface of {name}")
-    octaves, hurst = surface_octaves(tree, surface, called, notes)
+    own = own_surface(surface)
+    octaves, hurst = surface_octaves(tree, surface, called, [] if own is not None else notes)
     octaves = _with_relief(nodes, surface, index, octaves, called, notes)
     if surface.get("waviness") and (words := "waviness is not played: it makes no sound of its own here") not in notes:
         notes.append(words)
     damping = [bulk.get(key) for key in ("alpha", "beta")]
     known = all(x is not None for x in damping)
+    both = dict.fromkeys(str(x["name"]) for x in (bulk, surface) if x.get("name"))
     made = Material.isotropic(
-        ", ".join(str(x["name"]) for x in (bulk, surface) if x.get("name")) or f"material of {name}",
+        ", ".join(both) or f"material of {name}",
         youngs_pa=elastic["youngsModulus"],
         poisson=elastic["poissonRatio"],
         density_kg_m3=elastic["density"],
@@ -98,7 +108,20 @@ def material_of(
         octave_rms_m=octaves,
         source=f"{AUDIO} of a glTF",
     )
-    return made, bulk
+    return (made if own is None else _as_ours(made, own)), bulk
+
+
+def _as_ours(material: Material, own: OwnSurface) -> Material:
+    """Make a material that a file of ours says more of."""
+    octaves = own.octave_rms_m
+    return replace(
+        material,
+        stiffness_pa=with_grain(material, own),
+        roughness_m=own.roughness_m,
+        hurst=own.hurst,
+        restitution=own.restitution,
+        octave_rms_m=None if octaves is None else np.array(octaves),
+    )
 
 
 def _with_relief(
@@ -132,9 +155,13 @@ def model_of(
     frame: BodyFrame,
     body_mass_kg: float | None,
     bulk: Mapping[str, Any],
+    mounting: Mounting,
     notes: list[str],
-) -> ModalModel:
-    """Read a node's modal model, at its scale, in its body's frame; raises the tree's error."""
+) -> tuple[ModalModel, Residual | None]:
+    """Read a node's modal model, at its scale, in its body's frame, and its residual; raises the tree's error.
+
+    Its decays are all that the body loses but for that of its mounting.
+    """
     mass_off = 0.01
     tree, audio, node = nodes.tree, audio_of(nodes), nodes.name(owner)
     entry = one_of(tree, audio.get("modalModels", ()), number, f"{node}: modalModel")
@@ -150,6 +177,16 @@ def model_of(
         raise tree.error(f"{node} rings and is scaled unevenly", "apply the scale and solve its modes anew")
     scale = float(placed.scale[0])
     face = named_triangles(tree, entry, name, len(point)) if "indices" in entry else _hull(nodes, point, name, notes)
+    ours = own_model(entry, freq, decay)
+    more: dict[str, Any] = {}  # by what level bends
+    if ours is not None:
+        modes = ours.modes
+        freq, decay = np.array(modes.freq_hz), np.array(modes.decay_per_s)
+        if mounting != FREE:
+            freq, decay = without_mounting(freq, decay, mounting)
+        if abs(scale - 1) < 1e-6:
+            bent = {"bend_s2_m2": modes.bend_s2_m2, "damping_growth_s_m": modes.damping_growth_s_m}
+            more = {key: np.array(values) for key, values in bent.items() if values is not None}
     freq, decay = scaled_modes(freq, decay, scale, bulk)
     own = (frame.turn.T @ placed.turn).T  # rows are vectors
     vertex = (placed.position_m + (point * scale) @ placed.turn.T - frame.centre_m) @ frame.turn
@@ -158,8 +195,11 @@ def model_of(
     if body_mass_kg and stated and abs(stated * scale**3 / body_mass_kg - 1) > mass_off:
         notes.append(f"{node} weighs {body_mass_kg:.4g} kg, its model {stated * scale**3:.4g} kg: shapes stay as given")
     order = np.argsort(freq, kind="stable")
+    more = {key: values[order] for key, values in more.items()}
+    if more and ours is not None:
+        more["damping_growth_power"] = ours.modes.damping_growth_power
     turned = shape[order].astype(float) @ own * scale**-1.5
-    return ModalModel(
+    made = ModalModel(
         freq_hz=freq[order],
         decay_per_s=decay[order],
         shape=np.ascontiguousarray(turned.transpose(1, 2, 0), np.float32),
@@ -170,7 +210,9 @@ def model_of(
         mass_kg=mass,
         note=f"{name} of a glTF" + (f", scaled by {scale:.4g}" if abs(scale - 1) > 1e-6 else ""),
         includes_radiation=True,
+        **more,
     )
+    return made, None if ours is None else ours.residual_called(name)
 
 
 def scaled_modes(freq_hz: Array, decay_per_s: Array, scale: float, bulk: Mapping[str, Any]) -> tuple[Array, Array]:
@@ -220,8 +262,3 @@ def _solid(
     if not mass:
         mass = volume * density if density else 0.0
     return mass, volume, face
-
-
-def as_given(material: Material) -> Material:
-    """Make the material of a body whose model is given: its decays are all that the body loses."""
-    return replace(material, includes_radiation=True)

@@ -2,7 +2,7 @@
 
     motion: mass, centerOfMass, inertiaDiagonal, inertiaOrientation, linearVelocity, angularVelocity, gravityFactor
     collider: geometry (shape | mesh), physicsMaterial: dynamicFriction, restitution, their combine rules
-    joint with locked turns and one velocity drive -> SpeedDrive
+    joints: joints.py
 
 What is none of these is named in notes.
 """
@@ -19,10 +19,10 @@ from sonic_bullet.files.gltf.checked_accessors import one_of
 from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number
-from sonic_bullet.records.rigid_scene import PhysicsMaterial, SpeedDrive
+from sonic_bullet.records.rigid_scene import PhysicsMaterial
 from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
 
-PHYSICS, SHAPES = "KHR_physics_rigid_bodies", "KHR_implicit_shapes"
+PHYSICS, SHAPES, AUDIO = "KHR_physics_rigid_bodies", "KHR_implicit_shapes", "KHR_audio_rigid_bodies"
 UP_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Turns a shape whose axis is z so that it is y."""
 MOTION = {"isKinematic", "mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation"} | {
@@ -53,7 +53,7 @@ class BodyMotion:
 
 
 def body_nodes(nodes: Nodes) -> dict[int, list[int]]:
-    """Find each body's node and its colliders': what moves with what hangs on it, else each by itself."""
+    """Find each body's node and its colliders': what moves, or sounds, with what hangs on it, else each by itself."""
     found: dict[int, list[int]] = {}
     for i in nodes.in_scene():
         own = nodes.extension(i, PHYSICS)
@@ -61,7 +61,9 @@ def body_nodes(nodes: Nodes) -> dict[int, list[int]]:
             found.setdefault(i, [])
         if "collider" in own:
             chain = (i, *nodes.ancestors(i))
-            mover = next((one for one in chain if "motion" in nodes.extension(one, PHYSICS)), i)
+            mover = next((one for one in chain if "motion" in nodes.extension(one, PHYSICS)), None)
+            if mover is None:
+                mover = next((one for one in chain if AUDIO in nodes.entry[one].get("extensions", {})), i)
             found.setdefault(mover, []).append(i)
     return found
 
@@ -84,8 +86,7 @@ def motion_of(nodes: Nodes, index: int, notes: list[str]) -> BodyMotion:
     if said is None:
         return BodyMotion(0.0, zero, zero, zero, 1.0)
     notes += [f"{name}: motion.{key} is not known" for key in sorted(set(said) - MOTION)]
-    if said.get("isKinematic"):
-        notes.append(f"{name} is kinematic: it stands still, for nothing here moves it")
+    if said.get("isKinematic"):  # it follows its animation, or stands still
         return BodyMotion(0.0, zero, zero, zero, 1.0)
     turn = nodes.placed(index).turn  # velocities are in the node's space [KHR_physics_rigid_bodies, Motions]
     mass = said.get("mass")
@@ -184,42 +185,6 @@ def physics_of(nodes: Nodes, colliders: list[int], name: str, notes: list[str]) 
         said.get("restitution", 0.0),
         said.get("frictionCombine", "average"),
         said.get("restitutionCombine", "average"),
-    )
-
-
-def drive_of(nodes: Nodes, index: int, number_of: Mapping[int, int], notes: list[str]) -> SpeedDrive | None:
-    """Read a node's joint as a drive; None where it has none, or one that PyBullet lacks, which is named.
-
-    number_of: bodies by the numbers of their nodes.
-    """
-    said = nodes.extension(index, PHYSICS).get("joint")
-    if said is None:
-        return None
-    name = nodes.name(index)
-    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS, {}).get("physicsJoints", ())
-    joint = one_of(nodes.tree, known, said.get("joint"), f"{name}: joint")
-    limits, drives = joint.get("limits", ()), joint.get("drives", ())
-    locked = all(
-        set(x.get("angularAxes", ())) == {0, 1, 2} and x.get("min") == x.get("max") == 0 and "linearAxes" not in x
-        for x in limits
-    )
-    speed = len(drives) == 1 and drives[0].get("type") == "linear" and not drives[0].get("stiffness")
-    owner = next((one for one in (index, *nodes.ancestors(index)) if one in number_of), None)
-    if not (locked and speed and "velocityTarget" in drives[0]) or owner is None:
-        kinds = sorted({axis for x in limits for axis in x if axis.endswith("Axes")})
-        words = ", ".join([*kinds, *(f"{x.get('type')} drive" for x in drives)]) or "none"
-        notes.append(f"{name}: its joint ({words}) is not simulated: PyBullet makes no such one between two bodies")
-        return None
-    drive, partner = drives[0], said.get("connectedNode")
-    axis = nodes.placed(index).turn[:, int(drive.get("axis", 0))]
-    return SpeedDrive(
-        body=number_of[owner],
-        partner=number_of.get(partner, -1),
-        direction=axis / np.linalg.norm(axis),
-        speed_m_s=-drive["velocityTarget"],  # of the partner in the body's joint space
-        damping_n_s_m=drive.get("damping", 0.0),
-        most_n=drive.get("maxForce", 1e9),
-        turns_locked=bool(limits),
     )
 
 

@@ -25,7 +25,7 @@ def run_gltf(
     stage: SceneStage, seconds: float | None, progress: Callable[[float], None] | None, say: Say | None
 ) -> tuple[str, ...]:
     """Run it for so many seconds of physics time; notes a user should read. Raises SonicBulletError."""
-    from sonic_bullet.listener.pybullet.rigid_world import build_rigid_scene
+    from sonic_bullet.listener.pybullet.rigid.rigid_world import build_rigid_scene
 
     scene = read_rigid_scene(stage.path)
     stage.client = client = direct_client()
@@ -58,7 +58,12 @@ def _cast(scene: RigidScene, ids: list[int]) -> dict[int, dict[str, Any]]:
     cast: dict[int, dict[str, Any]] = {}
     for body_id, body in zip(ids, scene.bodies, strict=True):
         if body.model is not None:
-            cast[body_id] = {"material": body.material, "model": body.model, "name": body.name, "mounting": "free"}
+            cast[body_id] = {
+                "material": body.material,
+                "model": body.model,
+                "name": body.name,
+                "mounting": body.mounting,
+            }
         elif body.solved:
             cast[body_id] = {"material": body.material, "name": body.name}
     return cast

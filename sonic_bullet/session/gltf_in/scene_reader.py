@@ -1,7 +1,7 @@
 """A .gltf or .glb with KHR_physics_rigid_bodies -> RigidScene.
 
 tree -> a body a node that moves, and a body a collider that does not -> shapes, motion, material, model -> RigidBody
-     -> joints -> drives;  what is not understood -> notes
+     -> joints, drives, animations -> paths;  what is not understood -> notes
 
 A dynamic body with an acoustic material and no model is solved here where no body of the file has a model; else it is
 silent on purpose [Attaching to Nodes].
@@ -11,26 +11,30 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.reading import reading
 from sonic_bullet.geometry import shape_volume_m3
-from sonic_bullet.records import Shape
+from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.file_endings import GLTF_ENDINGS
-from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
-from sonic_bullet.session.gltf_in.acoustics import AUDIO, as_given, audio_of, material_of, model_of, said_of
+from sonic_bullet.records.rigid_scene import RigidBody, RigidJoint, RigidScene, SpeedDrive
+from sonic_bullet.session.gltf_in.acoustics import audio_of, material_of, model_of, said_of
+from sonic_bullet.session.gltf_in.animations import paths_of
+from sonic_bullet.session.gltf_in.joints import joint_of
 from sonic_bullet.session.gltf_in.node_frames import Nodes
+from sonic_bullet.session.gltf_in.own_words import FREE, own_mounting
 from sonic_bullet.session.gltf_in.physics import (
+    AUDIO,
     GRAVITY_M_S2,
     PHYSICS,
     SHAPES,
     body_frame,
     body_nodes,
     collider_shapes,
-    drive_of,
     motion_of,
     physics_of,
 )
@@ -59,8 +63,6 @@ def _scene_of(tree: GltfTree, name: str) -> RigidScene:
     nodes, notes = Nodes(tree), list[str]()
     used = [str(x) for x in tree.tree.get("extensionsUsed", ())]
     notes += [f"{name} uses {x}, which is not read" for x in used if x not in READ and not x.startswith(LOOKS)]
-    if tree.tree.get("animations"):
-        notes.append(f"animations of {name} are not played: sonic-bullet score gives them their sound")
     found = body_nodes(nodes)
     if not found:
         raise SceneError(f"{name} has no rigid body: its extensions are {', '.join(used) or 'none'}", REMEDY)
@@ -73,8 +75,20 @@ def _scene_of(tree: GltfTree, name: str) -> RigidScene:
             continue
         number_of[index] = len(bodies)
         bodies.append(_body(nodes, index, colliders, modelled, notes))
-    joined = [drive_of(nodes, index, number_of, notes) for index in nodes.in_scene()]
-    return RigidScene(tuple(bodies), tuple(x for x in joined if x is not None), GRAVITY_M_S2, _once(notes))
+    joined = [joint_of(nodes, index, number_of, notes) for index in nodes.in_scene()]
+    paths = paths_of(nodes, number_of, bodies, notes)
+    drives = tuple(one for one in joined if isinstance(one, SpeedDrive))
+    joints = tuple(one for one in joined if isinstance(one, RigidJoint))
+    weighed, gravity = _shared_gravity(bodies)
+    return RigidScene(weighed, drives, gravity, _once(notes), joints, paths)
+
+
+def _shared_gravity(bodies: Sequence[RigidBody]) -> tuple[tuple[RigidBody, ...], Array]:
+    """Take a gravityFactor that all that moves has for the scene's gravity."""
+    factors = {body.gravity_factor for body in bodies if body.mass_kg > 0}
+    if len(factors) != 1:
+        return tuple(bodies), GRAVITY_M_S2
+    return tuple(replace(body, gravity_factor=1.0) for body in bodies), GRAVITY_M_S2 * factors.pop()
 
 
 def _once(notes: Sequence[str]) -> tuple[str, ...]:
@@ -89,10 +103,11 @@ def _body(nodes: Nodes, index: int, colliders: list[int], modelled: bool, notes:
     physics = physics_of(nodes, colliders, name, notes)
     said, owner = said_of(nodes, index, colliders, notes)
     material, bulk = material_of(nodes, said, index, physics, notes)
-    model = None
+    model, mounting = None, FREE
     if "modalModel" in said and material is not None:
-        model = model_of(nodes, said["modalModel"], owner, frame, motion.mass_kg, bulk, notes)
-        material = as_given(material)
+        mounting = own_mounting(nodes.extension(owner, AUDIO))
+        model, residual = model_of(nodes, said["modalModel"], owner, frame, motion.mass_kg, bulk, mounting, notes)
+        material = replace(material, includes_radiation=True, residual=residual)
     mass = motion.mass_kg
     if mass is None:
         mass = model.mass_kg if model is not None and model.mass_kg else _solid_mass(shapes, bulk)
@@ -103,7 +118,7 @@ def _body(nodes: Nodes, index: int, colliders: list[int], modelled: bool, notes:
     return RigidBody(
         name, tuple(shapes), mass, motion.inertia_kg_m2, frame.centre_m, Rotation.from_matrix(frame.turn).as_quat(),
         motion.velocity_m_s, motion.spin_rad_s, physics, motion.gravity_factor, material, model, solved,
-        said.get("gain", 1.0),
+        said.get("gain", 1.0), mounting,
     )  # fmt: skip
 
 

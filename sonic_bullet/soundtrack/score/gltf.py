@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sonic_bullet.files.gltf.gltf_animation import Sampler, local_transforms, read_channels
 from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.reading import reading
@@ -33,7 +33,6 @@ BYTES_MAX = 1 << 30
 POSES_MAX = 2_000_000
 """Of all nodes: half a gigabyte while they are read."""
 _REMEDY = "export it again as glTF 2.0 (.glb)"
-REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 STRETCH = 1e-3
 """Relative change of a scale, or obliqueness of the axes of a transform, that is still rounding."""
 
@@ -49,7 +48,7 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
         if place.stat().st_size > BYTES_MAX:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         file = read_tree(place, AnimationError, _REMEDY)
-        channels = _channels(file)
+        channels = read_channels(file)
         if not channels:
             raise AnimationError(
                 f"{path} holds no node animation", "bake the simulation to keyframes and export with animations"
@@ -70,68 +69,6 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
         return Export(rate, objects, np.array([0.0, 0.0, -9.81]), tuple(notes))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sampler:
-    """Keys (k,) in s and values (k, w), or (3k, w) of a cubic spline: in-tangent, value, out-tangent of each."""
-
-    time_s: Array
-    value: Array
-    interpolation: str
-    turns: bool
-
-    def at(self, time_s: Array) -> Array:
-        """Interpolate (t, w) at these times, held before the first and after the last key [C.1 … C.5]."""
-        key, x = self.time_s, np.clip(time_s, self.time_s[0], self.time_s[-1])
-        i = np.clip(np.searchsorted(key, x + 1e-6, side="right") - 1, 0, max(len(key) - 2, 0))
-        j = np.minimum(i + 1, len(key) - 1)
-        width = np.maximum(key[j] - key[i], 1e-12)
-        s = np.clip((x - key[i]) / width, 0, 1)[:, None]
-        if self.interpolation == "CUBICSPLINE":
-            knots = self.value.reshape(len(key), 3, -1)
-            a, b = knots[i], knots[j]
-            found = (
-                (2 * s**3 - 3 * s**2 + 1) * a[:, 1] + width[:, None] * (s**3 - 2 * s**2 + s) * a[:, 2]
-                + (3 * s**2 - 2 * s**3) * b[:, 1] + width[:, None] * (s**3 - s**2) * b[:, 0]
-            )  # fmt: skip
-        elif self.interpolation == "STEP":
-            found = np.where(s >= 1, self.value[j], self.value[i])
-        elif self.turns:
-            found = _slerp(self.value[i], self.value[j], s)
-        else:
-            found = self.value[i] + s * (self.value[j] - self.value[i])
-        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True) if self.turns else found)
-
-
-def _slerp(a: Array, b: Array, s: Array) -> Array:
-    """Interpolate quaternions on the sphere [C.4], Shoemake 1985."""
-    dot = (a * b).sum(axis=1, keepdims=True)
-    b, dot = np.where(dot < 0, -b, b), np.minimum(np.abs(dot), 1.0)
-    angle = np.arccos(dot)
-    small = angle < 1e-6
-    sine = np.where(small, 1.0, np.sin(angle))
-    return np.asarray(np.where(small, a + s * (b - a), (np.sin((1 - s) * angle) * a + np.sin(s * angle) * b) / sine))
-
-
-def _channels(file: GltfTree) -> dict[int, dict[str, _Sampler]]:
-    """Read the samplers of each animated node, of all animations; of two on one path the first counts."""
-    found: dict[int, dict[str, _Sampler]] = {}
-    for animation in file.tree.get("animations", ()):
-        for channel in animation.get("channels", ()):
-            node, path = channel["target"].get("node"), channel["target"]["path"]
-            if node is None or path not in REST or path in found.get(node, {}):
-                continue
-            sampler = animation["samplers"][channel["sampler"]]
-            time_s = file.accessor(sampler["input"])[:, 0].astype(float)
-            value = file.accessor(sampler["output"]).astype(float)
-            how = sampler.get("interpolation", "LINEAR")
-            if len(value) != len(time_s) * (3 if how == "CUBICSPLINE" else 1) or (np.diff(time_s) <= 0).any():
-                raise AnimationError("a sampler has not one value a key, or keys out of order", _REMEDY)
-            if not (np.isfinite(time_s).all() and np.isfinite(value).all()):
-                raise AnimationError("a sampler holds numbers that are none", _REMEDY)
-            found.setdefault(node, {})[path] = _Sampler(time_s, value, how, path == "rotation")
-    return found
-
-
 def _parents(file: GltfTree) -> dict[int, int]:
     return {child: i for i, node in enumerate(file.tree.get("nodes", ())) for child in node.get("children", ())}
 
@@ -148,7 +85,7 @@ def _needed(file: GltfTree) -> set[int]:
 
 
 def _objects(
-    file: GltfTree, channels: Mapping[int, Mapping[str, _Sampler]], at_s: Array, scale: float, notes: list[str]
+    file: GltfTree, channels: Mapping[int, Mapping[str, Sampler]], at_s: Array, scale: float, notes: list[str]
 ) -> Iterator[ExportedObject]:
     nodes, parent = file.tree.get("nodes", []), _parents(file)
     known: dict[int, Array] = {}
@@ -158,7 +95,7 @@ def _objects(
         if depth > len(nodes):
             raise AnimationError("its nodes hang on themselves", _REMEDY)
         if i not in known:
-            own = _local(nodes[i], channels.get(i, {}), at_s)
+            own = local_transforms(nodes[i], channels.get(i, {}), at_s)
             known[i] = world(parent[i], depth + 1) @ own if i in parent else own
         return known[i]
 
@@ -188,24 +125,6 @@ def _objects(
             (vertex @ stretch.T * scale, face),
             stated=_stated(name, node),
         )
-
-
-def _local(node: Mapping[str, Any], own: Mapping[str, _Sampler], at_s: Array) -> Array:
-    """Compute the transform (t, 4, 4) of a node in its parent [3.5.3]."""
-    from scipy.spatial.transform import Rotation
-
-    if "matrix" in node and not own:
-        return np.broadcast_to(np.array(node["matrix"], float).reshape(4, 4).T, (len(at_s), 4, 4))
-    part = {
-        path: own[path].at(at_s)
-        if path in own
-        else np.broadcast_to(np.array(node.get(path, rest), float), (len(at_s), len(rest)))
-        for path, rest in REST.items()
-    }
-    made = np.zeros((len(at_s), 4, 4))
-    made[:, :3, :3] = Rotation.from_quat(part["rotation"]).as_matrix() * part["scale"][:, None, :]
-    made[:, :3, 3], made[:, 3, 3] = part["translation"], 1.0
-    return made
 
 
 def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from sonic_bullet.files.gltf.gltf_animation import Sampler
 from sonic_bullet.records.errors import AnimationError, SonicBulletError
 from sonic_bullet.soundtrack.frame_rates import nearest_rate, rate_of_keys
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
 from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
-from sonic_bullet.soundtrack.score.gltf import _Sampler
 from sonic_bullet.soundtrack.score.keyframes import FORMAT, read_rules
 from sonic_bullet.soundtrack.score.scoring import read_animation
 from tests.made.animations import (
@@ -67,19 +67,19 @@ def test_a_cubic_spline_holds_a_cubic() -> None:
     value, slope = key**3 - 2 * key**2 + key, 3 * key**2 - 4 * key + 1
     knots = np.stack([slope, value, slope], axis=1).reshape(-1, 1)
     at = np.linspace(0, 1, 33)
-    found = _Sampler(key, knots, "CUBICSPLINE", False).at(at)[:, 0]
+    found = Sampler(key, knots, "CUBICSPLINE", False).at(at)[:, 0]
     assert found == pytest.approx(at**3 - 2 * at**2 + at, abs=1e-12)
 
 
 def test_a_turn_goes_at_one_speed_by_the_shorter_arc() -> None:
     ends = Rotation.from_rotvec(np.radians([[0, 0, 10], [0, 0, 70]])).as_quat()
     ends[1] *= -1  # the same orientation
-    found = _Sampler(np.array([0.0, 1.0]), ends, "LINEAR", True).at(np.linspace(0, 1, 7))
+    found = Sampler(np.array([0.0, 1.0]), ends, "LINEAR", True).at(np.linspace(0, 1, 7))
     assert Rotation.from_quat(found).as_euler("zyx", degrees=True)[:, 0] == pytest.approx(np.linspace(10, 70, 7))
 
 
 def test_a_step_holds_until_the_next_key() -> None:
-    step = _Sampler(np.array([0.0, 1.0, 2.0]), np.array([[1.0], [2.0], [3.0]]), "STEP", False)
+    step = Sampler(np.array([0.0, 1.0, 2.0]), np.array([[1.0], [2.0], [3.0]]), "STEP", False)
     assert step.at(np.array([-1, 0, 0.9, 1.0, 1.9, 2.0, 9.0]))[:, 0].tolist() == [1, 1, 1, 2, 2, 3, 3]
 
 

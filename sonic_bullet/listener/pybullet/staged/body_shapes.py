@@ -59,7 +59,8 @@ def collision_options(shape: Shape, body: AnimatedBody) -> Iterator[dict[str, An
         kind = pybullet.GEOM_CAPSULE if shape.kind == "capsule" else pybullet.GEOM_CYLINDER
         yield {"shapeType": kind, "radius": size[0], "height": size[1], **placed}
     elif shape.kind == "plane":
-        yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [0, 0, 1]}
+        turn = np.array(pybullet.getMatrixFromQuaternion(shape.quaternion_xyzw)).reshape(3, 3)
+        yield {"shapeType": pybullet.GEOM_PLANE, "planeNormal": turn[:, 2].tolist()}
     else:
         found = pieces(shape, body.name, body.mass_kg > 0)
         for corner in found:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
+from sonic_bullet.geometry.shape_surfaces import shape_triangles
 from sonic_bullet.geometry.triangles import corner_normals
 from sonic_bullet.listener.pictures import Camera, Figure, Standing
 from sonic_bullet.listener.pybullet import body_facts as facts
@@ -27,8 +28,6 @@ LIGHT = (0.4, -0.6, 1.2)
 FAR_AWAY = (0.0, 0.0, -1e5)
 SMOOTH = 0.001
 """Deviation of a simplified mesh, relative to its size: less than a pixel of a picture that it fills."""
-PLANE_M = 100.0
-"""Side of the square that is drawn for a plane."""
 
 
 class PyBulletPictures:
@@ -172,7 +171,7 @@ def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
     """
     vertices, faces, count = [], [], 0
     for shape in shapes:
-        vertex, face = _triangles(shape)
+        vertex, face = shape_triangles(shape)
         turn = np.array(pybullet.getMatrixFromQuaternion(shape.quaternion_xyzw)).reshape(3, 3)
         vertices.append(vertex @ turn.T + shape.position_m)
         faces.append(face + count)
@@ -180,23 +179,3 @@ def surface(shapes: Sequence[Shape]) -> tuple[Array, Array]:
     if not faces:
         raise MeshError("a link without a shape", "give it one")
     return np.concatenate(vertices), np.concatenate(faces)
-
-
-def _triangles(shape: Shape) -> tuple[Array, Array]:
-    """Return vertices and faces of a shape in its own frame."""
-    from trimesh import creation
-
-    x, y, _ = shape.size_m.tolist()
-    if shape.kind == "mesh":
-        return shape.vertex_m, shape.face
-    if shape.kind == "sphere":
-        made = creation.icosphere(subdivisions=3, radius=x)
-    elif shape.kind == "cylinder":
-        made = creation.cylinder(radius=x, height=y, sections=64)
-    elif shape.kind == "capsule":
-        made = creation.capsule(radius=x, height=y)
-    else:
-        made = creation.box(extents=shape.size_m if shape.kind == "box" else (PLANE_M, PLANE_M, 1e-3))
-    vertex = np.array(made.vertices, float)
-    # a capsule starts at its lower cap's centre in some releases
-    return vertex - (np.ptp(vertex, axis=0) / 2 + vertex.min(axis=0)), np.asarray(made.faces)

@@ -3,6 +3,7 @@
     RigidBody -> collision shapes in its principal frame -> multibody -> dynamics, speeds
     PhysicsMaterial of two bodies, combined -> a factor each, whose products PyBullet takes for the pair
     SpeedDrive -> a force before each step: F = I + m Δv/dt, I = Σ k m Δv/dt, at most most_n  [PI control]
+    RigidJoint, BodyPath of a body of mass 0 -> rigid_joints, kinematic_bodies
 
 PyBullet multiplies both bodies' friction, and so their restitution. Where the file's pairs are no products, the nearest
 are taken by least squares of logarithms, over the pairs that can meet, and named.
@@ -17,6 +18,8 @@ import numpy as np
 
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.listener.pybullet.restitution import keep_restitution
+from sonic_bullet.listener.pybullet.rigid.kinematic_bodies import as_kinematic, follow_path
+from sonic_bullet.listener.pybullet.rigid.rigid_joints import make_joints
 from sonic_bullet.listener.pybullet.staged.body_shapes import collision_options, compound
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import CombineRule, PhysicsMaterial, RigidBody, RigidScene, SpeedDrive
@@ -37,12 +40,16 @@ def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callab
     client.setGravity(*scene.gravity_m_s2.tolist())
     friction, some = pair_factors(scene.bodies, combined_friction)
     restitution, more = pair_factors(scene.bodies, combined_restitution)
+    driven = {path.body: path for path in scene.paths if scene.bodies[path.body].mass_kg <= 0}
     ids = [
-        _made(client, body, float(f), float(e)) for body, f, e in zip(scene.bodies, friction, restitution, strict=True)
+        _made(client, as_kinematic(body) if i in driven else body, float(friction[i]), float(restitution[i]))
+        for i, body in enumerate(scene.bodies)
     ]
     keep_restitution(client)
+    notes = list(make_joints(client, scene, ids))
     movers: list[Callable[[], None]] = [_lifter(client, one, x) for one, x in zip(ids, scene.bodies, strict=True)
         if x.mass_kg > 0 and x.gravity_factor != 1]  # fmt: skip
+    movers += [follow_path(client, ids[i], path) for i, path in driven.items()]
     for drive in scene.drives:
         movers.append(_motor(client, ids, drive, scene.bodies[drive.body].mass_kg))
         if drive.turns_locked:
@@ -53,7 +60,7 @@ def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callab
         for move in movers:
             move()
 
-    notes = [f"friction of {words}" for words in some] + [f"restitution of {words}" for words in more]
+    notes += [f"friction of {words}" for words in some] + [f"restitution of {words}" for words in more]
     return ids, act, tuple(notes)
 
 
@@ -106,6 +113,9 @@ def pair_factors(
     """
     kinds = list(dict.fromkeys(body.physics for body in bodies))
     count = len(kinds)
+    rule = "friction" if combine is combined_friction else "restitution"
+    if all(getattr(kind, f"{rule}_rule") == "multiply" for kind in kinds):
+        return np.array([getattr(body.physics, rule) for body in bodies]), ()
     moving = {body.physics for body in bodies if body.mass_kg > 0}
     several = {kind for kind in moving if sum(body.physics == kind and body.mass_kg > 0 for body in bodies) > 1}
     still = {body.physics for body in bodies if body.mass_kg <= 0}

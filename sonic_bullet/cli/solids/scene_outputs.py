@@ -1,0 +1,72 @@
+"""A scene or a contact log as one glTF: run or read, baked, written whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sonic_bullet.cli.output import status
+from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.records import Body
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import AudioError, FileError
+
+if TYPE_CHECKING:
+    from sonic_bullet.bake import BakedModel, PruningOptions
+    from sonic_bullet.bake.scene_out.scene_tree import BodySound
+    from sonic_bullet.listener.pybullet.rigid.world_scene import StandingScene
+    from sonic_bullet.session import Listener
+
+
+def write_whole_scene(
+    to: str, source: str, materials: WantedMaterials, pruning: PruningOptions, seconds: float | None
+) -> tuple[list[BakedModel], str, tuple[str, ...]]:
+    """Write it; return its models, a line on the rest, and notes. Raises SonicBulletError."""
+    from sonic_bullet.bake.scene_out.recorded_scene import recorded_scene
+    from sonic_bullet.bake.scene_out.scene_tree import write_scene
+    from sonic_bullet.cli.solids.bake_outputs import scene_log
+
+    standing: list[StandingScene] = []
+    log = scene_log(source, materials, seconds, lambda listener: standing.append(_world_of(listener)))
+    if is_log(source) and seconds is not None:
+        if seconds > log.duration_s + 1e-9:
+            raise AudioError(f"{source} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds")
+        log = log.first(int((log.start_s < seconds - 1e-9).sum()))
+    world = standing[0] if standing else None
+    made = recorded_scene(log, *((world.scene, world.links) if world is not None else ()))
+    if not any(body is not None and body.model is not None and body.model.mode_count for body in made.members):
+        raise FileError(f"no body of {source} has modes", "give one a material that rings")
+    with status(source) as say:
+        sounds: list[BodySound] = []
+        for body in made.members:
+            say("" if body is None else body.name)
+            sounds.append(_sound_of(body, pruning))
+    notes = (*made.scene.notes, *write_scene(to, made.scene, sounds))
+    scene = made.scene
+    joints = f", {format_count(len(scene.joints), 'joint')}" if scene.joints else ""
+    line = (
+        f"{Path(to).name}: {format_count(len(scene.bodies), 'body', 'bodies')}{joints}, "
+        f"{log.duration_s:.3g} s of motion of {len(scene.paths)}"
+    )
+    return [one.model for one in sounds if one.model is not None], line, notes
+
+
+def _world_of(listener: Listener) -> StandingScene:
+    from sonic_bullet.listener import PyBulletWorld
+    from sonic_bullet.listener.pybullet.rigid.world_scene import read_world_scene
+
+    assert isinstance(listener.world, PyBulletWorld)  # scenes run in PyBullet
+    return read_world_scene(listener.world.client_id, listener.world.record_names)
+
+
+def _sound_of(body: Body | None, pruning: PruningOptions) -> BodySound:
+    from sonic_bullet.bake import bake_body
+    from sonic_bullet.bake.baking import bake_material
+    from sonic_bullet.bake.scene_out.scene_tree import BodySound
+
+    if body is None or body.material is None:
+        return BodySound()
+    gain = 0.0 if body.silent else body.gain
+    if body.model is not None and body.model.mode_count:
+        return BodySound(bake_body(body, pruning), bake_material(body.material), gain, body.mounting)
+    return BodySound(None, bake_material(body.material), gain)

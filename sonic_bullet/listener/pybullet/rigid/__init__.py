@@ -1,0 +1,1 @@
+"""Scenes of rigid bodies by value, to and from a PyBullet world."""
