@@ -195,7 +195,6 @@ def described(found: Any) -> dict[str, Any]:
         "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
         "dimension_tolerance": found.dimension_tolerance,
         "verdict": fit.verdict,
-        "metric": fit.metric if fit.metric >= 0 else None,
         "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
         "takes": [asdict(take) for take in found.takes],
         "next_measurement": next_measurement(found),
@@ -282,10 +281,6 @@ def _summary(found: Any, preset: Any) -> str:
         text.append(
             f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest "
             f"{np.abs(correction).max():.2%}"
-        )
-    if fit.metric >= 0:
-        text.append(
-            f"hybrid metric of recording and synthesis: {fit.metric:.3g} (0 the same, 1 and more as far as silence)"
         )
     if found.log_spectral_db >= 0:
         text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.metric import Constants
 from sonic_bullet.records import Array
+from studies.ren2013.hybrid.metric import Constants
 from studies.ren2013.optimise import fast, polish
 from studies.ren2013.plates import plate
 from studies.ren2013.problem import Problem, modes_of

@@ -19,8 +19,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.metric import Constants
 from sonic_bullet.records import Array
+from studies.ren2013.hybrid.metric import Constants
 from studies.ren2013.partners import all_partners, candidates
 from studies.ren2013.problem import Found, Problem
 from studies.ren2013.search_metric import Aim, aim_at, hybrid, residuals

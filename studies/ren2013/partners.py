@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.matching import Points, energy, match_ratio_product
+from sonic_bullet.estimator.lines.line_values import Features, energy
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
+from studies.ren2013.hybrid.matching import Points, match_ratio_product
 from studies.ren2013.problem import Problem, modes_of
 from studies.ren2013.search_metric import Aim
 from studies.ren2013.starts import by_energy, feature_eigenvalues, undominated

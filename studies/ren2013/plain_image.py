@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import Image, pooled, spectra
+from sonic_bullet.estimator.perceptual.image import pooled, spectra
 from sonic_bullet.estimator.perceptual.loudness import loudness
 from sonic_bullet.records import Array
+from studies.ren2013.hybrid.image import Image
 
 
 def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import distance
-from sonic_bullet.estimator.perceptual.matching import match_ratio_product
-from sonic_bullet.estimator.perceptual.metric import Constants, Target, hybrid_of_modes, match_of_modes, target
 from sonic_bullet.records import Array
+from studies.ren2013.hybrid.image import distance
+from studies.ren2013.hybrid.matching import match_ratio_product
+from studies.ren2013.hybrid.metric import Constants, Target, hybrid_of_modes, match_of_modes, target
 from studies.ren2013.plain_image import plain_distance
 from studies.ren2013.problem import Problem, modes_of
 

@@ -26,7 +26,6 @@ KEYS = {
     "covariance",
     "dimension_tolerance",
     "verdict",
-    "metric",
     "log_spectral_db",
     "takes",
     "next_measurement",
@@ -68,7 +67,6 @@ def test_case_to_preset_json_and_picture(folder: Path, tmp_path: Path, capfd: py
     told: dict[str, Any] = json.loads(capfd.readouterr().out)
     assert set(told) == KEYS
     assert told["verdict"] == "fitted"
-    assert 0 <= told["metric"] < 1e-3  # Π at the truth, but for noise
     assert 0 < told["log_spectral_db"] < 3
     assert told["alpha_per_s"] == pytest.approx(8.0, rel=5e-3)
     assert np.array(told["covariance"], float).shape == (5, 5)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.image import Image, distance, image
 from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, loudness, phon, sone
-from sonic_bullet.estimator.perceptual.matching import match_ratio_product, points
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
+from studies.ren2013.hybrid.image import Image, distance, image
+from studies.ren2013.hybrid.matching import match_ratio_product, points
 from studies.ren2013.plain_image import plain_distance
 from tests.few_cases import parametrize_few
 

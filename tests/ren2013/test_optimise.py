@@ -9,10 +9,10 @@ import pytest
 
 from sonic_bullet.estimator.lines.extraction import extract
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.metric import Constants
 from sonic_bullet.modal import analyse
 from sonic_bullet.records import Array, Material, Shape
 from sonic_bullet.records.errors import RecordError
+from studies.ren2013.hybrid.metric import Constants
 from studies.ren2013.optimise import fast, polish, reference
 from studies.ren2013.problem import Problem, modes_of
 from studies.ren2013.search_metric import aim_at, hybrid

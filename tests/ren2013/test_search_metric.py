@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.perceptual.image import distance
+from studies.ren2013.hybrid.image import distance
 from studies.ren2013.problem import Problem, modes_of
 from studies.ren2013.search_metric import aim_at, hybrid, match, residuals
 from tests.estimator.test_metric import observed, sounding

@@ -13,7 +13,7 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Comparable, Take
 from sonic_bullet.estimator.lines.log_spectral import with_noise
-from sonic_bullet.estimator.perceptual.image import image
+from sonic_bullet.estimator.perceptual.image import loudness_levels
 from sonic_bullet.records.errors import RecordError
 
 FULL_SCALE = 90.0
@@ -27,10 +27,13 @@ def sone_distance(takes: Comparable, made: Predictions) -> float | None:
     for take in (t for t in takes if isinstance(t, Take)):
         played = with_noise(take.played(made[take.body]), take.floor, take.strike)
         try:
-            a, b = (image(x, take.sr, 0.0, FULL_SCALE, levels=levels, bark_step=1.0) for x in (take.sample, played))
+            a, b = (
+                loudness_levels(x, take.sr, 0.0, FULL_SCALE, levels=levels, bark_step=1.0)
+                for x in (take.sample, played)
+            )
         except RecordError:
             continue
-        for one, two in zip(a.levels, b.levels, strict=False):
+        for one, two in zip(a, b, strict=False):
             observed = one.loud.sum(axis=1) > OBSERVED
             if observed.any():
                 found.append(float(np.abs(one.loud - two.loud).sum(axis=1)[observed].mean()))

@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit, RadiationIn
 from sonic_bullet.estimator.fit.chance_pairs import PAIRED, strong_lines
-from sonic_bullet.estimator.fit.comparison import hybrid_of, log_spectral_of
+from sonic_bullet.estimator.fit.comparison import log_spectral_of
 from sonic_bullet.estimator.fit.dimension_tolerance import add_dimension_tolerance, scale_tolerance
 from sonic_bullet.estimator.fit.pairing import DEGENERATE
 from sonic_bullet.estimator.fit.rayleigh import RayleighFit
@@ -66,7 +66,6 @@ def finished(
     covariance[np.outer(identified, identified) & np.isnan(covariance)] = 0.0
     amiss = _amiss(objects, damping, scatter, gain[2], foreign, share, by_chance)
     amplitude = gain[0] if np.isfinite(gain[0]) else 1.0
-    metric, decibels = hybrid_of(objects, amplitude), log_spectral_of(objects, amplitude)
     verdict = (
         "; ".join(
             [f"misfit: {', '.join(amiss)}"] * bool(amiss) + [f"not identifiable: {', '.join(unsaid)}"] * bool(unsaid)
@@ -76,7 +75,7 @@ def finished(
     freq, decay, size = _modes(evidence, objects, amplitude)
     gamma = float(np.exp(log_gamma))
     values = (damping.alpha_per_s, damping.beta_s, gamma, amplitude, poisson)
-    found = MaterialFit(*values, covariance, verdict, metric, freq, decay, size)
+    found = MaterialFit(*values, covariance, verdict, freq, decay, size)
     density = guess.density_kg_m3
     assumed = ["density (from the guess: modes tell E/ρ alone, and the gain is unknown)"]
     if np.isnan(covariance[4, 4]):
@@ -100,7 +99,7 @@ def finished(
         foreign,
         tuple(assumed),
         tuple(warnings),
-        decibels,
+        log_spectral_of(objects, amplitude),
         radiation,
         evidence,
         dimension_tolerance=tolerance,

@@ -62,14 +62,18 @@ class Features:
             )
 
 
+def energy(decay_per_s: Array, amplitude: Array) -> Array:
+    """Return ∫ (a e^{−dt} sin ωt)² dt (m,) for d ≪ ω of damped sinusoids (m,)."""
+    return np.asarray(amplitude**2 / (4 * np.maximum(decay_per_s, 1e-3)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialFit:
     """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α,
     ln β, ln γ, ln σ, ν.
 
     A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not,
-    one line. metric: the hybrid metric Π there (metric.py), mean over the fitted strikes, -1 where there is nothing to
-    compare. modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
+    one line. modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
     """
 
     alpha_per_s: float
@@ -79,7 +83,6 @@ class MaterialFit:
     poisson_ratio: float
     covariance: Array  # (5, 5)
     verdict: str
-    metric: float
     freq_hz: Array  # (m,)
     decay_per_s: Array  # (m,)
     amplitude: Array  # (m,)

@@ -5,7 +5,7 @@ features leave of the sound.
         [Ren, Yeh, Lin 2013, sec. 6.1]
 
     R(φ_i, Φ̃) = Σ_j u_ij k_ij / Σ_j u_ij,   k = 1/(1 + D²),  u_ij = w_j/(D² + δ²)²
-        [eq. 23-25; matching.py]
+        [eq. 23-25]
     w_i = min(R_i, √(Σ_j k_ij² a_j²)/a_i)
 
 D is stricter than in a search for the material, as frequencies have been corrected by then. What is left is to be
@@ -22,9 +22,8 @@ import numpy as np
 from sonic_bullet.estimator.fit.case_fit import CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
 from sonic_bullet.estimator.fit.typical_strike import ringing
-from sonic_bullet.estimator.lines.line_values import Lines
+from sonic_bullet.estimator.lines.line_values import Lines, energy
 from sonic_bullet.estimator.perceptual.loudness import bark
-from sonic_bullet.estimator.perceptual.matching import energy
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError

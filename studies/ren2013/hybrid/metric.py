@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.estimator.lines.line_values import Features
-from sonic_bullet.estimator.perceptual.image import Image, distance, image
-from sonic_bullet.estimator.perceptual.matching import Points, match_ratio_product, points
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import RecordError
+from studies.ren2013.hybrid.image import Image, distance, image
+from studies.ren2013.hybrid.matching import Points, match_ratio_product, points
 
 MATCH_FLOOR = 1e-6  # a match ratio product of zero would make Π infinite
 PASCAL_DB_SPL = 94.0  # of an rms of 1 where samples are pascals

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.estimator.perceptual.image import OUTSIDE, WINDOW
 from sonic_bullet.machine.compiled import njit
 
-WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 NODES = 8  # of the loudness table, an octave of power
-OUTSIDE = -2  # in Level.band: a bin that feeds no triangle
 TABLE_FROM, TABLE_TO = -13, 54  # its powers of two: −39 to 162 dB SPL
 
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.estimator.lines.line_values import Features
+from sonic_bullet.estimator.lines.line_values import Features, energy
 from sonic_bullet.estimator.perceptual.loudness import bark
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
@@ -37,11 +37,6 @@ class Points(NamedTuple):
     per_s: float
     near: float
     power: float
-
-
-def energy(decay_per_s: Array, amplitude: Array) -> Array:
-    """(m,) ∫ (a e^{−dt} sin ωt)² dt for d ≪ ω."""
-    return np.asarray(amplitude**2 / (4 * np.maximum(decay_per_s, 1e-3)))
 
 
 def points(
