@@ -1,6 +1,6 @@
-"""From recordings to materials [after Ren, Yeh, Lin 2013, sections 4 and 5; their own search: benchmarks/ren2013].
+r"""From recordings to materials [after Ren, Yeh, Lin 2013, sections 4 and 5; their own search: studies/ren2013].
 
-    recordings -> Lines (lines) \\
+    recordings -> Lines (lines) \
     mesh + guess -> Family (modal) -> pairs, least squares (fit) -> MaterialFit -> preset -> the run time
     case -> Observation        /
 

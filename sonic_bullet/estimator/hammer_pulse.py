@@ -39,7 +39,7 @@ class HammerPulse:
 
 
 def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
-    """The pulse in a take's force (n,); None where none stands above its noise."""
+    """Measure the pulse in a take's force (n,); None where none stands above its noise."""
     rest = force - np.median(force)
     turned = -rest.min() > rest.max()
     rest = -rest if turned else rest

@@ -27,9 +27,9 @@ POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the gue
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectFit:
-    """One object under the fitted material. m groups of modes in the band, ascending: freq_hz with, model_hz without
-    their correction (m,); decay_per_s (m,).
+    """One object under the fitted material.
 
+    m groups of modes in the band, ascending: freq_hz with, model_hz without their correction (m,); decay_per_s (m,).
     pattern (s, m): J ψ; line (m,): the line that each is, or -1; measured_hz, measured_decay_per_s (m,) NaN where none.
     sensor_weight (m,): of a microphone, else 1.
     """
@@ -53,9 +53,9 @@ class ObjectFit:
 
 @dataclass(frozen=True, slots=True)
 class TakeDistance:
-    """One take's log-spectral distances in dB: of the fit's prediction, of silence, of the nearest other take; NaN
-    where nothing of it stands above its noise, or where there is no other take.
+    """One take's log-spectral distances in dB: of the fit's prediction, of silence, of the nearest other take.
 
+    NaN where nothing of it stands above its noise, or where there is no other take.
     free_gain: whether the prediction's gain was fitted to this take, its impulse or place being unknown. gain: that
     gain, 0 where none makes it nearer than silence; else 1. plausible_db: of the guessed material on the object's
     shape, at its best gain; NaN where it has no mesh.
@@ -73,15 +73,14 @@ class TakeDistance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaseFit:
-    """A fit and what it rests on. youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the
-    law.
+    """A fit and what it rests on.
 
-    amplitude_scatter: relative, of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was
-    taken from the guess. warnings: one line each. log_spectral_db: distance of recording and synthesis (distance.py),
-    mean over the fitted strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with.
-    evidence: what was recorded of each object, those
-    without a mesh included. takes: how far the prediction of each take is, of those held out where there are any.
-    dimension_tolerance: of the shapes, relative, in γ's variance.
+    youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the law. amplitude_scatter: relative,
+    of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was taken from the guess. warnings:
+    one line each. log_spectral_db: distance of recording and synthesis (distance.py), mean over the fitted strikes; -1
+    where there is nothing to compare. radiation: what α and β are without, or with. evidence: what was recorded of each
+    object, those without a mesh included. takes: how far the prediction of each take is, of those held out where there
+    are any. dimension_tolerance: of the shapes, relative, in γ's variance.
     """
 
     case: Case
@@ -108,8 +107,10 @@ class CaseFit:
         return bool(self.objects) or any(r.object in self.case.objects for e in self.evidence for r in e.recordings)
 
     def plays_modes(self, e: RecordedObject) -> bool:
-        """Whether an object's strikes at known places are played by the modes of its shape: where their gain is known
-        and the lines are modes, not by chance. Else by its lines, as struck on average.
+        """Say whether an object's strikes at known places are played by the modes of its shape.
+
+        They are where their gain is known and the lines are modes, not by chance; else by its lines, as struck on
+        average.
         """
         return e.family is not None and bool(np.isfinite(self.gain_sd) and np.isfinite(self.fit.covariance[2, 2]))
 

@@ -13,9 +13,7 @@ from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db,
 
 
 def log_spectral_of(objects: tuple[ObjectFit, ...], gain: float) -> float:
-    """Mean log-spectral distance in dB of recording and synthesis over the fitted strikes; -1 where there is nothing to
-    compare.
-    """
+    """Return the mean distance in dB of recording and synthesis over the fitted strikes; -1 with nothing to compare."""
     found = []
     for o in objects:
         e = o.evidence

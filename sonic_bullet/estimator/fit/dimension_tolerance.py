@@ -21,7 +21,7 @@ GAMMA_PER_SCALE = 2.0  # d ln γ / d ln L
 
 
 def scale_tolerance(objects: tuple[ObjectFit, ...]) -> float:
-    """The relative standard error of the dimensions behind γ: of the objects that have lines, the largest."""
+    """Return the relative standard error of the dimensions behind γ: of the objects that have lines, the largest."""
     return max((o.evidence.thing.dimension_tolerance for o in objects if (o.line >= 0).any()), default=0.0)
 
 
@@ -34,5 +34,5 @@ def add_dimension_tolerance(covariance: Array, tolerance: float) -> None:
 
 
 def lines_sd(covariance: Array, tolerance: float) -> float:
-    """The spread of ln γ that the lines alone leave."""
+    """Return the spread of ln γ that the lines alone leave."""
     return float(np.sqrt(max(covariance[2, 2] - (GAMMA_PER_SCALE * tolerance) ** 2, 0.0)))

@@ -1,5 +1,4 @@
-"""What a fit may claim: covariance, what is not identifiable, where the model does not fit, and whether the mesh is
-fine enough.
+"""What a fit may claim: covariance, what is not identifiable, where model or mesh do not do.
 
 fitted | not identifiable: WHICH and why | misfit: WHAT does not hold
     parts joined by "; ", "fitted" alone where nothing is amiss
@@ -39,7 +38,7 @@ def finished(
     radiation: RadiationIn,
     by_chance: bool,
 ) -> CaseFit:
-    """The CaseFit of all that was found. by_chance: lines would find as many modes of the meshes by chance."""
+    """Return the CaseFit of all that was found. by_chance: lines would find as many modes of the meshes by chance."""
     log_gamma, poisson, information, scatter = elastic
     guess = evidence[0].guess
     covariance = np.full((5, 5), np.nan)
@@ -107,7 +106,7 @@ def finished(
 
 
 def _mesh_warning(family: Family) -> list[str]:
-    """A warning where elements may bend γ by over 1 %, or where that is not known; none without elements."""
+    """Warn where elements may bend γ by over 1 %, or where that is not known; none without elements."""
     if not family.meshed or 2 * family.error <= GAMMA_MOVES:
         return []
     if np.isnan(family.error):

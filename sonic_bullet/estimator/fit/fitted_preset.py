@@ -25,15 +25,16 @@ NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
 
 
 def spreads(found: CaseFit) -> dict[str, float | None]:
-    """Standard errors in the parameters' own units, None where not identifiable."""
+    """Return standard errors in the parameters' own units, None where not identifiable."""
     sd = np.sqrt(np.diag(found.fit.covariance))
     value = (found.fit.alpha_per_s, found.fit.beta_s, found.fit.gamma_m2_s2, found.fit.sigma, 1.0)
     return {name: float(s * v) if np.isfinite(s) else None for name, s, v in zip(NAMES, sd, value, strict=True)}
 
 
 def recorded_lines(found: CaseFit) -> RecordedLines | None:
-    """The lines of an object as they were struck on average, where no line is known to be a mode of a shape; None
-    where the modes of a mesh say more, or where there is no line.
+    """Return the lines of an object as struck on average, where no line is known to be a mode of a shape.
+
+    None where the modes of a mesh say more, or where there is no line.
     """
     if found.objects and np.isfinite(found.fit.covariance[2, 2]):
         return None
@@ -51,7 +52,7 @@ def recorded_lines(found: CaseFit) -> RecordedLines | None:
 
 
 def preset_of(found: CaseFit) -> Preset:
-    """The preset of a fit.
+    """Return the preset of a fit.
 
     Surface and impact are no part of what modes tell: they are the guess's, or steel's for a guess without a name.
     """

@@ -40,10 +40,9 @@ WORSE_THAN_SILENCE = "worse-than-silence"
 
 
 def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
-    """The fit with the distances of the takes held out, or of its own where none is; and with the verdict that it is
-    worse than silence where it is.
+    """Return the fit with its distances from the takes held out, and with the verdict of one worse than silence.
 
-    Raises SonicBulletError.
+    Where none is held out they are those of its own takes. Raises SonicBulletError.
     """
     takes = predicted_takes(found, progress=progress)
     judged = replace(found, takes=takes)

@@ -1,5 +1,4 @@
-"""Recordings -> material: which mode each line is, γ and ν from the frequencies, α and β from the decays, σ from the
-amplitudes.
+"""Recordings -> material: each line's mode, γ and ν from frequencies, α and β from decays, σ from amplitudes.
 
     Evidence per object -> lines, of two kinds (choose_lines)
                         -> pairs (pairing.py), all objects at one (γ, ν) -> ln γ, ν: weighted least squares on ln λ
@@ -54,7 +53,7 @@ __all__ = [
 @says_so(text="progress")
 @one_thread()
 def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> CaseFit:
-    """The material of a case, from its 'fit' strikes alone.
+    """Fit the material of a case, from its 'fit' strikes alone.
 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands
     in the verdict instead.
@@ -65,11 +64,11 @@ def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], 
 
 @one_thread()
 def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[RecordedObject, ...]:
-    """The evidence, with lines of what rings after the attack where those from the onset on find no more modes of their
-    shapes than by chance, and these do.
+    """Return the evidence with lines from the onset on, or of what rings after the attack.
 
-    A real take's attack is no sum of lines: hundreds describe it, and hide the few that are modes. Where no shape is
-    known lines are only played again, and those from the onset on predict other takes better.
+    The latter where the former find no more modes of their shapes than by chance, and they do. A real take's attack is
+    no sum of lines: hundreds describe it, and hide the few that are modes. Where no shape is known lines are only
+    played again, and those from the onset on predict other takes better.
     """
     shaped = tuple(e for e in evidence if e.family is not None and e.signals is not None and len(e.lines.freq_hz))
     if not shaped or not _by_chance(case, shaped, _placed(shaped, case.band_hz)[0]):
@@ -150,9 +149,7 @@ def fit_evidence(
 
 
 def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) -> tuple[tuple[Pairs, ...], Array, float]:
-    """Pairs of every object at one common (ln γ, ν), information (2, 2) of the lines on it, relative scatter of
-    frequencies.
-    """
+    """Pair every object at one common (ln γ, ν); information (2, 2) of the lines on it, scatter of frequencies."""
     guess = shaped[0].guess
     centre = float(np.log(guess.youngs_pa / guess.density_kg_m3))
     starts = []
@@ -175,8 +172,9 @@ def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) ->
 def _together(
     shaped: tuple[RecordedObject, ...], start: tuple[float, float], guess_poisson: float
 ) -> tuple[tuple[Pairs, ...], Array, float]:
-    """Assign and solve for all objects at once until nothing moves; what the modes scatter is then learnt, in place of
-    `MESH_SD`.
+    """Assign and solve for all objects at once until nothing moves.
+
+    What the modes scatter is then learnt, in place of `MESH_SD`.
     """
     log_gamma, poisson = start
     information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, MESH_SD
@@ -221,9 +219,7 @@ def _undamped_hz(e: RecordedObject, line: Array) -> Array:
 def _decays(
     evidence: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], air: tuple[Radiated | None, ...]
 ) -> tuple[Array, Array, Array, Array]:
-    """λ, d, its spread and what of it is radiation, of the lines that are modes; of all lines where there is
-    no shape.
-    """
+    """Return λ, d, its spread and what of it is radiation, of the lines that are modes; of all without a shape."""
     found, at = [], 0
     for e in evidence:
         which = np.arange(len(e.lines.freq_hz))

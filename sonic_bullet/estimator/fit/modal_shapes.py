@@ -23,7 +23,7 @@ ALONG = 1e-3  # of a direction: how far off an axis it still is one
 
 
 def modal_shapes(found: CaseFit) -> ModalShapes:
-    """The modes of a fit's first object at points: on its surface where E/ρ is known, else at its strikes.
+    """Return the modes of a fit's first object at points: on its surface where E/ρ is known, else at its strikes.
 
     Raises FileError where neither a shape nor a strike's place and direction is known.
     """
@@ -68,8 +68,9 @@ def _of_strikes(name: str, e: RecordedObject) -> ModalShapes:
 
 
 def mobilities(found: CaseFit, shapes: ModalShapes) -> tuple[Mobility, ...]:
-    """What the fit predicts of velocity per force between the places of its first object's strikes and its sensor;
-    none where a place, an impulse or the gain is not known, or a direction lies along no axis.
+    """Predict velocity per force between the places of the first object's strikes and its sensor.
+
+    None where a place, an impulse or the gain is not known, or a direction lies along no axis.
     """
     if not found.objects or not found.plays_modes(found.objects[0].evidence) or found.case.sensor != "velocity":
         return ()

@@ -1,5 +1,4 @@
-"""One object's modes under a material: frequencies corrected where a line says, decays by the law, patterns as the
-sensor hears them; and σ.
+"""One object's modes under a material: frequencies, decays, patterns as the sensor hears them; and σ.
 
 (γ, ν) -> modes of the family -> λ, d = ½(α + βλ) + Δd, f = √(λ − d²)/2π
     [Ren, Yeh, Lin 2013, eq. 6, 7; Δd: radiation_share.py]
@@ -33,7 +32,7 @@ def fitted_object(
     *,
     taken_off: bool = False,
 ) -> ObjectFit:
-    """An object's modes under the material, corrected where a line says.
+    """Return an object's modes under the material, corrected where a line says.
 
     taken_off: damping is the material's own, and radiation comes on top.
     """
@@ -72,11 +71,10 @@ def fitted_object(
 
 
 def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
-    """σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known; NaN where
-    none is.
+    """Fit σ, its spread and the relative scatter of amplitudes about σψ, over all strikes whose place is known.
 
-    Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the mode's strongest
-    ψ, the shapes' own error.
+    NaN where none is. Least squares with Cauchy's weights; an amplitude counts as known to its spread and to 2 % of the
+    mode's strongest ψ, the shapes' own error.
     """
     observed, turned, predicted, loose = [], [], [], []
     # a strike without an impulse counts as 1 N·s: it tells no gain beside those that have one
@@ -128,7 +126,7 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
 def object_of(
     found: CaseFit, thing: CaseObject, guess: Material, body: Family, seen: Observation, known: ObjectFit | None
 ) -> ObjectFit:
-    """An object under a fitted material, observed as ``seen``; corrections and paired lines from ``known``."""
+    """Return an object under a fitted material, observed as ``seen``; corrections and paired lines from ``known``."""
     none = np.zeros(0)
     lines = (
         known.evidence.lines

@@ -24,9 +24,9 @@ OFF = 0.02  # of the body's diagonal: farther from the surface a point is not on
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """How s strikes of one body are observed, in the family's basis. strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or
-    None for what has no place.
+    """How s strikes of one body are observed, in the family's basis.
 
+    strike (s, b): J φ(p)·e; sensor (b,): φ(q)·n, or None for what has no place.
     known (s,): whether a strike's place is declared. level (s,): whether its impulse is. kind: as `Case.sensor`.
     """
 
@@ -38,8 +38,9 @@ class Observation:
     scale_per_kg: float
 
     def transfer(self, vector: Array, weight: Array | None = None) -> Array:
-        """Real ψ (s, m), J included, of modes (b, m) in the basis; weight (m,) of the sensor where it has no place.
-        NaN for strikes unknown.
+        """Return real ψ (s, m), J included, of modes (b, m) in the basis; NaN for strikes unknown.
+
+        weight (m,): of the sensor where it has no place.
         """
         at_sensor = (
             self.sensor @ vector
@@ -67,10 +68,10 @@ def observation(
     sensor_m: tuple[float, float, float] | None = None,
     sensor_direction: tuple[float, float, float] | None = None,
 ) -> Observation:
-    """Strikes (position in m, direction, impulse in N·s; None where not known) of a body, observed by a sensor. A
-    direction not given is the inward normal.
+    """Return how strikes of a body are observed by a sensor.
 
-    Raises MeshError where a point lies off the surface.
+    Strikes are (position in m, direction, impulse in N·s), None where not known; a direction not given is the inward
+    normal. Raises MeshError where a point lies off the surface.
     """
     s, b = len(strikes), family.skin.shape[2]
     rows, known = np.zeros((s, b)), np.array([position is not None for position, _, _ in strikes])

@@ -63,7 +63,7 @@ class Pairs:
 
 
 def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float) -> Group:
-    """The family's modes as lines at (γ, ν)."""
+    """Return the family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
     cut = np.flatnonzero(np.diff(np.log(freq)) > DEGENERATE * (MESHED if family.meshed else 1.0)) + 1
@@ -78,8 +78,9 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
 
 
 def _observed(lines: Lines, seen: Observation) -> Array:
-    """Line patterns (s, k): complex where phases are true, but for one common phase a mode, which a finite contact
-    turns; else magnitudes.
+    """Return line patterns (s, k): complex where phases are true, else magnitudes.
+
+    A finite contact turns all strikes of a mode by one common phase.
     """
     return lines.amplitude if phased(lines, seen) else np.abs(lines.amplitude)
 
@@ -90,7 +91,7 @@ def phased(lines: Lines, seen: Observation) -> bool:
 
 
 def _usable(lines: Lines, seen: Observation) -> Array:
-    """The strikes (s,) whose place is known; all-false where patterns say nothing."""
+    """Return the strikes (s,) whose place is known; all-false where patterns say nothing."""
     return (
         np.asarray(seen.known & np.isfinite(lines.amplitude).all(axis=1))
         if lines.amplitude.shape[1]
@@ -115,8 +116,7 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
 
 
 def _rings(lines: Lines) -> Array:
-    """How much each line (k,) may be a mode by its decay: 1, less where it is over far sooner than what holds the
-    energy.
+    """Weigh by its decay how much each line (k,) may be a mode: 1, less where it is over far too soon.
 
     Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more
     do those of other heaps.
@@ -136,8 +136,7 @@ def _rings(lines: Lines) -> Array:
 
 
 def heaped(lines: Lines) -> Array:
-    """Which lines (k,) are mostly cancelled by their neighbours: alone they would hold HEAPED times the energy of all
-    lines together.
+    """Say which lines (k,) are mostly cancelled by others: alone they would hold HEAPED times the energy of all.
 
     ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)
     """
@@ -163,7 +162,7 @@ def best_pairs(
     band_hz: tuple[float, float],
     reach: float,
 ) -> list[tuple[float, float]]:
-    """The best few (ln γ, ν) of the grid, best first."""
+    """Return the best few (ln γ, ν) of the grid, best first."""
     width = 0.006
     grid = log_gamma + np.arange(-reach, reach + 1e-9, 0.004)
     observed, rings = np.log(lines.freq_hz), _rings(lines)

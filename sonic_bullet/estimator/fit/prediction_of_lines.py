@@ -1,5 +1,4 @@
-"""A fitted material played on strikes, those fitted and those not: what the sensor would record, in the recording's
-units.
+"""A fitted material played on strikes: what the sensor would record, in the recording's units.
 
 x(t) = Re Σ_j σ J ψ_j s_j e^{(−d_j + iω_j)t}
     ψ, s: observation.py; ω_j with the correction learnt on the fitted strikes
@@ -33,7 +32,7 @@ def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr:
 
 
 def lines_sound(lines: Lines, i: int, n: int, sr: int) -> Array:
-    """What the lines of recording i add up to (n,): the recording less this is what no damped sinusoid explains."""
+    """Add up the lines of recording i (n,): the recording less this is what no damped sinusoid explains."""
     return damped_sum(lines.freq_hz, lines.decay_per_s, lines.amplitude[i], n, sr)
 
 
@@ -48,10 +47,10 @@ def predicted(o: ObjectFit, pattern: Array, gain: float, n: int, sr: int) -> Arr
 def strike_modes(
     found: CaseFit, recording: CaseRecording, sr: int, *, corrected: bool = True
 ) -> tuple[Array, Array, Array]:
-    """Frequency, decay (m,) and complex amplitude (m,) that the fit predicts of any strike of its case: of a fitted
-    object with its corrections, of another object of the material without.
+    """Return frequency, decay and complex amplitude (m,) that the fit predicts of any strike of its case.
 
-    Raises FileError, MeshError where the object has no mesh or the strike no place.
+    Of a fitted object with its corrections, of another object of the material without. Raises FileError, MeshError
+    where the object has no mesh or the strike no place.
     """
     from sonic_bullet.estimator.fit.object_fit import object_of
     from sonic_bullet.estimator.fit.recorded import body_family, guess_of, observed

@@ -28,8 +28,9 @@ BEYOND = 1.03  # of a band's end: modes that a line within it may be paired with
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Radiated:
-    """Of each group of an object's modes (m,), as `grouped` has them: |pressure| at 1 m per modal velocity, and
-    radiation damping in 1/s. NaN above the band.
+    """What each group of an object's modes (m,), as `grouped` has them, radiates; NaN above the band.
+
+    weight: |pressure| at 1 m per modal velocity. extra_per_s: radiation damping in 1/s.
     """
 
     weight: Array
@@ -42,8 +43,9 @@ def nothing(group: Group) -> Radiated:
 
 
 def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationIn:
-    """Whether the material's own damping can be separated from what the air takes: nothing is lost to a medium, or it
-    is known, and so are all shapes.
+    """Say whether the material's own damping can be separated from what the air takes.
+
+    It can where nothing is lost to a medium, or the medium is known, and so are all shapes.
     """
     if case.medium == "none":
         return "nothing"
@@ -51,10 +53,9 @@ def radiation_in(case: Case, evidence: tuple[RecordedObject, ...]) -> RadiationI
 
 
 def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, apart: bool) -> Radiated | None:
-    """What an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate; None where neither its
-    sensor nor the fit asks for the air.
+    """Return what an object's modes at (γ, ν) and the guess's density, those up to to_hz, radiate.
 
-    apart: radiation is no part of the material's damping.
+    None where neither its sensor nor the fit asks for the air. apart: radiation is no part of the material's damping.
     """
     assert e.family is not None and e.seen is not None
     if not apart and e.seen.kind != "pressure":

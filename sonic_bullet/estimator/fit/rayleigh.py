@@ -1,6 +1,6 @@
-"""Lines -> α and β: d = ½(α + βλ), λ = ω² + d² [Ren, Yeh, Lin 2013, eq. 6-8], by least squares that notices
-where the law does not hold.
+"""Lines -> α and β, by least squares that notices where the law does not hold.
 
+d = ½(α + βλ), λ = ω² + d²                                                            [Ren, Yeh, Lin 2013, eq. 6-8]
 Σ w (d − ½α − ½βλ)² → min,  w = c/(s² + (τd)²),
     τ: the least relative scatter that makes the residuals as large as their spreads [Paule & Mandel 1982],
     c: Cauchy's weight of outliers
@@ -26,8 +26,10 @@ STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is ident
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RayleighFit:
-    """alpha_per_s, beta_s; covariance (2, 2) of their logarithms, NaN where the lines do not say; scatter: τ of all
-    lines; said: what is not identifiable.
+    """α and β with what is known of them.
+
+    covariance (2, 2): of their logarithms, NaN where the lines do not say; scatter: τ of all lines; said: what is not
+    identifiable.
     """
 
     alpha_per_s: float
@@ -44,9 +46,9 @@ def rayleigh(
     guess: tuple[float, float],
     whole_per_s: Array | None = None,
 ) -> RayleighFit:
-    """α and β of lines (k,). guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is
-    infinite: no value; NaN: 5 %.
+    """Fit α and β to lines (k,).
 
+    guess: (α, β) whose ratio stands in for what one line cannot tell. A spread that is infinite: no value; NaN: 5 %.
     whole_per_s (k,): what was measured, where decays are what something else has left of it: scatter is relative to
     that, or what is hardly there would be sure. What is left may then be below zero: leaving that out would bend the
     law upwards.
@@ -100,8 +102,9 @@ def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Ar
 
 
 def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int) -> tuple[Array, Array]:
-    """Values and information that most of the lines agree on; where a law through two of them leaves far less of that,
-    those it leads to.
+    """Return values and information that most of the lines agree on.
+
+    Where a law through two of them leaves far less of that, those it leads to.
     """
     best = _descended(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
     law, off = _through_two(lam, decay, size)
@@ -113,8 +116,9 @@ def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int)
 
 
 def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
-    """Of the laws through two lines the one that is nearest to most of them, and how far that is: elemental sets
-    [Rousseeuw 1984, sec. 5].
+    """Return of the laws through two lines the one nearest to most of them, and how far that is.
+
+    Elemental sets [Rousseeuw 1984, sec. 5].
     """
     i, j = np.triu_indices(len(lam), 1)
     apart = np.abs(np.log(lam[i] / lam[j])) > 0.05
@@ -129,15 +133,16 @@ def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
 
 
 def _middle_off(law: Array, lam: Array, decay: Array, size: Array) -> float:
-    """The median, over lines, of what a law (2,) is off by, relative to size (k,)."""
+    """Return the median, over lines, of what a law (2,) is off by, relative to size (k,)."""
     return float(np.median(np.abs(decay - 0.5 * (law[0] + law[1] * lam)) / size))
 
 
 def _descended(
     lam: Array, decay: Array, spread: Array, size: Array, freedom: int, tau: float, weight: Array
 ) -> tuple[Array, Array]:
-    """Values and information, from a relative scatter τ and weights (k,) down to that of which half of the lines fall
-    within their spreads.
+    """Return values and information at the least τ of which half of the lines fall within their spreads.
+
+    From a relative scatter τ and weights (k,) on downwards.
     """
     value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
     while tau > 1e-5:
@@ -152,9 +157,7 @@ def _descended(
 def _weighted(
     lam: Array, decay: Array, sd: Array, start: Array | None = None
 ) -> tuple[Array, Array, float, Array, Array]:
-    """Values (2,) >= 0, information (2, 2), Σ of squared residuals, each cut at 9; the weights (k,) that outliers are
-    left with, squares (k,).
-    """
+    """Return values (2,) >= 0, information (2, 2), Σ of squared residuals cut at 9, outliers' weights, squares (k,)."""
     slope = np.stack([np.full(len(lam), 0.5), 0.5 * lam], axis=1) / sd[:, None]
     scale = 1 / np.sqrt((slope**2).sum(axis=0))
     weight = np.ones(len(lam)) if start is None else start
@@ -169,7 +172,7 @@ def _weighted(
 
 
 def _not_negative(a: Array, b: Array) -> Array:
-    """x (2,) >= 0 of least |a x − b|: inside, or the better one of the two edges."""
+    """Return x (2,) >= 0 of least |a x − b|: inside, or the better one of the two edges."""
     gram, right = a.T @ a, a.T @ b
     own = np.diag(gram)
     det = own[0] * own[1] - gram[0, 1] ** 2

@@ -57,8 +57,9 @@ class RecordedObject:
 
 
 class Sounds(NamedTuple):
-    """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them, and the
-    part of each recording's energy that lies before its onset, from where it begins to sound.
+    """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them.
+
+    before: part of each recording's energy that lies before its onset, from where it begins to sound.
     """
 
     signals: Array
@@ -68,7 +69,7 @@ class Sounds(NamedTuple):
 
 
 def guess_of(thing: CaseObject) -> Material:
-    """The object's guessed material: the declared constants, the named preset's for what is not declared.
+    """Return the object's guessed material: the declared constants, the named preset's for what is not declared.
 
     Raises MaterialError, FileError.
     """
@@ -111,10 +112,10 @@ def gather(
     clipped: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[RecordedObject, ...]:
-    """RecordedObjects of all objects that have strikes of ``split`` with audio or features. clipped: let through what
-    stands at its peak, and what holds several hits.
+    """Return RecordedObjects of all objects that have strikes of ``split`` with audio or features.
 
-    Raises SonicBulletError where there is none.
+    clipped: let through what stands at its peak, and what holds several hits. Raises SonicBulletError where there is
+    none.
     """
     say = progress or (lambda _: None)
     found: list[RecordedObject] = []
@@ -156,9 +157,7 @@ def gather(
 
 
 def check_meshes(case: Case, names: Iterable[str]) -> None:
-    """Raise FileError where the mesh file of one of a case's objects is not there: before any of them is listened to,
-    which takes long.
-    """
+    """Raise FileError where the mesh file of one of a case's objects is not there, before one is listened to."""
     for name in names:
         mesh = case.objects[name].mesh if name in case.objects else None
         if mesh is not None and not mesh.is_file():
@@ -171,7 +170,7 @@ def _modes_observed(body: Family, guess: Material, band_hz: tuple[float, float])
 
 
 def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, say: Callable[[str], None]) -> Family:
-    """The family of a case's object. Raises FileError, MeshError."""
+    """Return the family of a case's object. Raises FileError, MeshError."""
     shape = read_mesh(thing.mesh or "", thing.scale)
     across = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
     if not MESH_M[0] < across < MESH_M[1]:
@@ -226,7 +225,7 @@ def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecord
 
 
 def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> Sounds:
-    """What is heard of an object's strikes. Raises FileError, AudioError."""
+    """Read what is heard of an object's strikes. Raises FileError, AudioError."""
     sounds, limited, rates, remarks, hums, begun = [], [], [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
@@ -283,8 +282,9 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
 
 
 def until_it_breaks_off(sound: Array, sr: int) -> Array:
-    """A recording (n,) without the digital silence that it is filled up with: a decay ends in its last bit or in noise,
-    not far above.
+    """Return a recording (n,) without the digital silence that it is filled up with.
+
+    A decay ends in its last bit or in noise, not far above.
     """
     observed = np.flatnonzero(sound)
     last, short = int(observed[-1]) + 1 if len(observed) else 0, max(1, round(SHUT_S * sr))
@@ -293,10 +293,10 @@ def until_it_breaks_off(sound: Array, sr: int) -> Array:
 
 
 def onset_sample(sound: Array, sr: int) -> int:
-    """The sample after which energy has arrived: the first of the millisecond in which the power rises the most over
-    all before it, then its peak.
+    """Return the sample after which energy has arrived.
 
-    A strike's pulse is over after its first peak, so lines are read from there.
+    The first of the millisecond in which the power rises the most over all before it, then its peak. A strike's pulse
+    is over after its first peak, so lines are read from there.
     """
     block = max(1, sr // 1000)
     power = (sound[: len(sound) // block * block].reshape(-1, block) ** 2).mean(axis=1) + 1e-20

@@ -21,9 +21,10 @@ no mode. Without them takes held out of six measured objects are predicted 0.2 d
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TypicalStrike:
-    """What a strike of unknown place leaves of each line that rings. freq_hz, decay_per_s (k,); amplitude (k,) complex,
-    in the recordings' units at the mean level of the takes; spread_db (k,): standard deviation over takes about it, 0
-    where there is one take.
+    """What a strike of unknown place leaves of each line that rings.
+
+    freq_hz, decay_per_s (k,); amplitude (k,) complex, in the recordings' units at the mean level of the takes;
+    spread_db (k,): standard deviation over takes about it, 0 where there is one take.
     """
 
     freq_hz: Array
@@ -33,7 +34,7 @@ class TypicalStrike:
 
 
 def ringing(lines: Lines) -> Array:
-    """Indices (k,) of the lines that ring, by frequency: those that last `FEWEST_CYCLES`."""
+    """Return indices (k,) of the lines that ring, by frequency: those that last `FEWEST_CYCLES`."""
     decay = np.nan_to_num(lines.decay_per_s)
     keep = np.flatnonzero((decay > 0) & (lines.freq_hz >= FEWEST_CYCLES * decay))
     return keep[np.argsort(lines.freq_hz[keep], kind="stable")]

@@ -1,5 +1,6 @@
-"""Lines of what rings after the attack, for recordings that no sum of damped sinusoids explains from the onset on: the
-first milliseconds of a real take hold the striker, slaps and a room, and its modes are not exactly exponential.
+"""Lines of what rings after the attack, for recordings that no sum of damped sinusoids explains from the onset on.
+
+The first milliseconds of a real take hold the striker, slaps and a room, and its modes are not exactly exponential.
 
     signals (s, n) -> bands of BAND_HZ about their centre, decimated, once the band's filter is full: after the attack
     -> poles of a band, of all recordings at once (ESPRIT)           [Roy & Kailath 1989, eq. 3.12-3.17]
@@ -88,7 +89,7 @@ def _low_pass(passed: float, stopped: float, stop_db: float) -> Array:
 
 
 def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]:
-    """The bands of signals (s, n), each from the sample on at which its filter is full."""
+    """Cut the bands of signals (s, n), each from the sample on at which its filter is full."""
     from scipy.fft import fft, ifft, next_fast_len
 
     step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
@@ -266,8 +267,9 @@ def _polished(y: Array, pole: Array) -> Array:
 
 
 def _solved(y: Array, pole: Array) -> tuple[Array, Array, Array, Array, Array, float]:
-    """Amplitudes (s, k), what is left (s, m), Gram matrix (k, k); of Gauss and Newton, the matrix (k, k), gradient (k,)
-    and sum of squares.
+    """Solve for amplitudes (s, k): with what is left (s, m), their Gram matrix, and a step's equations.
+
+    Of Gauss and Newton, the matrix (k, k), gradient (k,) and sum of squares.
     """
     ring = _rings(pole, y.shape[1])
     slope = np.arange(y.shape[1])[:, None] * ring

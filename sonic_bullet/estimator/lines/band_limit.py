@@ -50,7 +50,7 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
 
 
 def _raised(freq: Array, start: float, stop: float) -> Array:
-    """Raised cosine (n,) from 0 at start to 1 at stop."""
+    """Return a raised cosine (n,) from 0 at start to 1 at stop."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip((freq - start) / (stop - start), 0, 1))
 
 

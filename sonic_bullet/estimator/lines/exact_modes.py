@@ -1,5 +1,4 @@
-"""Modes of a recording without noise, or with no more than float32 rounds off: its Hankel matrix has a rank, and the
-rank has the poles.
+"""Modes of a recording without noise, or with no more than float32 rounds off: its Hankel matrix has a rank.
 
     H (L, M), H_ij = x(i + j) = Σ_k c_k z_k^{i+j}  =>  rank H = 2 × modes, whatever lies close to what
         [Kronecker 1881]

@@ -141,7 +141,7 @@ def _fit(
 
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:
-    """The significant modes of a signal and the noise they leave; of a real take what rings after its attack."""
+    """Find the significant modes of a signal and the noise they leave; of a real take what rings after its attack."""
     floor = FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
@@ -199,7 +199,7 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
 
 
 def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sinusoids:
-    """The bands' poles and their amplitudes; the strongest alone where there are more than can be identified."""
+    """Return the bands' poles and their amplitudes; the strongest alone where there are more than can be identified."""
     still = x[None] / max(noise_rms(x[None], sr)[0], floor)
     slow, fast = (poles(still, sr, *band_hz, ABOVE) for poles in (start_poles, early_poles))
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
@@ -213,7 +213,7 @@ def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sin
 def _first(
     x: Array, sr: int, start: Sinusoids, band_hz: tuple[float, float], least: float, floor: float
 ) -> tuple[Sinusoids, Noise]:
-    """The significant ones of the bands' poles, fitted."""
+    """Return the significant ones of the bands' poles, fitted."""
     pole = start.pole
     noise = measured(likelihood.residual(x, start, sr), sr, floor, len(pole), band_hz)
     if not len(pole):
@@ -227,8 +227,9 @@ def _first(
 
 
 def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noise, least: float) -> Sinusoids:
-    """Without the modes that are not significant, or share a line with others so that no decay is identified, the
-    weakest first, the rest fitted again.
+    """Drop modes that are not significant, or share a line so that no decay is identified, and fit the rest again.
+
+    The weakest go first.
     """
     while len(modes.pole):
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
@@ -258,7 +259,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
 
 
 def _moved(x: Array, modes: Sinusoids, noise: Noise, band_hz: tuple[float, float], later: int) -> Sinusoids:
-    """The same modes for a signal that starts ``later`` samples after the one they were found in."""
+    """Return the same modes for a signal that starts ``later`` samples after the one they were found in."""
     if later == 0:
         return modes
     turned = Sinusoids(modes.pole, modes.amplitude * np.exp(modes.pole / noise.sr * later))
@@ -276,8 +277,10 @@ def _features(
     *,
     whole: bool,
 ) -> Features:
-    """Features of the modes of a signal (n,); banded (n,): what the band alone holds of it. whole: no band was asked
-    for, whose edge makes lines at the onset that are none.
+    """Make features of the modes of a signal (n,).
+
+    banded (n,): what the band alone holds of it. whole: no band was asked for, whose edge makes lines at the onset
+    that are none.
     """
     k, sr = len(modes.pole), noise.sr
     left = banded - (x - likelihood.residual(x, modes, sr))

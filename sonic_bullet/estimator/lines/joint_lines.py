@@ -1,11 +1,10 @@
-"""Several recordings of one object -> the damped sinusoids they share: frequencies and decays common, amplitudes their
-own.
+"""Several recordings of one object -> the damped sinusoids they share.
 
-    x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
-    start:   shared_poles.py
-    refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
-        [Golub & Pereyra 1973; Kaufman 1975]
-    spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
+x_s(t) = Re Σ_k A_sk e^{(−d_k + iω_k) t} + noise
+start:   shared_poles.py
+refine:  maximum likelihood in white noise, A_sk linear and projected out (projection.py)
+    [Golub & Pereyra 1973; Kaufman 1975]
+spread:  inverse of the information matrix at the end, so the Cramér-Rao bound          [Kay 1993, ch. 3.9]
 """
 
 from __future__ import annotations
@@ -78,8 +77,9 @@ def joint_lines(
 def _identified(
     signals: Array, noise: Array, sr: int, band_hz: tuple[float, float], signed: bool, modes: int | None, *, crowd: bool
 ) -> Lines:
-    """Lines of one hit, or what is left after several; crowd: of more poles than lines those, too, that take most one
-    after another, where these say plainly more.
+    """Find lines of one hit, or what is left after several.
+
+    crowd: of more poles than lines those, too, that take most one after another, where these say plainly more.
     """
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
@@ -151,9 +151,7 @@ def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: 
 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
-    """Lines from a sample on, as they would have begun at the onset; None where nothing can be identified from there,
-    or a recording is over.
-    """
+    """Find lines from a sample on, as they would have begun at the onset; None where nothing can be identified."""
     rest = signals[:, late:]
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
@@ -182,16 +180,15 @@ def _too_loud(lines: Lines, signals: Array) -> Array:
 
 
 def _struck(lines: Lines, signals: Array) -> Lines:
-    """The lines without those that no hit at the onset can have left: of echoes that arrive late some are over so soon
-    that they would have begun far above all there is.
+    """Drop the lines that no hit at the onset can have left.
+
+    Of echoes that arrive late some are over so soon that they would have begun far above all there is.
     """
     return lines_at(lines, np.flatnonzero(~_too_loud(lines, signals)))
 
 
 def noise_rms(signals: Array, sr: int) -> Array:
-    """Rms (s,) of the stationary floor, white: from the lower quarter of the spectrum of each recording's
-    last third.
-    """
+    """Return the rms (s,) of the stationary floor, white, from the lower quarter of each last third's spectrum."""
     tail = signals[:, -signals.shape[1] // 3 :]
     power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
     # exponential law: its lower quartile is ln(4/3) of the mean

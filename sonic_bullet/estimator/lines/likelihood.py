@@ -32,7 +32,7 @@ class Sinusoids:
     amplitude: Array
 
     def take(self, which: Array) -> Sinusoids:
-        """The modes of that index or mask."""
+        """Return the modes of that index or mask."""
         return Sinusoids(self.pole[which], self.amplitude[which])
 
 
@@ -100,7 +100,7 @@ def information(modes: Sinusoids, sr: int, count: int) -> Array:
 
 
 def residual(signal: Array, modes: Sinusoids, sr: int) -> Array:
-    """What the modes leave of a signal (n,)."""
+    """Return what the modes leave of a signal (n,)."""
     return np.asarray(_subtracted(signal, modes.pole / sr, modes.amplitude))
 
 
@@ -175,10 +175,10 @@ def fitted(
 
 
 def spreads(modes: Sinusoids, sr: int, count: int) -> tuple[Array, Array]:
-    """Standard errors (4, k) of ω, d, Re A, Im A in white noise of unit rms, and energies (k,) of each mode given the
-    others.
+    """Return standard errors (4, k) of ω, d, Re A, Im A, and energies (k,) of each mode given the others.
 
-    The energy is |A|² in the metric of A's own covariance at fixed poles [Kay 1998, eq. 7.36].
+    In white noise of unit rms. The energy is |A|² in the metric of A's own covariance at fixed poles [Kay 1998, eq.
+    7.36].
     """
     k = len(modes.pole)
     matrix = information(modes, sr, count)

@@ -21,11 +21,10 @@ PINNED = 0.98  # of the fastest decay there is
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """Damped sinusoids of one recording, strongest first; amplitude in units of the recording (full scale 1) at the
-    onset.
+    """Damped sinusoids of one recording, strongest first.
 
-    Spreads are standard errors; a feature without one has NaN there. noise_dbfs: level of what is no feature, rms, per
-    sample.
+    amplitude: in units of the recording (full scale 1) at the onset. Spreads are standard errors; a feature without one
+    has NaN there. noise_dbfs: level of what is no feature, rms, per sample.
     """
 
     freq_hz: Array  # (k,) > 0
@@ -41,6 +40,7 @@ class Features:
     note: str = ""
 
     def __post_init__(self) -> None:
+        """Refuse columns of other lengths, and values that no feature has."""
         count = len(np.atleast_1d(self.freq_hz))
         values = (
             ("freq_hz", self.freq_hz),
@@ -69,11 +69,11 @@ def energy(decay_per_s: Array, amplitude: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialFit:
-    """What recordings say of a material. parameters: (α 1/s, β s, γ m²/s², σ, ν), γ = E/ρ; covariance (5, 5) of ln α,
-    ln β, ln γ, ln σ, ν.
+    """What recordings say of a material: α 1/s, β s, γ = E/ρ m²/s², σ, ν.
 
-    A row and column of NaN: that parameter is not identifiable, and the verdict says so. verdict: "fitted", or why not,
-    one line. modes: per mode freq_hz, decay_per_s, amplitude (m,) of the fitted model at the first strike.
+    covariance (5, 5): of ln α, ln β, ln γ, ln σ, ν. A row and column of NaN: that parameter is not identifiable, and
+    the verdict says so. verdict: "fitted", or why not, one line. modes: per mode freq_hz, decay_per_s, amplitude (m,)
+    of the fitted model at the first strike.
     """
 
     alpha_per_s: float
@@ -88,6 +88,7 @@ class MaterialFit:
     amplitude: Array  # (m,)
 
     def __post_init__(self) -> None:
+        """Refuse columns of other lengths."""
         count = len(np.atleast_1d(self.freq_hz))
         for name, value in (
             ("freq_hz", self.freq_hz),
@@ -132,7 +133,7 @@ class Lines:
 
 
 def lines_at(lines: Lines, keep: Array) -> Lines:
-    """Some of the lines (k,), by index."""
+    """Return some of the lines (k,), by index."""
     return replace(
         lines,
         freq_hz=lines.freq_hz[keep],

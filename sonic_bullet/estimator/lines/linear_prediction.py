@@ -26,7 +26,7 @@ def prediction_error_filter(signal: Array, order: int) -> Array:
 
 
 def predicted_on(signal: Array, order: int, count: int) -> Array:
-    """What follows (count,) a signal (n,) by its own recursion."""
+    """Predict what follows (count,) a signal (n,) by its own recursion."""
     from scipy.signal import lfilter, lfiltic
 
     a = prediction_error_filter(signal, order)

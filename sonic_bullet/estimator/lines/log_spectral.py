@@ -30,15 +30,17 @@ QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floor:
-    """A stationary noise: variance_per_bin (b,) of white noise that had this density at all frequencies, from 0 to
-    half the rate.
+    """A stationary noise.
+
+    variance (b,): of white noise that had this density at all frequencies, from 0 to half the rate.
     """
 
     variance: Array
 
     def at(self, bins: int) -> Array:
-        """The same at another number of bins (bins,): fewer are each what a Hann window of their width takes in, as
-        noise may be steep.
+        """Return the same at another number of bins (bins,).
+
+        Fewer are each what a Hann window of their width takes in, as noise may be steep.
         """
         fine, wide = len(self.variance), (len(self.variance) - 1) / max(bins - 1, 1)
         return np.asarray(
@@ -50,7 +52,7 @@ class Floor:
         )
 
     def within(self, sr: int, band_hz: tuple[float, float]) -> Floor:
-        """The same for a band: outside it no sound stands above the noise."""
+        """Limit it to a band: outside it no sound stands above the noise."""
         freq = np.linspace(0, sr / 2, len(self.variance))
         return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), HIDING, self.variance))
 
@@ -64,8 +66,9 @@ def _taken_in(variance: Array, wide: float) -> Array:
 
 
 def floor_of(residual: Array) -> Floor:
-    """The floor of what is left of a recording (n,) without its modes: medians over time, so that what still rings does
-    not count.
+    """Return the floor of what is left of a recording (n,) without its modes.
+
+    Medians over time, so that what still rings does not count.
     """
     window = min(FLOOR_WINDOW, len(residual) // 4)
     shape = np.hanning(window)
@@ -76,7 +79,7 @@ def floor_of(residual: Array) -> Floor:
 
 
 def floor_between(signals: list[Array]) -> Floor:
-    """The stationary noise that recordings (n,) share.
+    """Return the stationary noise that recordings (n,) share.
 
     Per bin the lower quartile over the last third of every recording, and over neighbouring bins, as no noise is narrow
     (hum is no noise).
@@ -96,8 +99,9 @@ def floor_between(signals: list[Array]) -> Floor:
 
 
 def _broad(level: Array, side: int) -> Array:
-    """What neighbours (b,) agree on: ``side`` bins to each side, and no further than a factor, as a noise may fall
-    steeply with frequency.
+    """Return what neighbours (b,) agree on.
+
+    ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency.
     """
     count = len(level)
     k = np.arange(count)
@@ -154,7 +158,7 @@ def spectra_distance_db(a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor
 
 
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
-    """The sound (n,) plus Gaussian noise like ``floor``."""
+    """Return the sound (n,) plus Gaussian noise like ``floor``."""
     spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal(len(sound)))
     return np.asarray(sound + np.fft.irfft(spectrum * np.sqrt(floor.at(len(spectrum))), len(sound)))
 

@@ -26,7 +26,9 @@ FRAME = 256
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Noise:
-    """density (n_f,) rms per sample over 0 … sr/2, course (m,) of the power in frames of FRAME samples, in units of its
+    """Noise over frequency and time.
+
+    density (n_f,): rms per sample over 0 … sr/2. course (m,): of the power in frames of FRAME samples, in units of its
     density.
     """
 
@@ -56,8 +58,9 @@ def white(rms: float, sr: int) -> Noise:
 
 
 def measured(left: Array, sr: int, floor: float, modes: int = 0, band_hz: tuple[float, float] = (0.0, np.inf)) -> Noise:
-    """Noise of what is left (n,) of a recording without its modes, four numbers each, by what the band holds;
-    floor: least density.
+    """Measure the noise in what is left (n,) of a recording without its modes, four numbers each.
+
+    By what the band holds. floor: least density.
     """
     density = np.maximum(
         _lower_half(left, sr, band_hz) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor
@@ -74,9 +77,7 @@ def measured(left: Array, sr: int, floor: float, modes: int = 0, band_hz: tuple[
 
 
 def _lower_half(left: Array, sr: int, band_hz: tuple[float, float]) -> Array:
-    """Rms per sample (n_f,) over frequency 0 … sr/2, from the lower half of the power in neighbourhoods that
-    overlap.
-    """
+    """Return rms per sample (n_f,) over 0 … sr/2, from the lower half of the power in neighbourhoods that overlap."""
     power = _mirrored(np.abs(np.fft.rfft(left)) ** 2 / len(left), sr, band_hz)
     width = min(max(26, len(power) // 60), len(power))
     side = np.pad(power, width // 2, mode="reflect")
@@ -96,8 +97,7 @@ def _mirrored(power: Array, sr: int, band_hz: tuple[float, float]) -> Array:
 def matched(
     left: Array, noise: Noise, band_hz: tuple[float, float], needed: Callable[[Array], Array], fastest_per_s: float
 ) -> Array:
-    """Poles (k,) whose matched filter on what is left (n,) answers with T > needed(Hz), each the peak of its
-    neighbourhood.
+    """Return poles (k,), peaks whose matched filter on what is left (n,) answers with T > needed(Hz).
 
     T(ω, d) = 2|Σ x e^{−(d+iω)t}|² / (σ² Σ e^{−2dt}) [Kay 1998, eq. 7.29 with an exponential envelope], d in octaves:
     every resolution.

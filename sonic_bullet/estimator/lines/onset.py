@@ -1,5 +1,4 @@
-"""Where an impact starts in a recording, where the next one interrupts it, and what in the recording is no honest
-signal.
+"""Where an impact starts in a recording, where the next one interrupts it, and what in it is no honest signal.
 
 energy in blocks of 1 ms -> the first block within 20 dB of the loudest, or the first strike (strike_times.py) ->
 first sample above the noise in that block -> about the onset the modes observed after it, run backwards, against
@@ -61,7 +60,7 @@ def levels(signal: Array, sr: int) -> tuple[Array, int]:
 
 
 def span(signal: Array, sr: int) -> Span:
-    """The first impact of a recording (n,) that is not silent."""
+    """Return the first impact of a recording (n,) that is not silent."""
     power, block = levels(signal, sr)
     if len(power) < 4:
         return Span(0, len(signal))
@@ -84,8 +83,9 @@ def span(signal: Array, sr: int) -> Span:
 
 
 def is_struck(signal: Array, sr: int) -> bool:
-    """Whether a recording (n,) that is not silent holds a hit: an onset stands out, or what follows the loudest rise
-    fades, as noise, hum and tones that last do not.
+    """Say whether a recording (n,) that is not silent holds a hit.
+
+    An onset stands out, or what follows the loudest rise fades, as noise, hum and tones that last do not.
     """
     if len(find_strikes(signal, sr)):
         return True
@@ -95,7 +95,7 @@ def is_struck(signal: Array, sr: int) -> bool:
 
 
 def until_next_hit(signal: Array, sr: int, start: int) -> Span:
-    """The impact of a recording (n,) that begins at sample ``start``."""
+    """Return the impact of a recording (n,) that begins at sample ``start``."""
     return _until_next(find_strikes(signal, sr), sr, start, len(signal))
 
 
@@ -105,8 +105,9 @@ def _until_next(strikes: Array, sr: int, start: int, end: int) -> Span:
 
 
 def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float) -> int:
-    """The sample at which the modes, of amplitudes at sample ``start``, take over from silence: the earliest of the
-    likeliest.
+    """Return the sample at which the modes, of amplitudes at sample ``start``, take over from silence.
+
+    The earliest of the likeliest:
 
     Σ_{n<t} x² + Σ_{n≥t} (x − m)² is least at the true t; a sine begins with a zero, which silence explains as well:
     hence the earliest within (3 noise)² of the least. Nothing is assumed of the phases.

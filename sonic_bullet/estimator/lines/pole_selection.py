@@ -1,5 +1,4 @@
-"""Which of many poles are worth a line: those without near doubles, and of a crowd those that take most of the
-recordings one after another.
+"""Which of many poles are worth a line: those without near doubles, of a crowd those that take most.
 
 left_k = <e_k, x − what the picked ones take of x>;   next: max Σ_s |left_k|²/<e_k, e_k>
     (orthogonal matching pursuit) [Pati, Rezaiifar & Krishnaprasad 1993]
@@ -29,8 +28,7 @@ def apart(pole: Array) -> Array:
 
 
 def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> Array:
-    """Which poles (at most count,) take most of the signals (s, n) one after another, each of what those before it have
-    left.
+    """Say which poles (at most count,) take most of the signals (s, n), each of what those before it have left.
 
     All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other
     half, at −ω, is taken to be far away.

@@ -64,7 +64,7 @@ def _solve(factor: tuple[Array, Array], right: Array) -> Array:
 
 
 def amplitudes_at(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, float, Array, Array]:
-    """amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
+    """Return amplitude (s, k), half the sum of squares over the noise, energy (k,), residual rms (s,)."""
     z = pole / sr
     n = signals.shape[1]
     even, odd = products(z, n)
@@ -84,9 +84,7 @@ def amplitudes_at(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[A
 
 
 def normal_equations(signals: Array, noise: Array, pole: Array, sr: int) -> tuple[Array, Array, float]:
-    """Gauss-Newton matrix (2k, 2k) and gradient (2k,) for (ω, d) with the amplitudes projected out, and half the sum of
-    squares.
-    """
+    """Return matrix (2k, 2k) and gradient (2k,) of Gauss-Newton for (ω, d), amplitudes projected out, and ½ Σ r²."""
     z, n, k = pole / sr, signals.shape[1], len(pole)
     even, odd = products(z, n)
     factor = _factor(basis_gram(even[0], odd[0]))

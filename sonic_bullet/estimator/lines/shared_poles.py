@@ -66,9 +66,7 @@ def early_poles(signals: Array, sr: int, low: float, high: float, above: float =
 
 
 def _subspace(band: Array, dt: float, above: float) -> Array:
-    """Poles of complex series band (s, n) of unit noise at step dt: signal subspace of all of them at once, then the
-    shift.
-    """
+    """Return poles of complex series (s, n) of unit noise at step dt: their one signal subspace, then the shift."""
     s, n = band.shape
     window = min(MOST_WINDOW, n // 3)
     if window < 8:

@@ -109,6 +109,6 @@ def _weights(signal: Array, f: float, multiple: Array, sr: int) -> Array:
 
 
 def _tones(signal: Array, f: float, multiple: Array, sr: int) -> Array:
-    """What a recording (n,) holds at the comb, by a window that keeps modes beside it out."""
+    """Return what a recording (n,) holds at the comb, by a window that keeps modes beside it out."""
     turn = 2 * np.pi * f / sr * np.outer(multiple, np.arange(len(signal)))
     return np.asarray(np.exp(-1j * turn) @ (np.hanning(len(signal)) * signal))

@@ -1,3 +1,1 @@
-"""How alike two sounds are to an ear [Ren, Yeh, Lin 2013, section 4.3]: loudness, images of loudness over time, match
-ratios.
-"""
+"""How loud a sound is to an ear, over time and frequency [Ren, Yeh, Lin 2013, section 4.3]."""

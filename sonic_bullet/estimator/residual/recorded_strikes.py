@@ -1,5 +1,4 @@
-"""Recordings and what was found of them -> the residual: what the modes leave unsaid of the features, and what the
-features leave of the sound.
+"""Recordings -> the residual: what the modes leave unsaid of the features, and the features of the sound.
 
     CaseFit -> Features and modes of each strike -> match ratios R_i -> lines √(1 - w_i²) φ_i, leftover -> Residual
         [Ren, Yeh, Lin 2013, sec. 6.1]
@@ -59,10 +58,10 @@ def match_ratios(
 def represented_share(
     freq_hz: Array, decay_per_s: Array, amplitude: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array
 ) -> Array:
-    """Share w (k,) of each feature's amplitude that modes (m,) represent. amplitude (s, k), mode_amplitude (s, m): at s
-    strikes, taken together by power.
+    """Return the share w (k,) of each feature's amplitude that modes (m,) represent.
 
-    A strike louder than the model says and another softer are no residual: what is left is left on the average.
+    amplitude (s, k), mode_amplitude (s, m): at s strikes, taken together by power. A strike louder than the model says
+    and another softer are no residual: what is left is left on the average.
     """
     loud, played = (np.sqrt((np.abs(x) ** 2).mean(axis=0)) for x in (amplitude, mode_amplitude))
     ratio, there = match_ratios(freq_hz, decay_per_s, mode_hz, mode_decay_per_s, played)
@@ -71,11 +70,10 @@ def represented_share(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strikes:
-    """s strikes of one body from the onset on, and what they leave. signals, left (s, n): recorded, beside all
-    features.
+    """s strikes of one body from the onset on, and what they leave.
 
-    freq_hz, decay_per_s (k,), amplitude (s, k) complex: features; share (k,): what of each the modes represent. mode_*
-    (m,), mode_amplitude (s, m) complex.
+    signals, left (s, n): recorded, beside all features. freq_hz, decay_per_s (k,), amplitude (s, k) complex: features;
+    share (k,): what of each the modes represent. mode_* (m,), mode_amplitude (s, m) complex.
     """
 
     signals: Array
@@ -99,9 +97,9 @@ def strikes_of(
     modes: tuple[Array, Array, Array],
     source: str,
 ) -> Strikes:
-    """The residual of strikes (s, n) from the onset on. lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the
-    features, without which ``left`` (s, n) remains.
+    """Compute the residual of strikes (s, n) from the onset on.
 
+    lines: freq_hz, decay_per_s (k,), amplitude (s, k) of the features, without which ``left`` (s, n) remains.
     modes: freq_hz, decay_per_s (m,), amplitude (s, m) complex of what the model plays. Raises AudioError, RecordError.
     """
     freq, decay, amplitude = lines
@@ -118,10 +116,10 @@ def strikes_of(
 
 @one_thread()
 def case_strikes(found: CaseFit) -> Strikes:
-    """The residual of a fitted case, of the object with the most strikes: beside what a fit plays of them, which is the
-    modes of a shape struck at known places, or else the lines.
+    """Compute the residual of a fitted case, of the object with the most strikes, beside what a fit plays of them.
 
-    Raises AudioError where no recording can be used.
+    That is the modes of a shape struck at known places, or else the lines. Raises AudioError where no recording can be
+    used.
     """
     shaped = {o.evidence.thing.name: o for o in found.objects if np.isfinite(o.pattern).any()}
     recorded = [e for e in found.evidence if e.signals is not None and (e.thing.name in shaped or len(e.lines.freq_hz))]
@@ -147,8 +145,9 @@ def _played_lines(lines: Lines) -> tuple[Array, Array, Array]:
 
 
 def _played_modes(found: CaseFit, o: ObjectFit) -> tuple[Array, Array, Array]:
-    """Frequency, decay (m,), amplitude (s, m) of what a fit plays of the strikes of a shape: of those without a place
-    what was recorded.
+    """Return frequency, decay (m,), amplitude (s, m) of what a fit plays of the strikes of a shape.
+
+    Of those without a place what was recorded.
     """
     e = o.evidence
     assert e.seen is not None
@@ -165,7 +164,7 @@ def _played_modes(found: CaseFit, o: ObjectFit) -> tuple[Array, Array, Array]:
 
 @one_thread()
 def recording_strikes(sample: Array, sr: int, onset_s: float | None, name: str) -> Strikes:
-    """The residual of one recording (n,) whose shape is not known: its features stand in for modes.
+    """Compute the residual of one recording (n,) whose shape is not known: its features stand in for modes.
 
     Raises AudioError.
     """

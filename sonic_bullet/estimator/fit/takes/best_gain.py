@@ -100,7 +100,7 @@ def _searched(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, r
 def _refined(
     power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, searched: tuple[Array, Array], recorded: bool
 ) -> BestGain:
-    """The best gain about the lowest minima of a search, by all cells."""
+    """Return the best gain about the lowest minima of a search, by all cells."""
     grid, costs = searched
     silence = BestGain(0.0, distance_at(power, made, floor, 0.0))
     padded = np.concatenate([[np.inf], costs, [np.inf]])
@@ -120,8 +120,9 @@ def _refined(
 
 
 def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Array:
-    """Gains from where a sound is lost in the noise up to where it is OVER_DB louder than the recording; none of a
-    sound that is nothing in the band.
+    """Return gains from where a sound is lost in the noise to where it is OVER_DB louder than the recording.
+
+    None of a sound that is nothing in the band.
     """
     over, level = 0.0, np.zeros(2)
     for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
@@ -136,8 +137,10 @@ def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Ar
 
 
 def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, added: bool) -> list[Array]:
-    """Of every window some cells (5, c): powers of recording and sound, the noise, whether the sound gets it in full,
-    how many cells each stands for. Cells that count at any gain are drawn apart from those that may not.
+    """Draw some cells (5, c) of every window.
+
+    Powers of recording and sound, the noise, whether the sound gets it in full, how many cells each stands for. Cells
+    that count at any gain are drawn apart from those that may not.
     """
     found = []
     for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):

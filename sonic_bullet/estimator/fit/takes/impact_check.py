@@ -23,8 +23,9 @@ LEAST = 0.05
 
 
 def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: float) -> str:
-    """Say why a take (n,) of some lines is no single impact; nothing where it may be one. before: part of the energy
-    that lies before its loudest rise.
+    """Say why a take (n,) of some lines is no single impact; nothing where it may be one.
+
+    before: part of the energy that lies before its loudest rise.
     """
     if before > BEFORE:
         return f"{100 * before:.0f} % of its energy lies before its loudest rise, and does not decay from there"

@@ -29,7 +29,7 @@ def next_measurement(found: CaseFit) -> str:
 
 
 def _open(found: CaseFit) -> Iterator[str]:
-    """What would decide each thing that is open, the first things first."""
+    """Say what would decide each thing that is open, the first things first."""
     recorded = [e for e in found.evidence if e.signals is not None]
     if recorded:
         yield from _open_of_takes(max(recorded, key=lambda one: len(one.recordings)))
@@ -50,7 +50,7 @@ def _open(found: CaseFit) -> Iterator[str]:
 
 
 def _open_of_takes(e: RecordedObject) -> Iterator[str]:
-    """What the takes of an object leave open by themselves."""
+    """Say what the takes of an object leave open by themselves."""
     if len(e.recordings) == 1:
         yield "strike the same place again, three times or more: of one take nothing is held out, no spread is known"
     if _attack_left(e) > NOT_MODAL:
@@ -77,7 +77,7 @@ def _attack_left(e: RecordedObject) -> float:
 
 
 def _within_widths(e: RecordedObject) -> tuple[float, float] | None:
-    """The strongest two neighbours of the lines that ring, of which each lies within half the widths d/π of both."""
+    """Return the strongest neighbours of the lines that ring which lie within half the widths d/π of both."""
     keep = ringing(e.lines)
     energy = np.nan_to_num(e.lines.energy)
     keep = keep[energy[keep] >= STRONG * energy[keep].max(initial=0)]

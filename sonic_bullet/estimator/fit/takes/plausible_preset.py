@@ -20,7 +20,7 @@ from sonic_bullet.records import Array, Material
 
 
 def with_shipped_damping(guess: Material) -> Material:
-    """The guess, or where it has no damping the isotropic preset of a table that is nearest to it."""
+    """Return the guess, or where it has no damping the isotropic preset of a table that is nearest to it."""
     from sonic_bullet.presets import load_material, table_names
 
     if guess.alpha_per_s is not None and guess.beta_s is not None:
@@ -34,7 +34,7 @@ def with_shipped_damping(guess: Material) -> Material:
 
 
 def plausible_sound(found: CaseFit, e: RecordedObject, recording: CaseRecording, n: int, sr: int) -> Array | None:
-    """A take's sound (n,) by the guess, at no level of its own; None of an object without a mesh.
+    """Play a take (n,) by the guess, at no level of its own; None of an object without a mesh.
 
     Raises MeshError where the strike lies off the surface.
     """
@@ -59,8 +59,9 @@ def plausible_sound(found: CaseFit, e: RecordedObject, recording: CaseRecording,
 
 
 def _sensor_weight(found: CaseFit, e: RecordedObject, count: int) -> Array:
-    """What a microphone takes of each mode (m,), as the fit has it: shapes hardly change with the material; the middle
-    one of modes that the fit does not hold.
+    """Return what a microphone takes of each mode (m,), as the fit has it; the middle one of modes it does not hold.
+
+    Shapes hardly change with the material.
     """
     o = next((o for o in found.objects if o.evidence.thing.name == e.thing.name), None)
     if o is None or not len(o.sensor_weight):
