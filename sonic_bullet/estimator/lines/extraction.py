@@ -128,15 +128,12 @@ def _rms(signal: Array) -> float:
     return float(np.sqrt((signal**2).mean()))
 
 
-def _reach(band_hz: tuple[float, float], sr: int) -> tuple[float, float]:
-    return 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
-
-
 def _fit(
     signal: Array, start: Sinusoids, sr: int, band_hz: tuple[float, float], effort: tuple[int, float] = QUICK
 ) -> Sinusoids:
+    reach = 2 * np.pi * 0.5 * band_hz[0], 2 * np.pi * min(1.02 * band_hz[1], 0.4999 * sr)
     return likelihood.fitted(
-        signal, start, sr, band=_reach(band_hz, sr), fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1]
+        signal, start, sr, band=reach, fastest_per_s=FASTEST_PER_S, steps=effort[0], tolerance=effort[1]
     )
 
 
