@@ -34,6 +34,10 @@ class WhileAlive(Generic[Of, More, Result]):
             mine[key] = self.__wrapped__(of, *more, **named)
         return mine[key]
 
+    def put(self, of: Of, result: Result, *more: More.args, **named: More.kwargs) -> None:
+        """Store a result that was computed elsewhere."""
+        self._kept.setdefault(of, {})[(more, tuple(sorted(named.items())))] = result
+
     def cache_clear(self) -> None:
         """Forget all results."""
         self._kept.clear()

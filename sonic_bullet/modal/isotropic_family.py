@@ -7,7 +7,7 @@ K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,8 @@ class Family:
         False where λ carries no element's error.
     error
         Estimated relative error of the highest frequency, NaN where it is not known.
+    curvature_per_m : (4t,)
+        Of the surface, as of `ModalModel`.
     """
 
     lame: Array
@@ -49,6 +51,7 @@ class Family:
     note: str
     meshed: bool = True
     error: float = float("nan")
+    curvature_per_m: Array = field(default_factory=lambda: np.zeros(0))
 
     def modes(self, gamma_m2_s2: float, poisson: float) -> tuple[Array, Array]:
         """Compute λ (m,) in 1/s², ascending, and the modes (b, m) in the basis; `points` turns them into shapes."""

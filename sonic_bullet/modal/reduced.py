@@ -49,7 +49,7 @@ def family(
     length = diagonal_m((shape,))
     limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
     clamp = np.array(fixed, float).reshape(-1, 4)
-    name = key("family", shape.vertex_m, shape.face, edge_m, clamp, poisson, limit)
+    name = key("family", solid_key((shape,), None, edge_m), clamp, poisson, limit)
     found = store.load(cache, name)
     if found is not None:
         a, note = found
@@ -66,6 +66,7 @@ def family(
             note,
             bool(meshed),
             float(error) if error >= 0 else np.nan,
+            a["curvature"],
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
@@ -90,6 +91,7 @@ def family(
         "skin": made.skin,
         "vertex": made.vertex_m,
         "face": made.face,
+        "curvature": made.curvature_per_m,
         "numbers": numbers,
     }
     store.save(cache, name, arrays, made.note)
@@ -162,4 +164,5 @@ def _reduced(
         f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
         method.meshed,
         error,
+        shown.curvature_per_m,
     )

@@ -1,0 +1,73 @@
+"""A shape solved once, for every size and isotropic material.
+
+    Shape -> family (reduced.py) at size 1 -> ModalModel at size s of a material (E, ν, ρ)
+
+    λ = (E/ρ) θ(ν)/(sL)²,   u = u'(ν)/√(ρ (sL)³),   x = s x',   curvature = curvature'/s
+
+so that f ∝ √(E/ρ)/s and u ∝ ρ^(-1/2) s^(-3/2). Damping is the material's at the new λ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sonic_bullet.modal.isotropic_family import Family
+from sonic_bullet.modal.model import damped
+from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.records.counts import format_count
+from sonic_bullet.records.errors import ModalError
+from sonic_bullet.records.mode_shapes import rounded
+
+ISOTROPIC = 1e-9
+"""Relative deviation from an isotropic tensor that rounding explains."""
+
+
+def is_isotropic(material: Material) -> bool:
+    """Tell whether a material is equally stiff in every direction."""
+    made = Material.isotropic("x", youngs_pa=material.youngs_pa, poisson=material.poisson, density_kg_m3=1)
+    off = np.abs(made.stiffness_pa - material.stiffness_pa).max()
+    return bool(off <= ISOTROPIC * np.abs(material.stiffness_pa).max())
+
+
+def model_of_size(family: Family, material: Material, size: float, to_hz: float) -> tuple[ModalModel, Array]:
+    """Make the model of a family's body times ``size`` of a material.
+
+    Returns
+    -------
+    ModalModel
+        Its modes up to to_hz, as far as the family has them.
+    Array, shape (m,)
+        Which of the family's modes they are.
+
+    Raises
+    ------
+    ModalError
+        The material is stiffer in some directions than in others.
+    """
+    if not is_isotropic(material):
+        raise ModalError(
+            f"material {material.name} is not isotropic", "solve its body with `Listener.add`, or take another"
+        )
+    density = material.density_kg_m3
+    length_m = size * family.length_m
+    value, vector = family.modes(material.youngs_pa / density, material.poisson)
+    value = value[value <= (2 * np.pi * to_hz * size) ** 2] / size**2
+    freq_hz, decay_per_s, alive = damped(value, material)
+    skin = family.skin.reshape(-1, family.skin.shape[2])
+    shape = skin @ (vector[:, alive] / np.sqrt(density * length_m**3)).astype(np.float32)
+    dropped = len(value) - len(alive)
+    left_out = f"; {format_count(dropped, 'overdamped mode')} dropped" if dropped else ""
+    model = ModalModel(
+        freq_hz=freq_hz,
+        decay_per_s=decay_per_s,
+        shape=rounded(shape.reshape(*family.skin.shape[:2], -1)),
+        vertex_m=family.vertex_m * size,
+        face=family.face,
+        curvature_per_m=family.curvature_per_m / size,
+        volume_m3=family.volume_m3 * size**3,
+        mass_kg=family.volume_m3 * size**3 * density,
+        dropped=dropped,
+        note=f"{family.note}; size {size:.6g} of a shape solved once{left_out}",
+        includes_radiation=material.includes_radiation,
+    )
+    return model, alive
