@@ -11,5 +11,6 @@ whose NAME.json is there is never done again.
 """
 
 from sonic_bullet.dataset.recipes import DatasetScene
+from sonic_bullet.session.known_shapes import KnownShape, known_shape
 
-__all__ = ["DatasetScene"]
+__all__ = ["DatasetScene", "KnownShape", "known_shape"]

@@ -5,19 +5,19 @@ Make it yours by a changed file: OBJECTS, MATERIALS and the ranges in `sample`.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import trimesh
 
 from sonic_bullet.dataset import DatasetScene
-from sonic_bullet.geometry.triangles import volume_m3
 from sonic_bullet.listener import keep_restitution
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Shape
+from sonic_bullet.session.known_shapes import KnownShape, known_shape
 
 MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
+SLOW = ("plastic",)
 FLOOR = "concrete"
 SIZES = (0.6, 1.4)
 HEIGHTS_M = (0.05, 0.5)
@@ -100,14 +100,13 @@ def build(
 ) -> dict[int, Any]:
     """Set up a floor and the body above it."""
     made = load_material(material)
-    shape = OBJECTS[object]
-    shape = replace(shape, size_m=shape.size_m * size, vertex_m=shape.vertex_m * size)
+    model = known(object, material).model(size, made)
     client.setGravity(0, 0, -9.81)
     client.setTimeStep(1 / 480)
     floor = client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
     body = client.createMultiBody(
-        volume_m3(*surface(shape)) * made.density_kg_m3,
-        collision_shape(client, shape),
+        model.mass_kg,
+        collision_shape(client, OBJECTS[object], size),
         basePosition=(0, 0, height_m + 0.12 * size),
         baseOrientation=np.array(quaternion_xyzw) / np.linalg.norm(quaternion_xyzw),
     )
@@ -115,27 +114,20 @@ def build(
     for one, of in ((floor, load_material(FLOOR)), (body, made)):
         client.changeDynamics(one, -1, restitution=of.restitution, lateralFriction=0.5, linearDamping=0)
     keep_restitution(client)
-    return {floor: {"material": FLOOR, "name": "floor"}, body: {"material": made, "mesh": shape, "name": object}}
+    return {floor: {"material": FLOOR, "name": "floor"}, body: {"material": made, "model": model, "name": object}}
 
 
-def surface(shape: Shape) -> tuple[Any, Any]:
-    """Return vertices and faces of a shape."""
-    x, y, z = shape.size_m
-    made = (
-        trimesh.creation.box((x, y, z))
-        if shape.kind == "box"
-        else trimesh.creation.cylinder(x, y, sections=48)
-        if shape.kind == "cylinder"
-        else trimesh.Trimesh(shape.vertex_m, shape.face, process=False)
-    )
-    return made.vertices, made.faces
+def known(object: str, material: str) -> KnownShape:
+    """Solve an object once for all its sizes and materials; apart for SLOW ones, which have several times the modes."""
+    group = [name for name in MATERIALS if (name in SLOW) == (material in SLOW)]
+    return known_shape(OBJECTS[object], group, largest=SIZES[1])
 
 
-def collision_shape(client: Any, shape: Shape) -> int:
+def collision_shape(client: Any, shape: Shape, size: float) -> int:
     """Make a collision shape; Bullet takes the convex hull of a mesh."""
-    x, y, z = shape.size_m.tolist()
+    x, y, z = (size * shape.size_m).tolist()
     if shape.kind == "box":
         return int(client.createCollisionShape(client.GEOM_BOX, halfExtents=(x / 2, y / 2, z / 2)))
     if shape.kind == "cylinder":
         return int(client.createCollisionShape(client.GEOM_CYLINDER, radius=x, height=y))
-    return int(client.createCollisionShape(client.GEOM_MESH, vertices=shape.vertex_m.tolist()))
+    return int(client.createCollisionShape(client.GEOM_MESH, vertices=(size * shape.vertex_m).tolist()))

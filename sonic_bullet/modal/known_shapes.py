@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model import damped
-from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.records import Array, Material, ModalModel, isotropic_stiffness_pa
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.records.mode_shapes import rounded
@@ -22,15 +22,17 @@ ISOTROPIC = 1e-9
 """Relative deviation from an isotropic tensor that rounding explains."""
 
 
-def is_isotropic(material: Material) -> bool:
-    """Tell whether a material is equally stiff in every direction."""
-    made = Material.isotropic("x", youngs_pa=material.youngs_pa, poisson=material.poisson, density_kg_m3=1)
-    off = np.abs(made.stiffness_pa - material.stiffness_pa).max()
-    return bool(off <= ISOTROPIC * np.abs(material.stiffness_pa).max())
+def check_isotropic(material: Material) -> None:
+    """Raise ModalError where a material is stiffer in some directions than in others."""
+    even = isotropic_stiffness_pa(material.youngs_pa, material.poisson)
+    if np.abs(even - material.stiffness_pa).max() > ISOTROPIC * np.abs(even).max():
+        raise ModalError(
+            f"material {material.name} is not isotropic", "its bodies are solved anew: give `Listener.add` the mesh"
+        )
 
 
 def model_of_size(family: Family, material: Material, size: float, to_hz: float) -> tuple[ModalModel, Array]:
-    """Make the model of a family's body times ``size`` of a material.
+    """Make the model of a family's body times ``size`` of an isotropic material.
 
     Returns
     -------
@@ -38,16 +40,7 @@ def model_of_size(family: Family, material: Material, size: float, to_hz: float)
         Its modes up to to_hz, as far as the family has them.
     Array, shape (m,)
         Which of the family's modes they are.
-
-    Raises
-    ------
-    ModalError
-        The material is stiffer in some directions than in others.
     """
-    if not is_isotropic(material):
-        raise ModalError(
-            f"material {material.name} is not isotropic", "solve its body with `Listener.add`, or take another"
-        )
     density = material.density_kg_m3
     length_m = size * family.length_m
     value, vector = family.modes(material.youngs_pa / density, material.poisson)

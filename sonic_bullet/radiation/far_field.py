@@ -24,6 +24,8 @@ v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
@@ -31,6 +33,8 @@ from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weigh
 from sonic_bullet.radiation.entrained_mass import Moved, moved_air
 from sonic_bullet.records import Air, Array, ModalModel
 
+NearField = Callable[[Array, Array, Array], tuple[Moved, Array] | None]
+MOST_PATCHES = 1800
 MOST_TRIANGLES = (700, 850, 1000, 1200, 1400)
 """Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
 its triangles' chords would cross. The last takes 2 s of processor."""
@@ -50,8 +54,11 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
     return radiation_and_note(model, air)[:2]
 
 
-def radiation_and_note(model: ModalModel, air: Air) -> tuple[Array, Array, str]:
-    """Compute `radiation`, and a note: `COMPACT` where the compact law replaces the near field, else ""."""
+def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None = None) -> tuple[Array, Array, str]:
+    """Compute `radiation`, and a note: `COMPACT` where the compact law replaces the near field, else "".
+
+    near_field: takes the place of `surface_air`, of corners (f, 3, 3), areas (f,) and normals (f, 3).
+    """
     most_patches = 1800
     m = model.mode_count
     corner, face = sound_faces(model)
@@ -64,7 +71,7 @@ def radiation_and_note(model: ModalModel, air: Air) -> tuple[Array, Array, str]:
     normal = twice / (2 * area[:, None])
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
     patch, place = _patches(corner, area, normal, most_patches)
-    near = _near(corner, area, normal)
+    near = (near_field or surface_air)(corner, area, normal)
     if near is None:
         weight = compact_weight(model, face, area, normal @ turn, k, air)
         return weight, _damping(weight, air), COMPACT
@@ -179,7 +186,7 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
     return patch, np.stack([np.bincount(patch, area * centre[:, i]) / total for i in range(3)], axis=1)
 
 
-def _near(corner: Array, area: Array, normal: Array) -> tuple[Moved, Array] | None:
+def surface_air(corner: Array, area: Array, normal: Array) -> tuple[Moved, Array] | None:
     """Compute the air moved by the body, and the triangle (f,) of it that represents each face; else None."""
     tried = 0
     for most in MOST_TRIANGLES:

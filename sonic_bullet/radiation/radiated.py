@@ -6,6 +6,7 @@ models themselves
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,8 +37,13 @@ def radiation_note(model: ModalModel, air: Air, cache: store.Place = "default") 
 
 
 @WhileAlive
-def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array, str]:
-    """Compute `radiation.far_field.radiation_and_note` of a model, cached as by `radiation_of`."""
+def radiation_and_note(
+    model: ModalModel, air: Air, cache: store.Place = "default", keep_surface: bool = False
+) -> tuple[Array, Array, str]:
+    """Compute `radiation.far_field.radiation_and_note` of a model, cached as by `radiation_of`.
+
+    keep_surface: also cache the air that its surface moves, some 4 MB: another material of the same shape needs it.
+    """
     m = model.mode_count
     if m == 0 or len(model.face) == 0:
         return radiation.radiation_and_note(model, air)
@@ -54,9 +60,24 @@ def radiation_and_note(model: ModalModel, air: Air, cache: store.Place = "defaul
     )
     known = _recall(store.load(cache, name), m)
     if known is None:
-        known = radiation.radiation_and_note(model, air)
+        known = radiation.radiation_and_note(model, air, partial(_kept_air, cache) if keep_surface else None)
         store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, known[2])
     return known
+
+
+def _kept_air(cache: store.Place, corner: Array, area: Array, normal: Array) -> tuple[added_mass.Moved, Array] | None:
+    """Recall `radiation.far_field.surface_air` of a surface, or compute it."""
+    name = key("surface", corner, code=code_digest(SOURCES, PACKAGES))
+    found = store.load(cache, name)
+    if found is not None:
+        a = found[0]
+        return added_mass.Moved(a["area"], a["length"], a["vector"]), a["nearest"]
+    made = radiation.surface_air(corner, area, normal)
+    if made is not None:
+        moved, nearest = made
+        arrays = {"area": moved.area_m2, "length": moved.length_m, "vector": moved.vector, "nearest": nearest}
+        store.save(cache, name, arrays, "")
+    return made
 
 
 def _recall(found: tuple[dict[str, Array], str] | None, m: int) -> tuple[Array, Array, str] | None:

@@ -20,11 +20,11 @@ from sonic_bullet.effects.presets_of_effects import with_material, with_modes
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.modal.known_shapes import model_of_size
+from sonic_bullet.modal.known_shapes import check_isotropic, model_of_size
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.radiation.radiated import radiation_and_note
-from sonic_bullet.records import Air, Material, ModalModel, Shape
+from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.records.mode_shapes import rounded
@@ -66,8 +66,11 @@ class KnownShape:
         """
         size = as_number(size, "size", f"give one up to {self.largest:g}", above=0, most=self.largest, error=ModalError)
         made = with_material(as_material(material))
+        check_isotropic(made)
         if made.youngs_pa / made.density_kg_m3 < self.gamma_m2_s2 * (size / self.largest) ** 2 * (1 - 1e-9):
-            raise ModalError(f"{made.name} has a lower E/density than the shape is known for", "add it to its materials")
+            raise ModalError(
+                f"{made.name} has a lower E/density than the shape is known for", "add it to its materials"
+            )
         plain, mine = model_of_size(self.family, made, size, self.to_hz)
         model = with_modes(plain, made)
         if model is not plain:
@@ -85,7 +88,7 @@ class KnownShape:
         at = at[mine]
         if (at < 0).any() or (np.abs(model.freq_hz * ratio / large.freq_hz[at] - 1) > MOST_SHIFT).any():
             return
-        weight, damping, note = radiation_and_note(large, air)
+        weight, damping, note = radiation_and_note(large, air, keep_surface=True)
         radiation_and_note.put(model, (weight[at] / np.sqrt(ratio), damping[at] / ratio, note), air, "default")
 
 
@@ -119,6 +122,8 @@ def known_shape(
     """
     largest = as_number(largest, "largest", "give a size above 0", above=0, error=ModalError)
     made = [with_material(as_material(one)) for one in materials]
+    for one in made:
+        check_isotropic(one)
     if not made:
         raise ModalError("materials are none", "name those that the shape will be made of")
     gamma = min(one.youngs_pa / one.density_kg_m3 for one in made)

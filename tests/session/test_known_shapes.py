@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from dataclasses import replace
 
@@ -10,55 +11,65 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.dataset.impacts import OBJECTS
+from sonic_bullet.geometry.triangles import face_areas_m2
 from sonic_bullet.presets import load_material
 from sonic_bullet.radiation import far_field
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import ModalModel, Shape
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.session.body_models import analyse_body
-from sonic_bullet.session.known_shapes import known_shape
+from sonic_bullet.session.known_shapes import MARGIN, known_shape
 from tests.few_cases import parametrize_few
 
 AIR = sb.Air()
 MATERIALS = ("steel", "glass", "wood", "aluminium")
-WEDGE = Shape(
-    "mesh",
-    vertex_m=np.array([[0, 0, 0], [0.12, 0, 0], [0, 0.05, 0], [0.01, 0.01, 0.03]]) - 0.01,
-    face=np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
-)
 
 
 def resized(shape: Shape, size: float) -> Shape:
     return replace(shape, size_m=shape.size_m * size, vertex_m=shape.vertex_m * size)
 
 
-def nearest_levels_db(model: ModalModel, fresh: ModalModel) -> np.ndarray:
-    """Differences of third-octave radiated power per squared modal velocity, which pairs of modes may share."""
+def third_octaves_apart_db(model: ModalModel, fresh: ModalModel) -> np.ndarray:
+    """Differences of third octaves of radiated power per squared modal velocity: pairs turn as they like."""
     levels = []
     for one, weight in ((model, radiation_of(model, AIR)[0]), (fresh, far_field.radiation(fresh, AIR)[0])):
-        third = np.round(3 * np.log2(one.freq_hz / 1000)).astype(int)
-        levels.append(np.bincount(third + 30, np.abs(weight) ** 2, 50))
+        third = np.round(3 * np.log2(one.freq_hz / 1000)).astype(int)[: model.mode_count]
+        levels.append(np.bincount(third + 30, np.abs(weight[: len(third)]) ** 2, 50))
     both = (levels[0] > 0) & (levels[1] > 0)
     return np.asarray(10 * np.log10(levels[0][both] / levels[1][both]))
 
 
-@parametrize_few("name", ["square-plate", "bowl", "bar", "ring", "wedge"], 2)
-@pytest.mark.parametrize(("size", "material"), [(1.0, "steel"), (0.6, "glass"), (1.3, "wood")])
+def mean_square(model: ModalModel, count: int) -> np.ndarray:
+    """Mean over the surface (m,) of squared motion times mass, which no mesh has a part in."""
+    area = face_areas_m2(model.vertex_m, model.face)
+    square = (model.shape[:, :, :count].astype(float) ** 2).sum(axis=1)[model.face].mean(axis=1)
+    return np.asarray(area @ square / area.sum() * model.mass_kg)
+
+
+CASES = [
+    (name, *made)
+    for made in ((0.6, "glass"), (1.3, "wood"), (1.0, "steel"))
+    for name in ("square-plate", "bowl", "bar", "ring")
+]
+
+
+@parametrize_few(("name", "size", "material"), CASES, (0, 5))
 def test_a_size_and_a_material_are_those_of_a_fresh_solution(name: str, size: float, material: str) -> None:
-    shape = OBJECTS.get(name, WEDGE)
-    known = known_shape(shape, MATERIALS, largest=1.3)
-    model = known.model(size, material)
-    fresh = analyse_body((resized(shape, size),), load_material(material), accuracy=0.001 if name != "wedge" else 0.005)
-    count = min(model.mode_count, fresh.mode_count)
-    assert abs(model.mode_count - fresh.mode_count) <= 1 and count > 5
-    tolerance = 1e-3 if name != "wedge" else 5e-3  # whose elements are not as fine
-    np.testing.assert_allclose(model.freq_hz[:count], fresh.freq_hz[:count], rtol=tolerance)
-    np.testing.assert_allclose(model.decay_per_s[:count], fresh.decay_per_s[:count], rtol=3 * tolerance, atol=1e-3)
+    shape = OBJECTS[name]
+    model = known_shape(shape, MATERIALS, largest=1.3).model(size, material)
+    made, slow = load_material(material), load_material("wood")
+    # as many modes as the shape is known for, so that its surface has as many triangles: the near field on 700 of a
+    # thin plate depends on them by 1 dB
+    stiffer = np.sqrt(made.youngs_pa / made.density_kg_m3 / (slow.youngs_pa / slow.density_kg_m3))
+    fresh = analyse_body((resized(shape, size),), made, accuracy=0.001, to_hz=20_000 * MARGIN * 1.3 / size * stiffer)
+    count = model.mode_count
+    assert 5 < count == (fresh.omega0_squared_per_s2 <= (2 * np.pi * 20_000) ** 2).sum()
+    np.testing.assert_allclose(model.freq_hz[:count], fresh.freq_hz[:count], rtol=1e-3)
+    np.testing.assert_allclose(model.decay_per_s[:count], fresh.decay_per_s[:count], rtol=3e-3)
     assert model.mass_kg == pytest.approx(fresh.mass_kg, rel=1e-3)
-    apart_db = nearest_levels_db(model, fresh)
+    apart_db = third_octaves_apart_db(model, fresh)
     assert len(apart_db) > 3 and np.abs(apart_db).max() < 0.5
-    rms = [np.sqrt((one.shape[:, :, :count].astype(float) ** 2).mean()) for one in (model, fresh)]
-    assert rms[0] == pytest.approx(rms[1], rel=0.05)  # surfaces of other triangles
+    assert mean_square(model, count).mean() == pytest.approx(mean_square(fresh, count).mean(), rel=0.02)
 
 
 def test_a_size_is_the_scaling_law_itself() -> None:
@@ -81,7 +92,10 @@ def test_known_shapes_cost_what_was_asked() -> None:
     for size in (0.6, 0.7, 0.8, 0.9, 1.1):
         known.model(size, "steel")
     assert (time.process_time() - start) / 5 < 0.05
-    other = sb.Material.isotropic("made", youngs_pa=9e10, poisson=0.31, density_kg_m3=4000 + np.random.rand())
+    other = sb.Material.isotropic(
+        "made", youngs_pa=9e10, poisson=0.31, density_kg_m3=4000 + os.getpid() % 997, alpha_per_s=1, beta_s=1e-8
+    )  # of no earlier run
+
     start = time.process_time()
     known.model(1.0, other)
     assert time.process_time() - start < 1.0
