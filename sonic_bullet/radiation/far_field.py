@@ -34,7 +34,6 @@ from sonic_bullet.radiation.entrained_mass import Moved, moved_air
 from sonic_bullet.records import Air, Array, ModalModel
 
 NearField = Callable[[Array, Array, Array], tuple[Moved, Array] | None]
-MOST_PATCHES = 1800
 MOST_TRIANGLES = (700, 850, 1000, 1200, 1400)
 """Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
 its triangles' chords would cross. The last takes 2 s of processor."""
