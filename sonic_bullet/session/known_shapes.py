@@ -1,7 +1,7 @@
 """Models of known shapes: a size or a material costs no solution, neither of the modes nor of how they radiate.
 
     known_shape: Shape -> Family, cached, its modes up to to_hz at the largest size and the lowest E/ρ asked for
-        -> KnownShape.model(size, material): modes scaled (modal/known_shapes.py), effects and loss of the material anew
+        -> KnownShape.model(size, material): modes scaled (modal/model_of_size.py), effects and loss of the material anew
         -> radiation: of the largest size, solved or from the cache, times the law of sizes
 
 A body of size s whose modes have f ∝ 1/s radiates by the same ka. With u ∝ s^(-3/2), a surface ∝ s² and k ∝ 1/s its
@@ -20,7 +20,7 @@ from sonic_bullet.effects.presets_of_effects import with_material, with_modes
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.modal.known_shapes import check_isotropic, model_of_size
+from sonic_bullet.modal.model_of_size import check_isotropic, model_of_size
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.radiation.radiated import radiation_and_note

@@ -66,7 +66,7 @@ class Stages:
         stop = first + len(step.contacts)
         orient(packed(step.contacts), step.quaternion_xyzw, self.window.row[first:stop])
         self.window.step[place] = step.dt_s, step.gravity_m_s2, (first, stop)
-        self.window.quaternion_xyzw[place] = step.quaternion_xyzw
+        self.window.quaternion_xyzw[place, : len(step.quaternion_xyzw)] = step.quaternion_xyzw
         enter_loads(self.window.row, first, stop, step.dt_s, self.pairs)
         self._steps = [*self._steps[-LOOKAHEAD:], step]
         self.number += 1
