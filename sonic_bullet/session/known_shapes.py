@@ -1,7 +1,7 @@
 """Models of known shapes: a size or a material costs no solution, neither of the modes nor of how they radiate.
 
     known_shape: Shape -> Family, cached, its modes up to to_hz at the largest size and the lowest E/ρ asked for
-        -> KnownShape.model(size, material): modes scaled (modal/model_of_size.py), effects and loss of the material anew
+        -> KnownShape.model(size, material): modes scaled (modal/model_of_size.py), the material's effects and loss anew
         -> radiation: of the largest size, solved or from the cache, times the law of sizes
 
 A body of size s whose modes have f ∝ 1/s radiates by the same ka. With u ∝ s^(-3/2), a surface ∝ s² and k ∝ 1/s its
