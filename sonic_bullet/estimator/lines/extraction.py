@@ -36,7 +36,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 
-ABOVE = 1.5  # times where eigenvalues of noise end: what is none goes later
+ABOVE = 1.1  # times where eigenvalues of noise end: what is none goes later
 FALSE_ALARMS = 0.05
 EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's filter is full
 ROUNDS = 6
