@@ -19,10 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density
-from sonic_bullet.estimator.lines.extraction import ABOVE, extract
-from sonic_bullet.estimator.lines.joint_lines import noise_rms
-from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
+from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density, subspace
+from sonic_bullet.estimator.lines.extraction import BAND_HZ, FASTEST_PER_S, extract
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -116,7 +114,8 @@ def steps() -> None:
             times.append(time.process_time() - start)
 
         begun = time.process_time()
-        pole = start_poles(x[None] / noise_rms(x[None], SR)[0], SR, 20.0, 21_600.0, ABOVE)
+        density = np.maximum(noise_density.noise_density(x, SR, (20, 21_600), tail=True), 1e-12)
+        pole = subspace.poles(x, SR, density, (20, 21_600), BAND_HZ, FASTEST_PER_S)
         timed("poles by bands", pole, begun)
         if len(freq) == 100:
             begun = time.process_time()

@@ -21,6 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
@@ -78,22 +79,12 @@ def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, sign
     )
 
 
-def _low_pass(passed: float, stopped: float, stop_db: float) -> Array:
-    """Return taps (l,), l odd, of a linear-phase low-pass with gain 1 at 0 Hz.
-
-    passed, stopped: edges of what goes through and of what is ``stop_db`` (> 50) lower, over the rate.
-    """
-    half = int((stop_db - 7.95) / (2.285 * 2 * np.pi * (stopped - passed))) // 2
-    taps = np.sinc((passed + stopped) * np.arange(-half, half + 1)) * np.kaiser(2 * half + 1, 0.1102 * (stop_db - 8.7))
-    return np.asarray(taps / taps.sum())
-
-
 def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]:
     """Cut the bands of signals (s, n), each from the sample on at which its filter is full."""
     from scipy.fft import fft, ifft, next_fast_len
 
     step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
-    taps = _low_pass(PASSED * BAND_HZ / sr, STOPPED * BAND_HZ / sr, STOP_DB)
+    taps = low_pass(PASSED * BAND_HZ / sr, STOPPED * BAND_HZ / sr, STOP_DB)
     count = max(0, -(-(signals.shape[1] - len(taps) + 1) // step))
     points = next_fast_len(-(-(signals.shape[1] + len(taps)) // step))
     whole = points * step

@@ -3,7 +3,7 @@
     recording -> onset.py (which part is one impact)
     -> exact_modes.py     where there is no noise: the rank of the Hankel matrix tells all modes at once
     -> noise_density.py   density over frequency, course over time
-    -> shared_poles.py (poles, band by band)
+    -> subspace.py (poles, band by band)
         every frequency resolution at once, where the paper goes from level to level
     -> after_attack.py    where what those leave is far louder than the noise: of what rings after the attack
     -> likelihood.py (all modes jointly)       the paper's "everything found so far subtracted", to the optimum
@@ -22,22 +22,22 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.estimator.lines import exact_modes, likelihood, onset
+from sonic_bullet.estimator.lines import exact_modes, likelihood, onset, subspace
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.estimator.lines.line_values import Features, Lines
-from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, white
-from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, early_poles, start_poles
+from sonic_bullet.estimator.lines.noise_density import Noise, matched, measured, noise_density, white
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 
-ABOVE = 1.1  # times where eigenvalues of noise end: what is none goes later
+FASTEST_PER_S = 3000.0
 FALSE_ALARMS = 0.05
+BAND_HZ = 500.0
 EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's filter is full
 ROUNDS = 6
 ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
@@ -197,8 +197,9 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
 
 def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sinusoids:
     """Return the bands' poles and their amplitudes; the strongest alone where there are more than can be identified."""
-    still = x[None] / max(noise_rms(x[None], sr)[0], floor)
-    slow, fast = (poles(still, sr, *band_hz, ABOVE) for poles in (start_poles, early_poles))
+    density = np.maximum(noise_density(x, sr, band_hz, tail=True), floor)
+    slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
+    fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
     pole = np.concatenate([slow, fast[~seen & (fast.real < -EARLY_PER_S)]])
     most = min(2 * MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)

@@ -89,9 +89,31 @@ def _lower_half(left: Array, sr: int, band_hz: tuple[float, float]) -> Array:
 
 
 def _mirrored(power: Array, sr: int, band_hz: tuple[float, float]) -> Array:
-    """Power (n_f,) over 0 … sr/2 with what the band holds mirrored at its edges in place of what it does not."""
+    """Return power (n_f,) over 0 … sr/2 with what the band holds mirrored at its edges in place of what it does not."""
     first, last = (round(min(f, sr / 2) / (sr / 2) * (len(power) - 1)) for f in band_hz)
     return np.pad(power[first : last + 1], (first, len(power) - 1 - last), mode="reflect")
+
+
+def noise_density(signal: Array, sr: int, band_hz: tuple[float, float], *, tail: bool = False) -> Array:
+    """Return rms per sample (n_f,) over frequency 0 … sr/2, as if white at that level, by what the band holds.
+
+    tail: from the last third, else from all.
+    """
+    from scipy.ndimage import percentile_filter
+
+    part = signal[-len(signal) // 3 :] if tail else signal
+    window = np.hanning(len(part)) if tail else np.ones(len(part))
+    power = _mirrored(np.abs(np.fft.rfft(part * window)) ** 2 / (window**2).sum(), sr, band_hz)
+    power = np.concatenate([power, power[-1:]]) if len(power) < 64 else power
+    width = max(25, len(power) // 60)
+    coarse = max(1, width // 50)
+    trimmed = power[: len(power) // coarse * coarse].reshape(-1, coarse)
+    smooth = (
+        percentile_filter(trimmed.ravel(), 25, size=width, mode="nearest")
+        if coarse == 1
+        else percentile_filter(np.quantile(trimmed, 0.25, axis=1), 50, size=width // coarse, mode="nearest")
+    )
+    return np.asarray(np.sqrt(smooth / np.log(4 / 3)))
 
 
 def matched(

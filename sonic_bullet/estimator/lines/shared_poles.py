@@ -1,6 +1,6 @@
 """Several recordings of one object -> rough poles that they share, band by band.
 
-The likelihoods of joint_lines.py and of extraction.py start there.
+The likelihood of joint_lines.py starts there.
 
     bands, decimated; poles = eigenvalues of the shift between the rows of the signal subspace of all recordings at once
         (ESPRIT) [Roy & Kailath 1989, eq. 3.12-3.17]
@@ -15,12 +15,10 @@ from sonic_bullet.records import Array
 
 FASTEST_PER_S = 2500.0
 MOST_WINDOW, MOST_COLUMNS = 300, 1200  # of the data matrix of one recording
-ABOVE = 2.0  # times where eigenvalues of noise end [Marchenko & Pastur 1967]
-EARLY = 1500  # samples, which a band's filter would outlast
 
 
-def start_poles(signals: Array, sr: int, low: float, high: float, above: float = ABOVE) -> Array:
-    """Return poles −d + iω (k,) band by band of signals in units of their noise, which they exceed by ``above``."""
+def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
+    """Poles −d + iω (k,) band by band; signals in units of their noise."""
     n = signals.shape[1]
     whole = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.fft(signals, whole, axis=1)
@@ -38,7 +36,7 @@ def start_poles(signals: Array, sr: int, low: float, high: float, above: float =
             :, len(taps) - 1 : n : step
         ]
         band /= np.sqrt((taps**2).sum())
-        found = _subspace(band, step / sr, above)
+        found = _subspace(band, step / sr)
         freq = centre + found.imag / (2 * np.pi)
         keep = (freq >= edge) & (freq < min(edge + width, high)) & (found.real < 0) & (found.real > -FASTEST_PER_S)
         return np.asarray(found[keep].real + 2j * np.pi * freq[keep])
@@ -58,14 +56,7 @@ def _low_pass(taps: int, cutoff: float) -> Array:
     return np.asarray(kernel / kernel.sum())
 
 
-def early_poles(signals: Array, sr: int, low: float, high: float, above: float = ABOVE) -> Array:
-    """Return poles (k,) of the first `EARLY` samples, no filter before them: the fast ones."""
-    found = _subspace(signals[:, :EARLY].astype(complex), 1 / sr, above)
-    freq = found.imag / (2 * np.pi)
-    return np.asarray(found[(freq >= low) & (freq < high) & (found.real < 0) & (found.real > -FASTEST_PER_S)])
-
-
-def _subspace(band: Array, dt: float, above: float) -> Array:
+def _subspace(band: Array, dt: float) -> Array:
     """Return poles of complex series (s, n) of unit noise at step dt: their one signal subspace, then the shift."""
     s, n = band.shape
     window = min(MOST_WINDOW, n // 3)
@@ -81,7 +72,7 @@ def _subspace(band: Array, dt: float, above: float) -> Array:
     columns = s * len(first)
     floor = max(float(np.median(value)) / columns, 0.3)
     edge = floor * columns * (1 + np.sqrt(window / columns)) ** 2
-    order = min(int((value > above * edge).sum()), window // 3)
+    order = min(int((value > 2.0 * edge).sum()), window // 3)
     if order == 0:
         return np.zeros(0, complex)
     signal = vector[:, -order:]
