@@ -16,7 +16,6 @@ from sonic_bullet.dataset.sample_folder import SampleFolder, open_folder
 from sonic_bullet.dataset.samples import Job, Sample, make_sample, warm_up
 from sonic_bullet.files.levels import check_sr
 from sonic_bullet.machine.progress import Say
-from sonic_bullet.parallel import one_thread
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.session.keeping import package_versions
@@ -85,8 +84,7 @@ def make_dataset(
         try:
             if missing:
                 say("machine code")
-                with one_thread():
-                    warm_up()
+                warm_up()
                 say(f"0 of {len(missing)}")
             for number, found in run_jobs(job, missing, workers, limit_s):
                 if isinstance(found, Failed):

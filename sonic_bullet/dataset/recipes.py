@@ -133,7 +133,7 @@ def read_recipe(name: str) -> Recipe:
     return recipe
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)  # one, and the ready one that warms up
 def _module(recipe: Recipe) -> ModuleType:
     """Run a recipe's text as a module, once a process."""
     module = ModuleType(f"sonic_bullet_recipe_{Path(recipe.path).stem}")
