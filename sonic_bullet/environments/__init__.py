@@ -1,4 +1,4 @@
-"""Sound as an observation of a gymnasium environment whose world is PyBullet's.
+"""Sound as an observation of a gymnasium environment whose world is PyBullet's or MuJoCo's.
 
 env.step -> the same run time -> an observation -> log-mel features
 

@@ -1,6 +1,6 @@
-"""Find the PyBullet client among an environment's attributes.
+"""Find the PyBullet client, or MuJoCo's model and data, among an environment's attributes.
 
-A BulletClient is searched for level by level, so that the one nearest to the environment is found; without one, an
+A BulletClient, or an object that holds an MjModel and an MjData, is searched for level by level, so that the one nearest to the environment is found; without one, an
 attribute whose name contains "client" and that holds the id of a connected one, then the pybullet module. Attributes
 are read as stored; no property is called.
 """
@@ -11,16 +11,16 @@ import inspect
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from sonic_bullet.listener import is_bullet_client, is_connected
+from sonic_bullet.listener.opening import bullet_client, connected_number, mujoco_pair
 from sonic_bullet.records.errors import SceneError
 
 DEPTH = 3
 """Levels of attributes that are searched: env.robot.sim.physics_client is the third."""
-REMEDY = "give client=, a BulletClient, the pybullet module or a client id"
+REMEDY = "give client=, a BulletClient, the pybullet module, a client id or MuJoCo's (model, data)"
 
 
 def client_in(env: Any) -> Any:
-    """Return the BulletClient, client id or pybullet module of a gymnasium environment, None where it has none (yet).
+    """Return the BulletClient, client id, pybullet module or (model, data) of a gymnasium environment, or None.
 
     Raises
     ------
@@ -33,11 +33,14 @@ def client_in(env: Any) -> Any:
     for _ in range(DEPTH):
         clients: dict[int, Any] = {}
         below = []
+        for pair in (mujoco_pair([value for _, value in _parts(thing)]) for thing in level):
+            if pair is not None:
+                clients[id(pair[1])] = pair
         for name, value in (part for thing in level for part in _parts(thing)):
-            if is_bullet_client(value):
+            if bullet_client(value):
                 clients[id(value)] = value
             elif isinstance(value, int):
-                if "client" in name.lower() and is_connected(value):
+                if "client" in name.lower() and connected_number(value):
                     numbers[int(value)] = None
             elif inspect.ismodule(value):
                 module = value if value.__name__ == "pybullet" else module
@@ -45,7 +48,7 @@ def client_in(env: Any) -> Any:
                 seen.add(id(value))
                 below.append(value)
         if clients:
-            return _only(list(clients.values()), "PyBullet clients")
+            return _only(list(clients.values()), "clients")
         level = below
     return _only(list(numbers), "client ids") if numbers else module
 

@@ -1,9 +1,7 @@
-"""A PyBullet world that stores the records of the steps hidden in one env.step, and their lengths."""
+"""Open an environment's world, and measure the simulated time of one env.step."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from copy import deepcopy
 from fractions import Fraction
 from typing import Any
@@ -11,36 +9,29 @@ from typing import Any
 import gymnasium
 
 from sonic_bullet.environments.client_in_environment import REMEDY, client_in
-from sonic_bullet.listener import PyBulletWorld, client_id_of, module_steps
+from sonic_bullet.environments.episode_steps import EpisodeWorld
+from sonic_bullet.listener.opening import is_mujoco
 from sonic_bullet.listener.quiet import quiet_stdout
-from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.synth.clock import exact_step
 
 
-class EpisodeWorld(PyBulletWorld):
-    """The world of a client. steps: those made since the list was last emptied."""
+def episode_world(client: Any) -> EpisodeWorld:
+    """Open the world of a PyBullet client or of MuJoCo's (model, data); raises SceneError."""
+    if is_mujoco(client):
+        from sonic_bullet.environments.mujoco_episodes import MujocoEpisodeWorld
 
-    def __init__(self, client: Any) -> None:
-        super().__init__(client, client_id_of(client))
-        self.steps: list[Step] = []
-        self.hooked = False
+        return MujocoEpisodeWorld(client)
+    from sonic_bullet.environments.pybullet_episodes import PyBulletEpisodeWorld
 
-    def listen(self, after: Callable[[], object]) -> bool:
-        """Call ``after`` after every step of a BulletClient; return whether it is one."""
-        self.hooked = super().listen(after)
-        return self.hooked
+    return PyBulletEpisodeWorld(client)
 
-    def after_step(self) -> Step:
-        """Return the record of the step just made, and store it; raises SceneError."""
-        step = super().after_step()
-        if self.stepped:
-            self.steps.append(step)
-        return step
 
-    def hearing(self, after: Callable[[], object]) -> AbstractContextManager[None]:
-        """Call ``after`` after every step within the block, also where the client has no instance to hook."""
-        return nullcontext() if self.hooked else module_steps(self.client_id, after)
+def same_client(one: Any, other: Any) -> bool:
+    """Tell whether two clients are one: the same object, or pairs of the same model and data."""
+    if is_mujoco(one) and is_mujoco(other):
+        return one[0] is other[0] and one[1] is other[1]
+    return one is other
 
 
 def step_length(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
@@ -58,10 +49,11 @@ def step_length(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
     Raises
     ------
     SceneError
-        There is no PyBullet client, or env.step makes no physics step.
+        There is no client, or env.step makes no physics step.
     """
     found = client_in(env) if client is None else client
-    other = _another(env) if client is None and (found is None or hasattr(found, "_client")) else None
+    is_own = found is None or hasattr(found, "_client") or is_mujoco(found)
+    other = _another(env) if client is None and is_own else None
     if other is None:
         return _measured(env, client)
     try:
@@ -74,7 +66,7 @@ def connected_client(env: gymnasium.Env[Any, Any], client: Any) -> Any:
     """Return the client given, or the environment's own; SceneError where it has none."""
     found = client_in(env) if client is None else client
     if found is None:
-        raise SceneError(f"the environment {env.unwrapped} has no PyBullet client", REMEDY)
+        raise SceneError(f"the environment {env.unwrapped} has no PyBullet client and no MuJoCo model and data", REMEDY)
     return found
 
 
@@ -94,7 +86,7 @@ def _another(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any] | None:
 
 def _measured(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
     env.reset()
-    world = EpisodeWorld(connected_client(env, client))
+    world = episode_world(connected_client(env, client))
     world.listen(world.after_step)
     try:
         with world.hearing(world.after_step):

@@ -18,7 +18,7 @@ from gymnasium.spaces import Box, Dict
 from gymnasium.spaces.utils import flatten
 from gymnasium.utils import RecordConstructorArgs
 
-from sonic_bullet.environments.episode_world import EpisodeWorld, connected_client, step_length
+from sonic_bullet.environments.episode_world import connected_client, episode_world, same_client, step_length
 from sonic_bullet.environments.repeated_episodes import RepeatedEpisodes
 from sonic_bullet.environments.sounding_cast import Cast, MaterialsLike, add_fillable, as_materials, cast_of, same_cast
 from sonic_bullet.files import check_sr
@@ -34,7 +34,7 @@ AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
 
 
 class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """A gymnasium environment whose observation has "audio", the sound of its PyBullet world.
+    """A gymnasium environment whose observation has "audio", the sound of its PyBullet or MuJoCo world.
 
     The observation space is a Dict: the keys of the environment's own, or "observation" where that is not a Dict, and
     "audio". That is float32 (channels, ceil(sr·T)) in pascals, T the simulated time of one env.step: the newest samples
@@ -52,7 +52,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         meshed are named in a SceneWarning and stay silent. A mapping from a body's name or id, or (either, link), to a
         material or keywords of `Listener.add`. A function of the client that returns one.
     client
-        Of PyBullet; None: found among the environment's attributes.
+        Of PyBullet, or MuJoCo's (model, data); None: found among the environment's attributes.
     step_s
         T; None: measured, on another environment of the same spec where one can be made, else by a reset and a step of
         this one.
@@ -63,7 +63,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     Raises
     ------
     SceneError
-        There is no PyBullet client or step, or the observation has "audio" already.
+        There is no client or step, or the observation has "audio" already.
     AudioError, MaterialError, RecordError
         An argument is not valid.
     """
@@ -180,7 +180,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         if self._begun_anew(client, cast):
             return
         self._detach()
-        self._world = EpisodeWorld(client)
+        self._world = episode_world(client)
         listener = attach(self._world, keep_log=False, keep_sound=False, **self._options)
         try:
             if isinstance(self._materials, Material):
@@ -197,7 +197,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
 
         Without hooks removals are not observed.
         """
-        if self._listener is None or not self._world.hooked or self._world.client is not client:
+        if self._listener is None or not self._world.hooked or not same_client(self._world.client, client):
             return False
         if not same_cast(cast, self._cast):
             return False
@@ -225,7 +225,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             if step.dt_s != self._dt_s:
                 raise SceneError(
                     f"the environment changed its time step from {self._dt_s:g} s to {step.dt_s:g} s",
-                    "keep one fixedTimeStep, or wrap the environment anew",
+                    "keep one time step, or wrap the environment anew",
                 )
         if len(steps) > self._most:
             raise SceneError(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.listener import PyBulletWorld, bodies_called, client_id_of, links_with_shapes
+from sonic_bullet.environments.episode_steps import EpisodeWorld
+from sonic_bullet.listener.opening import is_mujoco
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SceneWarning
@@ -37,18 +39,30 @@ def cast_of(materials: MaterialsLike, client: Any) -> Cast:
     SceneError
         No body has that name, or a function returns no mapping.
     """
-    client_id = client_id_of(client)
+    every, called = _links_of(client)
     if isinstance(materials, Material):
-        return dict.fromkeys(links_with_shapes(client_id), materials)
+        return dict.fromkeys(every(), materials)
     given = materials(client) if callable(materials) else materials
     if not isinstance(given, Mapping):
         raise SceneError(f"materials(client) returned {shown(given)}", "return a dict from bodies to materials")
     cast: Cast = {}
     for who, how in given.items():
         body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
-        for one in bodies_called(client_id, body) if isinstance(body, str) else (body,):
+        for one in called(body) if isinstance(body, str) else (body,):
             cast[one, link] = how
     return cast
+
+
+def _links_of(client: Any) -> tuple[Callable[[], Sequence[tuple[int, int]]], Callable[[str], Sequence[Any]]]:
+    """Return what lists all links that can touch, and what finds the bodies of a name."""
+    if is_mujoco(client):
+        from sonic_bullet.listener.mujoco.model_links import ModelLinks
+
+        return ModelLinks(client[0]).touching, lambda name: (name,)
+    from sonic_bullet.listener import bodies_called, client_id_of, links_with_shapes
+
+    client_id = client_id_of(client)
+    return partial(links_with_shapes, client_id), partial(bodies_called, client_id)
 
 
 def same_cast(one: Any, other: Any) -> bool:
@@ -58,7 +72,7 @@ def same_cast(one: Any, other: Any) -> bool:
     return one is other or (isinstance(one, str | int | float) and type(one) is type(other) and one == other)
 
 
-def add_fillable(listener: Listener, world: PyBulletWorld, cast: Cast, silent: set[Hashable]) -> Cast:
+def add_fillable(listener: Listener, world: EpisodeWorld, cast: Cast, silent: set[Hashable]) -> Cast:
     """Add all links of a default cast except those that cannot be meshed or solved; return these.
 
     Each of them is named once, as a SceneWarning, and its likeness is added to ``silent``, whose links are skipped.

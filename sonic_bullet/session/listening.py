@@ -36,9 +36,9 @@ from sonic_bullet.session.wanted_bodies import WantedBody, checked, enter_bodies
 
 
 def _opened(client: Any) -> World:
-    from sonic_bullet.listener import open_world
+    from sonic_bullet.listener.opening import open_simulator
 
-    return open_world(client)
+    return open_simulator(client)
 
 
 def _wanted(world: World, who: Any, how: Any) -> WantedBody:

@@ -23,8 +23,9 @@ from sonic_bullet.listener.memory import Memory, make_ready
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.start import LEFT_OUT, hooked_start
+from sonic_bullet.listener.tables.soft_impacts import SoftImpacts
 from sonic_bullet.listener.world import World
-from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
@@ -33,6 +34,9 @@ from sonic_bullet.records.simulated import Simulator, Values, with_body_id
 
 class MotionWorld(World):
     """Records, names and steps of a world that is read as tables; no body is ever removed."""
+
+    impacts: SoftImpacts | None = None
+    """Where contacts are soft: the impacts under way."""
 
     def __init__(self) -> None:
         self.begin()
@@ -61,6 +65,10 @@ class MotionWorld(World):
         SceneError
             There is no such link.
         """
+
+    def own(self, body: int, link: int) -> tuple[int, int]:
+        """Return (body, link) as records have them, where a user may say it otherwise; raises SceneError."""
+        return body, link
 
     def dynamics_of(self, body: int, link: int) -> Values:
         """Return the properties of a link under the simulator's names."""
@@ -110,13 +118,14 @@ class MotionWorld(World):
 
     def name_of(self, body: int, link: int = -1) -> str:
         """Return a link's name and its body's id for messages; raises SceneError."""
-        own = self.described(body, link).name
-        return with_body_id(self.properties.names.called(int(encode(body, link)), own), body)
+        record = self.described(*self.own(body, link))
+        called = self.properties.names.called(self._code(body, link), record.name)
+        return with_body_id(called, record.body_id)
 
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
         """Return the names that records of links (body, link, given name) would have if all were added now."""
         return self.properties.names.expected(
-            [(int(encode(body, link)), self.described(body, link).name, given) for body, link, given in links]
+            [(self._code(body, link), self.described(body, link).name, given) for body, link, given in links]
         )
 
     def silence(self, names: Collection[str]) -> None:
@@ -125,7 +134,7 @@ class MotionWorld(World):
 
     def call(self, body: int, link: int, name: str) -> None:
         """Give a link a name; raises SceneError where another link has it."""
-        self.properties.names.call(int(encode(body, link)), name)
+        self.properties.names.call(self._code(body, link), name)
 
     def add(
         self,
@@ -141,7 +150,7 @@ class MotionWorld(World):
         """Register a link with its material or model; return its record. See `World.add`."""
         how: dict[str, Any] = {"material": material, "model": model, "shapes": tuple(shapes)}
         how |= {"options": options, "mounting": mounting}
-        code = int(encode(body, link))
+        code = self._code(body, link)
         record = replace(sounding_body(self.described(body, link), **how), since_step=self.step_count)
         self._close([code])
         self._added.pop(code, None)
@@ -198,6 +207,9 @@ class MotionWorld(World):
             known.enter(start)
             start["index"][start["index"] < 0] = LEFT_OUT
             row, made = memory.made(known, start, touches, None, dt_s)
+        if self.impacts is not None:
+            row = self._collected(row[:made], dt_s, gravity_m_s2)
+            made = len(row)
         step = memory.unusual(known, start, row, made, dt_s, gravity_m_s2)
         self._past, self.stepped = now, True
         self.step_count += 1
@@ -207,6 +219,21 @@ class MotionWorld(World):
         """Return a step in which nothing happened, and say that there was none (`stepped`)."""
         self.stepped = False
         return self._memory.nothing(dt_s, gravity_m_s2)
+
+    def _collected(self, row: Array, dt_s: float, gravity_m_s2: tuple[float, ...]) -> Array:
+        """Return the rows that a step gives out, of bodies whose records have not ended."""
+        assert self.impacts is not None
+        records = self._known.records
+        masses = [
+            (records[a].mass_kg, records[b].mass_kg) for a, b in zip(row["a"].tolist(), row["b"].tolist(), strict=True)
+        ]
+        lighter = np.array([min(one or two, two or one) for one, two in masses], float)
+        row = self.impacts.collect(row, dt_s, gravity_m_s2, lighter)
+        there = np.isin(row["a"], self._known.body) & np.isin(row["b"], self._known.body)
+        return row if there.all() else row[there]
+
+    def _code(self, body: int, link: int) -> int:
+        return int(encode(*self.own(body, link)))
 
     def _close(self, codes: Collection[int]) -> None:
         self.properties.end(self._known.live[code] for code in codes if code in self._known.live)

@@ -1,0 +1,1 @@
+"""MuJoCo worlds: links, forces, steps; the only package that imports mujoco."""

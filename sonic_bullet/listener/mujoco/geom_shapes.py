@@ -1,0 +1,94 @@
+"""Geoms of MuJoCo as shapes, in the frame of their body's inertia.
+
+geom type, size, pos, quat -> Shape; ellipsoids as meshes; meshes with their own triangles, not their hulls
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sonic_bullet.geometry import volume_m3
+from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.errors import MeshError
+
+GEOM = mujoco.mjtGeom
+RINGS = 24
+"""Rings of triangles of an ellipsoid, of twice as many each."""
+
+
+def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, placed: bool = True) -> Shape:
+    """Return the shape of a geom in a frame given in its body's.
+
+    Parameters
+    ----------
+    place_m, turn_wxyz : Array, shapes (3,), (4,)
+        The frame: a body's ipos and iquat.
+    placed
+        Whether to place it; else it lies in its own frame.
+
+    Raises
+    ------
+    MeshError
+        It is a height field, a signed distance field or a flex, which has no surface here.
+    """
+    where: dict[str, Array] = {}
+    if placed:
+        position, turn, back = np.zeros(3), np.zeros(4), np.zeros(4)
+        mujoco.mju_negQuat(back, np.asarray(turn_wxyz, float))
+        mujoco.mju_rotVecQuat(position, np.asarray(model.geom_pos[geom] - place_m, float), back)
+        mujoco.mju_mulQuat(turn, back, model.geom_quat[geom])
+        where = {"position_m": position, "quaternion_xyzw": turn[[1, 2, 3, 0]]}
+    x, y, z = (float(one) for one in model.geom_size[geom])
+    match GEOM(model.geom_type[geom]):
+        case GEOM.mjGEOM_PLANE:
+            return Shape("plane", **where)
+        case GEOM.mjGEOM_SPHERE:
+            return Shape("sphere", np.array([x, 0, 0]), **where)
+        case GEOM.mjGEOM_CAPSULE:
+            return Shape("capsule", np.array([x, 2 * y, 0]), **where)
+        case GEOM.mjGEOM_CYLINDER:
+            return Shape("cylinder", np.array([x, 2 * y, 0]), **where)
+        case GEOM.mjGEOM_BOX:
+            return Shape("box", 2 * np.array([x, y, z]), **where)
+        case GEOM.mjGEOM_ELLIPSOID:
+            vertex, face = _ellipsoid(np.array([x, y, z]))
+            return Shape("mesh", vertex_m=vertex, face=face, **where)
+        case GEOM.mjGEOM_MESH:
+            number = int(model.geom_dataid[geom])
+            first, many = int(model.mesh_vertadr[number]), int(model.mesh_vertnum[number])
+            face_at, faces = int(model.mesh_faceadr[number]), int(model.mesh_facenum[number])
+            return Shape(
+                "mesh",
+                vertex_m=np.array(model.mesh_vert[first : first + many], float),
+                face=np.array(model.mesh_face[face_at : face_at + faces], np.int32),
+                **where,
+            )
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
+    raise MeshError(
+        f"{name} is a height field or distance field, which has no shape here", "give mesh=, or leave it silent"
+    )
+
+
+def _ellipsoid(radius_m: Array) -> tuple[Array, Array]:
+    """Return vertices and triangles of an ellipsoid about the origin."""
+    around = 2 * RINGS
+    polar = np.pi * np.arange(1, RINGS)[:, None] / RINGS
+    azimuth = 2 * np.pi * np.arange(around) / around
+    ring = np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0 * azimuth], axis=-1
+    ).reshape(-1, 3)
+    vertex = np.concatenate([ring, [[0, 0, 1], [0, 0, -1]]])
+    i, j = np.meshgrid(np.arange(RINGS - 2), np.arange(around), indexing="ij")
+    a, b = i * around + j, i * around + (j + 1) % around
+    c, d = a + around, b + around
+    sides = np.stack([np.stack([a, c, b], axis=-1), np.stack([b, c, d], axis=-1)]).reshape(-1, 3)
+    step = np.arange(around)
+    top, bottom, last = len(ring), len(ring) + 1, (RINGS - 2) * around
+    caps = [np.stack([np.full(around, top), step, (step + 1) % around], axis=1)]
+    caps += [np.stack([np.full(around, bottom), last + (step + 1) % around, last + step], axis=1)]
+    face = np.concatenate([sides, *caps]).astype(np.int32)
+    fuller = np.cbrt(4 / 3 * np.pi / volume_m3(vertex, face))  # of the same volume
+    return fuller * vertex * radius_m, face

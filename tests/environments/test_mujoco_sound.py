@@ -1,0 +1,98 @@
+"""gymnasium's MuJoCo environments with sound: the bare environment, its step's sound, the same bytes again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sonic_bullet as sb
+from sonic_bullet.records.errors import SceneError
+from tests.made.models import STEEL
+from tests.made.worlds import plate_model
+
+gymnasium = pytest.importorskip("gymnasium")
+pytest.importorskip("mujoco")
+
+from gymnasium.utils import env_checker  # noqa: E402
+
+from sonic_bullet.environments import SoundObservation  # noqa: E402
+
+FOOT = {"material": STEEL, "model": plate_model()}
+FEET = {"right_foot": FOOT, "left_foot": FOOT}
+
+
+def humanoid(**how: Any) -> Any:
+    return gymnasium.make("Humanoid-v5", terminate_when_unhealthy=False, **how)
+
+
+@pytest.fixture
+def env() -> Iterator[Any]:
+    made = SoundObservation(humanoid(), materials=FEET, microphones=((0.0, -1.0, 1.0), (0.0, 1.0, 1.0)))
+    yield made
+    made.close()
+
+
+def episode(env: Any, seed: int, count: int) -> list[Any]:
+    env.reset(seed=seed)
+    env.action_space.seed(seed)
+    return [env.step(env.action_space.sample()) for _ in range(count)]
+
+
+def test_it_is_the_bare_environment_with_sound(env: Any) -> None:
+    """RK4, five hidden steps of 3 ms: observations keep every bit, samples add up, an episode repeats its bytes."""
+    assert env.step_s * 1000 == 15
+    made = episode(env, 3, 40)
+    for (one, reward, *_, info), (two, same, *_) in zip(made, episode(humanoid(), 3, 40), strict=True):
+        assert np.array_equal(one["observation"], two)
+        assert reward == same
+        assert one["audio"].shape == (2, 720)
+        assert info["audio_count"] <= 720
+    assert sum(info["audio_count"] for *_, info in made) == 40 * 720
+    audio = np.concatenate([one["audio"] for one, *_ in made], axis=1)
+    assert np.abs(audio).max() > 1e-4
+    again = episode(env, 3, 40)
+    assert np.array_equal(audio, np.concatenate([one["audio"] for one, *_ in again], axis=1))
+    assert not any("contacts_differ" in info for *_, info in again)
+
+
+def test_gymnasiums_checker_passes(env: Any) -> None:
+    env_checker.check_env(env, skip_render_check=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Humanoid-v5", "HalfCheetah-v5"])
+def test_a_thousand_steps_sound_and_balance(name: str) -> None:
+    """All that touches, as plastic: what gymnasium's own environments do for 1000 env.steps is finite and sounds."""
+    env = SoundObservation(gymnasium.make(name), materials="plastic")
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    loudest = 0.0
+    for _ in range(1000):
+        observation, _, ended, cut, _ = env.step(env.action_space.sample())
+        assert np.isfinite(observation["audio"]).all()
+        loudest = max(loudest, float(np.abs(observation["audio"]).max()))
+        if ended or cut:
+            env.reset()
+    assert 1e-3 < loudest < 1e3
+    env.close()
+
+
+def test_a_time_step_that_changes_and_a_client_that_is_none_are_one_line(env: Any) -> None:
+    episode(env, 0, 1)
+    env.unwrapped.model.opt.timestep = 0.0015
+    with pytest.raises(SceneError, match=r"changed its time step from 0.003 s to 0.0015 s; keep one time step"):
+        env.step(env.action_space.sample())
+    with pytest.raises(SceneError, match="no PyBullet client and no MuJoCo model and data; give client="):
+        SoundObservation(gymnasium.make("CartPole-v1"))
+
+
+def test_all_that_touches_sounds_of_one_material(env: Any) -> None:
+    from sonic_bullet.environments.sounding_cast import cast_of
+
+    client = (env.unwrapped.model, env.unwrapped.data)
+    material = sb.load_material("plastic")
+    assert len(cast_of(material, client)) == 14
+    assert list(cast_of({"torso": "wood", (3, -1): "wood"}, client)) == [("torso", -1), (3, -1)]
