@@ -10,9 +10,7 @@ from sonic_bullet.listener.world import World
 
 def is_mujoco(client: Any) -> bool:
     """Tell whether a client is a pair of MuJoCo's model and data."""
-    mujoco = sys.modules.get("mujoco")
-    pair = isinstance(client, (tuple, list)) and len(client) == 2 and mujoco is not None
-    return pair and isinstance(client[0], mujoco.MjModel) and isinstance(client[1], mujoco.MjData)
+    return isinstance(client, (tuple, list)) and len(client) == 2 and mujoco_pair(list(client)) == tuple(client)
 
 
 def mujoco_pair(things: list[Any]) -> tuple[Any, Any] | None:

@@ -1,4 +1,4 @@
-"""`attach`: a listener on a PyBullet client that turns each physics step into a frame of sound.
+"""`attach`: a listener on a simulated world that turns each physics step into a frame of sound.
 
 listening: the `Listener` | wanted_bodies: bodies to add, and their modes | arguments: checks of arguments
 keeping: log and unread frames | scene_file: kinds of scene files, their code run | directed: runs with substitutions
@@ -27,14 +27,14 @@ def attach(
     keep_log: bool = True,
     keep_sound: bool = True,
 ) -> Listener:
-    """Attach a listener to a PyBullet world.
+    """Attach a listener to a PyBullet or MuJoCo world.
 
     Parameters
     ----------
     client
         A `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a
-        client id (then call `listener.step()` after each `p.stepSimulation()`); or a `listener.World` of another
-        simulator.
+        client id (then call `listener.step()` after each `p.stepSimulation()`); MuJoCo's ``(model, data)`` (then every `mujoco.mj_step`
+        is watched); or a `listener.World` of another simulator.
     sr
         Sample rate in Hz, 8000 … 384000.
     microphone

@@ -24,8 +24,8 @@ BLOCKED = "import sys; sys.modules.update(pybullet=None, pybullet_utils=None, py
 EDGES_M, TONES_HZ, RADIUS_M, MASS_KG = (0.3, 0.2, 0.01), (740.0, 1230.0, 2950.0, 5210.0, 9000.0), 0.02, 0.1
 HEIGHT_M, MICROPHONE = 0.2, (0.1, -0.4, 0.3)
 TO_12_KHZ = 16
-"""Third octaves from 400 Hz on. Above, 30 dB down, PyBullet's own differ by up to 10 dB when the ball falls 1 mm farther:
-the pulse begins between two samples."""
+"""Third octaves from 400 Hz on. Above, 30 dB down, PyBullet's own differ by up to 10 dB when the ball falls 1 mm
+farther: the pulse begins between two samples."""
 
 
 def test_the_page_runs_without_pybullet(tmp_path: Path) -> None:

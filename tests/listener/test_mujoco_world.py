@@ -18,6 +18,7 @@ from tests.made.worlds import plate_model
 
 mujoco = pytest.importorskip("mujoco")
 GRAVITY = np.array([0, 0, -9.81])
+FREE = "<body><freejoint/><geom size='.1' {}/></body>"
 
 
 @pytest.fixture(autouse=True)
@@ -197,11 +198,11 @@ def test_a_height_field_is_no_shape() -> None:
 @pytest.mark.parametrize(
     ("body", "option", "said"),
     [
-        ("<body><freejoint/><geom size='.1' contype='0' conaffinity='0'/></body>", "", "the MuJoCo model has no contacts"),
-        ("<body><freejoint/><geom size='.1'/></body>", "<flag contact='disable'/>", "has its contacts disabled; remove"),
+        (FREE.format("contype='0' conaffinity='0'"), "", "the MuJoCo model has no contacts"),
+        (FREE.format(""), "<flag contact='disable'/>", "has its contacts disabled; remove"),
         ("<geom size='.1' pos='0 0 1'/>", "", "the MuJoCo model has no contacts"),
     ],
-)  # fmt: skip
+)
 def test_a_model_without_contacts_is_refused(body: str, option: str, said: str) -> None:
     with pytest.raises(SceneError, match=said):
         sb.attach(made(body, flags=option))

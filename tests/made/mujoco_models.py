@@ -13,7 +13,8 @@ DROPPED = {
 PAIR = (
     "<geom name='shelf' type='box' size='.1 .1 .01' pos='0 0 .3'/>"
     "<body name='arm' pos='0 0 1'><joint axis='0 1 0'/><geom type='capsule' size='.02 .1' pos='.1 0 0' euler='0 90 0'/>"
-    "<body name='hand' pos='.25 0 0'><joint axis='1 1 0'/><geom type='box' size='.05 .02 .01' pos='.01 .02 .03'/></body></body>"
+    "<body name='hand' pos='.25 0 0'><joint axis='1 1 0'/><geom type='box' size='.05 .02 .01' pos='.01 .02 .03'/>"
+    "</body></body>"
 )
 ASSETS = (
     "<asset><mesh name='wedge' vertex='0 0 0  .1 0 0  0 .08 0  0 0 .06'/>"

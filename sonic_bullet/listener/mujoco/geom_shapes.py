@@ -5,6 +5,7 @@ geom type, size, pos, quat -> Shape; ellipsoids as meshes; meshes with their own
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -12,9 +13,18 @@ import numpy as np
 
 from sonic_bullet.geometry import volume_m3
 from sonic_bullet.records import Array, Shape
+from sonic_bullet.records.bodies import ShapeKind
 from sonic_bullet.records.errors import MeshError
 
 GEOM = mujoco.mjtGeom
+SIZED: dict[Any, tuple[ShapeKind, Callable[[float, float, float], tuple[float, float, float]]]] = {
+    GEOM.mjGEOM_PLANE: ("plane", lambda x, y, z: (0, 0, 0)),
+    GEOM.mjGEOM_SPHERE: ("sphere", lambda x, y, z: (x, 0, 0)),
+    GEOM.mjGEOM_CAPSULE: ("capsule", lambda x, y, z: (x, 2 * y, 0)),
+    GEOM.mjGEOM_CYLINDER: ("cylinder", lambda x, y, z: (x, 2 * y, 0)),
+    GEOM.mjGEOM_BOX: ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
+}
+"""Kind of shape, and its size_m of a geom's size: MuJoCo's are half lengths."""
 RINGS = 24
 """Rings of triangles of an ellipsoid, of twice as many each."""
 
@@ -42,30 +52,21 @@ def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, pl
         mujoco.mju_mulQuat(turn, back, model.geom_quat[geom])
         where = {"position_m": position, "quaternion_xyzw": turn[[1, 2, 3, 0]]}
     x, y, z = (float(one) for one in model.geom_size[geom])
-    match GEOM(model.geom_type[geom]):
-        case GEOM.mjGEOM_PLANE:
-            return Shape("plane", **where)
-        case GEOM.mjGEOM_SPHERE:
-            return Shape("sphere", np.array([x, 0, 0]), **where)
-        case GEOM.mjGEOM_CAPSULE:
-            return Shape("capsule", np.array([x, 2 * y, 0]), **where)
-        case GEOM.mjGEOM_CYLINDER:
-            return Shape("cylinder", np.array([x, 2 * y, 0]), **where)
-        case GEOM.mjGEOM_BOX:
-            return Shape("box", 2 * np.array([x, y, z]), **where)
-        case GEOM.mjGEOM_ELLIPSOID:
-            vertex, face = _ellipsoid(np.array([x, y, z]))
-            return Shape("mesh", vertex_m=vertex, face=face, **where)
-        case GEOM.mjGEOM_MESH:
-            number = int(model.geom_dataid[geom])
-            first, many = int(model.mesh_vertadr[number]), int(model.mesh_vertnum[number])
-            face_at, faces = int(model.mesh_faceadr[number]), int(model.mesh_facenum[number])
-            return Shape(
-                "mesh",
-                vertex_m=np.array(model.mesh_vert[first : first + many], float),
-                face=np.array(model.mesh_face[face_at : face_at + faces], np.int32),
-                **where,
-            )
+    kind = GEOM(model.geom_type[geom])
+    if kind in SIZED:
+        name, size = SIZED[kind]
+        return Shape(name, np.array(size(x, y, z)), **where)
+    if kind == GEOM.mjGEOM_ELLIPSOID:
+        vertex, face = _ellipsoid(np.array([x, y, z]))
+        return Shape("mesh", vertex_m=vertex, face=face, **where)
+    if kind == GEOM.mjGEOM_MESH:
+        number = int(model.geom_dataid[geom])
+        first, many = int(model.mesh_vertadr[number]), int(model.mesh_vertnum[number])
+        face_at, faces = int(model.mesh_faceadr[number]), int(model.mesh_facenum[number])
+        vertex = np.array(model.mesh_vert[first : first + many], float)
+        return Shape(
+            "mesh", vertex_m=vertex, face=np.array(model.mesh_face[face_at : face_at + faces], np.int32), **where
+        )
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
     raise MeshError(
         f"{name} is a height field or distance field, which has no shape here", "give mesh=, or leave it silent"

@@ -1,6 +1,6 @@
 """Links of a MuJoCo model: which things can touch and sound, their names, masses and shapes.
 
-    MjModel -> bodies with geoms, and each geom of the world body on its own -> roster, Body, Shape in the inertial frame
+    MjModel -> bodies with geoms, each geom of the world body on its own -> roster, Body, Shape in the inertial frame
 
 A link is (body id, -1); a geom of the world body, which is a floor or a table and no part of the others there, is
 (0, geom id). A user may also name link k ≥ 0 of a body: the k-th body below it, as MuJoCo counts them, depth first.

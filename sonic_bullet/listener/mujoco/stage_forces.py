@@ -134,7 +134,7 @@ def _ordinals(geom: Array) -> Array:
 
 
 def _merged(stages: list[tuple[Array, Array]]) -> Array:
-    """Join the contacts of stages: those of one name are one, where it is first seen, with the sum of their impulses."""
+    """Join the contacts of stages: those of one name are one, as first seen, with the sum of their impulses."""
     row, name = joined([row for row, _ in stages], TOUCH), np.concatenate([name for _, name in stages])
     _, first, back = np.unique(name, axis=0, return_index=True, return_inverse=True)
     made = row[first]

@@ -17,6 +17,8 @@ point of an elastic impact, where the speed is 0 as well, that is π/2 of it.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
@@ -56,6 +58,21 @@ LOAD = np.dtype(
 """A pair in one step. impact: its place among the impacts, or -1."""
 
 
+IMPACTS, HELD_COUNT, PAIRS, ROWS = 0, 1, 2, 3
+"""Places in the counts of an `ImpactTables`."""
+
+
+class ImpactTables(NamedTuple):
+    """Tables of one step: impacts and points held, pairs of the step before and of this one, rows that it gives out."""
+
+    impact: Array
+    held: Array
+    before: Array
+    now: Array
+    out: Array
+    counts: Array
+
+
 class SoftImpacts:
     """Impacts under way in one world."""
 
@@ -85,10 +102,10 @@ class SoftImpacts:
         out, now = np.zeros(k + len(held), CONTACT), np.zeros(k, LOAD)
         counts = np.array([len(self._impact), len(self._held), 0, 0])
         g = float(np.linalg.norm(gravity_m_s2))
-        collect_rows(row, g * mass_kg, dt_s, 1.1 * g * dt_s, self._before, impact, held, now, out, counts)
-        self._impact, self._held = impact[: counts[0]].copy(), held[: counts[1]].copy()
-        self._before = now[: counts[2]]
-        return out[: counts[3]]
+        collect_rows(row, g * mass_kg, dt_s, 1.1 * g * dt_s, ImpactTables(impact, held, self._before, now, out, counts))
+        self._impact, self._held = impact[: counts[IMPACTS]].copy(), held[: counts[HELD_COUNT]].copy()
+        self._before = now[: counts[PAIRS]]
+        return out[: counts[ROWS]]
 
 
 @njit(nogil=True, error_model="numpy")
@@ -128,7 +145,7 @@ def copy_row(source, to, fraction):
 def hold(row, key, fraction, held, counts):
     """Add a fraction of a row to the nearest point held of its pair that no other row of this step was added to."""
     best, nearest = -1, np.inf
-    for i in range(counts[1]):
+    for i in range(counts[HELD_COUNT]):
         one = held[i]
         if one.key != key or one.taken != 0 or one.row.a != row.a:
             continue
@@ -138,8 +155,8 @@ def hold(row, key, fraction, held, counts):
             best, nearest = i, off
     load = fraction * load_of(row)
     if best < 0:
-        best = counts[1]
-        counts[1] += 1
+        best = counts[HELD_COUNT]
+        counts[HELD_COUNT] += 1
         held[best].key, held[best].weight_n_s = key, 0.0
         copy_row(row, held[best].row, 0.0)
         for x in range(3):
@@ -169,59 +186,69 @@ def give_out(one, approach, to):
 
 
 @njit(nogil=True, error_model="numpy")
-def collect_rows(row, weight, dt, fall, before, impact, held, now, out, counts):
-    """Fill out (·,) of CONTACT; update impact, held, now. counts (4,): how many of impact, held, now, out.
+def collect_rows(row, weight, dt, fall, tables):
+    """Fill the tables' out; update impact, held, now.
 
-    weight (k,): of the lighter body in N. fall: closing speed in m/s that begins no impact. before: `now` of the step before.
+    weight (k,): of the lighter body of each row (k,), in N. fall: closing speed in m/s that begins no impact.
     """
-    for i in range(counts[1]):
+    impact, held, now, counts = tables.impact, tables.held, tables.now, tables.counts
+    for i in range(counts[HELD_COUNT]):
         held[i].taken = 0
-    for i in range(counts[0]):
+    for i in range(counts[IMPACTS]):
         impact[i].over = 1  # unless the pair is loaded
+    sum_loads(row, weight, dt, now, counts)
+    for i in range(counts[PAIRS]):
+        if now[i].force_n > 0:
+            now[i].impact = follow(now[i], dt, fall, tables)
+    for i in range(len(row)):
+        pass_row(row[i], now[place_of(now, counts[PAIRS], pair_key(row[i]))], tables)
+    for i in range(counts[PAIRS]):  # what passed is the support of the next step
+        if now[i].impact >= 0 and impact[now[i].impact].over == 0:
+            now[i].force_n = min(now[i].force_n, impact[now[i].impact].support_n)
+    finish(impact, held, tables.out, counts)
+
+
+@njit(nogil=True, error_model="numpy")
+def sum_loads(row, weight, dt, now, counts):
+    """Fill now: load and fastest loaded approach of each pair."""
     for i in range(len(row)):
         key, load = pair_key(row[i]), load_of(row[i])
-        at = place_of(now, counts[2], key)
+        at = place_of(now, counts[PAIRS], key)
         if at < 0:
-            at = counts[2]
-            counts[2] += 1
+            at = counts[PAIRS]
+            counts[PAIRS] += 1
             now[at].key, now[at].force_n, now[at].approach_m_s, now[at].impact = key, 0.0, -np.inf, -1
             now[at].weight_n = weight[i]
         now[at].force_n += load / dt
         if load > 0:
             now[at].approach_m_s = max(now[at].approach_m_s, row[i].approach_m_s)
-    for i in range(counts[2]):
-        one = now[i]
-        if one.force_n > 0:
-            one.impact = follow(one, dt, fall, before, impact, counts)
-    for i in range(len(row)):
-        one = now[place_of(now, counts[2], pair_key(row[i]))]
-        fraction = 1.0
-        if one.impact >= 0 and impact[one.impact].over == 0:
-            fraction = min(impact[one.impact].support_n / one.force_n, 1.0)
-            if load_of(row[i]) == 0:
-                fraction = 1.0
-            if fraction < 1.0:
-                hold(row[i], one.key, 1.0 - fraction, held, counts)
-        if fraction > 0:
-            copy_row(row[i], out[counts[3]], fraction)
-            counts[3] += 1
-    for i in range(counts[2]):  # what passed is the support of the next step
-        if now[i].impact >= 0 and impact[now[i].impact].over == 0:
-            now[i].force_n = min(now[i].force_n, impact[now[i].impact].support_n)
-    finish(impact, held, out, counts)
 
 
 @njit(nogil=True, error_model="numpy")
-def follow(one, dt, fall, before, impact, counts):
+def pass_row(one, pair, tables):
+    """Write the part of a row that passes to out, and hold the rest."""
+    fraction = 1.0
+    if pair.impact >= 0 and tables.impact[pair.impact].over == 0 and load_of(one) > 0:
+        fraction = min(tables.impact[pair.impact].support_n / pair.force_n, 1.0)
+        if fraction < 1.0:
+            hold(one, pair.key, 1.0 - fraction, tables.held, tables.counts)
+    if fraction > 0:
+        copy_row(one, tables.out[tables.counts[ROWS]], fraction)
+        tables.counts[ROWS] += 1
+
+
+@njit(nogil=True, error_model="numpy")
+def follow(one, dt, fall, tables):
     """Begin or continue the impact of a loaded pair; return its place, or -1 without one."""
-    at = place_of(impact, counts[0], one.key)
+    impact, before, counts = tables.impact, tables.before, tables.counts
+    at = place_of(impact, counts[IMPACTS], one.key)
     if at < 0:
         was = place_of(before, len(before), one.key)
         support = before[was].force_n if was >= 0 else 0.0
         if not (one.approach_m_s > fall and one.force_n > support):
             return -1
-        at = counts[0]
-        counts[0] += 1
+        at = counts[IMPACTS]
+        counts[IMPACTS] += 1
         new = impact[at]
         new.key, new.support_n, new.steps, new.elapsed_s = one.key, max(support, one.weight_n), 0, 0.0
         new.peak_n = 0.0
@@ -242,18 +269,18 @@ def follow(one, dt, fall, before, impact, counts):
 def finish(impact, held, out, counts):
     """Give out what impacts held that are over, and drop them."""
     kept = 0
-    for i in range(counts[1]):
-        one = impact[place_of(impact, counts[0], held[i].key)]
+    for i in range(counts[HELD_COUNT]):
+        one = impact[place_of(impact, counts[IMPACTS], held[i].key)]
         if one.over != 0:
-            give_out(held[i], one.approach_m_s, out[counts[3]])
-            counts[3] += 1
+            give_out(held[i], one.approach_m_s, out[counts[ROWS]])
+            counts[ROWS] += 1
         else:
             held[kept] = held[i]
             kept += 1
-    counts[1] = kept
+    counts[HELD_COUNT] = kept
     kept = 0
-    for i in range(counts[0]):
+    for i in range(counts[IMPACTS]):
         if impact[i].over == 0:
             impact[kept] = impact[i]
             kept += 1
-    counts[0] = kept
+    counts[IMPACTS] = kept
