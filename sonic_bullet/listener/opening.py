@@ -10,7 +10,10 @@ from sonic_bullet.listener.world import World
 
 def is_mujoco(client: Any) -> bool:
     """Tell whether a client is a pair of MuJoCo's model and data."""
-    return isinstance(client, (tuple, list)) and len(client) == 2 and mujoco_pair(list(client)) == tuple(client)
+    if not isinstance(client, (tuple, list)) or len(client) != 2:
+        return False
+    pair = mujoco_pair(list(client))
+    return pair is not None and pair[0] is client[0]
 
 
 def mujoco_pair(things: list[Any]) -> tuple[Any, Any] | None:

@@ -33,8 +33,8 @@ def attach(
     ----------
     client
         A `BulletClient` (then `stepSimulation` is hooked and nothing else need be called), the `pybullet` module or a
-        client id (then call `listener.step()` after each `p.stepSimulation()`); MuJoCo's ``(model, data)`` (then every `mujoco.mj_step`
-        is watched); or a `listener.World` of another simulator.
+        client id (then call `listener.step()` after each `p.stepSimulation()`); MuJoCo's ``(model, data)`` (then every
+        `mujoco.mj_step` is watched); or a `listener.World` of another simulator.
     sr
         Sample rate in Hz, 8000 … 384000.
     microphone

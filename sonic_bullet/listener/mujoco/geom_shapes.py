@@ -54,8 +54,8 @@ def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, pl
     x, y, z = (float(one) for one in model.geom_size[geom])
     kind = GEOM(model.geom_type[geom])
     if kind in SIZED:
-        name, size = SIZED[kind]
-        return Shape(name, np.array(size(x, y, z)), **where)
+        word, size = SIZED[kind]
+        return Shape(word, np.array(size(x, y, z)), **where)
     if kind == GEOM.mjGEOM_ELLIPSOID:
         vertex, face = _ellipsoid(np.array([x, y, z]))
         return Shape("mesh", vertex_m=vertex, face=face, **where)
