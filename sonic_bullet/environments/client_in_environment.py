@@ -1,8 +1,8 @@
 """Find the PyBullet client, or MuJoCo's model and data, among an environment's attributes.
 
 A BulletClient, or an object that holds an MjModel and an MjData, is searched for level by level, so that the one
-nearest to the environment is found; without one, an attribute whose name contains "client" and that holds the id of a connected
-one, then the pybullet module. Attributes are read as stored; no property is called.
+nearest to the environment is found; without one, an attribute whose name contains "client" and that holds the id of a
+connected one, then the pybullet module. Attributes are read as stored; no property is called.
 """
 
 from __future__ import annotations
