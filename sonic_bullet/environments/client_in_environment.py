@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from sonic_bullet.listener.opening import bullet_client, connected_number, mujoco_pair
+from sonic_bullet.listener.opening import bullet_client, connected_number, is_mujoco, mujoco_pair
 from sonic_bullet.records.errors import SceneError
 
 DEPTH = 3
@@ -48,7 +48,8 @@ def client_in(env: Any) -> Any:
                 seen.add(id(value))
                 below.append(value)
         if clients:
-            return _only(list(clients.values()), "clients")
+            kinds = "simulators" if any(map(is_mujoco, clients.values())) else "PyBullet clients"
+            return _only(list(clients.values()), kinds)
         level = below
     return _only(list(numbers), "client ids") if numbers else module
 

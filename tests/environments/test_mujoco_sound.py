@@ -11,10 +11,11 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.records.errors import SceneError
 from tests.made.models import STEEL
+from tests.made.mujoco_models import DROPPED, made
 from tests.made.worlds import plate_model
 
 gymnasium = pytest.importorskip("gymnasium")
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 
 from gymnasium.utils import env_checker  # noqa: E402
 
@@ -30,9 +31,9 @@ def humanoid(**how: Any) -> Any:
 
 @pytest.fixture
 def env() -> Iterator[Any]:
-    made = SoundObservation(humanoid(), materials=FEET, microphones=((0.0, -1.0, 1.0), (0.0, 1.0, 1.0)))
-    yield made
-    made.close()
+    wrapped = SoundObservation(humanoid(), materials=FEET, microphones=((0.0, -1.0, 1.0), (0.0, 1.0, 1.0)))
+    yield wrapped
+    wrapped.close()
 
 
 def episode(env: Any, seed: int, count: int) -> list[Any]:
@@ -44,14 +45,14 @@ def episode(env: Any, seed: int, count: int) -> list[Any]:
 def test_it_is_the_bare_environment_with_sound(env: Any) -> None:
     """RK4, five hidden steps of 3 ms: observations keep every bit, samples add up, an episode repeats its bytes."""
     assert env.step_s * 1000 == 15
-    made = episode(env, 3, 40)
-    for (one, reward, *_, info), (two, same, *_) in zip(made, episode(humanoid(), 3, 40), strict=True):
+    steps = episode(env, 3, 40)
+    for (one, reward, *_, info), (two, same, *_) in zip(steps, episode(humanoid(), 3, 40), strict=True):
         assert np.array_equal(one["observation"], two)
         assert reward == same
         assert one["audio"].shape == (2, 720)
         assert info["audio_count"] <= 720
-    assert sum(info["audio_count"] for *_, info in made) == 40 * 720
-    audio = np.concatenate([one["audio"] for one, *_ in made], axis=1)
+    assert sum(info["audio_count"] for *_, info in steps) == 40 * 720
+    audio = np.concatenate([one["audio"] for one, *_ in steps], axis=1)
     assert np.abs(audio).max() > 1e-4
     again = episode(env, 3, 40)
     assert np.array_equal(audio, np.concatenate([one["audio"] for one, *_ in again], axis=1))
@@ -77,6 +78,43 @@ def test_a_thousand_steps_sound_and_balance(name: str) -> None:
         if ended or cut:
             env.reset()
     assert 1e-3 < loudest < 1e3
+    env.close()
+
+
+class Rolling(gymnasium.Env[Any, Any]):
+    """A ball on a plate, pushed; one step of 1/240 s each."""
+
+    def __init__(self) -> None:
+        self.model, self.data = made(DROPPED["ball"], timestep=1 / 240)
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (7,), np.float64)
+        self.action_space = gymnasium.spaces.Box(-0.2, 0.2, (3,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        mujoco.mj_resetData(self.model, self.data)
+        return self.data.qpos.copy(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.data.xfrc_applied[1, :3] = action - 0.05 * self.data.qpos[:3] * [1, 1, 0]
+        mujoco.mj_step(self.model, self.data)
+        return self.data.qpos.copy(), 0.0, False, False, {}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1500)
+def test_a_hundred_thousand_steps_of_183_samples_and_three_quarters() -> None:
+    """One shape, and counts that sum to floor(sr · time) at every step."""
+    env = SoundObservation(Rolling(), sr=44_100, materials={"thing": FOOT})
+    env.reset(seed=0)
+    rng, total, loudest = np.random.default_rng(0), 0, 0.0
+    for step in range(1, 100_001):
+        observation, *_, info = env.step(rng.uniform(-0.2, 0.2, 3))
+        audio = observation["audio"]
+        assert audio.shape == (1, 184)
+        total += info["audio_count"]
+        assert total == step * 735 // 4
+        loudest = max(loudest, float(np.abs(audio).max()))
+    assert loudest > 1e-4
     env.close()
 
 

@@ -28,6 +28,7 @@ TO_12_KHZ = 16
 farther: the pulse begins between two samples."""
 
 
+@pytest.mark.slow
 def test_the_page_runs_without_pybullet(tmp_path: Path) -> None:
     page = (REPO / "docs" / "how-to" / "listen-in-mujoco.md").read_text(encoding="utf-8")
     scripts = re.findall(r"^```python\n(.*?)^```", page, re.S | re.M)

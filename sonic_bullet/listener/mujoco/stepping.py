@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import mujoco
 
 
-class Watcher(Protocol):
+class StepWatcher(Protocol):
     """What is called around each step."""
 
     def before_step(self) -> None:
@@ -29,7 +29,7 @@ _WATCHERS: dict[int, list[weakref.ref[Any]]] = {}
 _REAL: dict[str, Callable[..., Any]] = {}
 
 
-def watch(data: Any, watcher: Watcher) -> Callable[[], None]:
+def watch(data: Any, watcher: StepWatcher) -> Callable[[], None]:
     """Call a watcher around every step of an MjData, while it lives; return what ends it, harmless when ended."""
     key, here = id(data), mujoco
     if not _WATCHERS:
