@@ -110,7 +110,7 @@ def hold_contacts(here, rows, table, pairs, stand):
             one.used, one.used_s = one.count, 0.0
             for k in range(one.count):
                 one.used_n[k] = one.load_n[k]
-                one.used_m[k] = one.point_m[k]
+                _copy(one.point_m[k], one.used_m[k])
             stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
 
 
@@ -161,7 +161,7 @@ def _smooth(one, rows, share, near, follow, target, place):
     for k in range(one.count):
         if one.load_n[k] >= max(LEAST * whole, LEAST_N) or target[k] > 0.0:
             one.load_n[kept] = one.load_n[k]
-            one.point_m[kept] = one.point_m[k]
+            _copy(one.point_m[k], one.point_m[kept])
             kept += 1
     one.count = kept
 
@@ -183,12 +183,12 @@ def _take_rows(one, rows, share, near, target, place):
             k = one.count
             one.count += 1
             one.load_n[k] = 0.0
-            one.point_m[k] = rows[r].point_m
+            _copy(rows[r].point_m, one.point_m[k])
         target[k] += load
         total += load
         if old == 0 and load > most:  # a new pair takes its heaviest row's normal, then the mean
             most = load
-            one.outward[:] = rows[r].outward
+            _copy(rows[r].outward, one.outward)
         for side in range(2):
             for x in range(3):
                 place[k, side, x] += load * rows[r].point_m[side, x]
@@ -211,6 +211,14 @@ def _lean(one, outward, total, follow):
         length = max(_length(mean), 1e-300)
         for x in range(3):
             mean[x] /= length
+
+
+@njit(nogil=True, error_model="numpy")
+def _copy(vectors, out):
+    """Copy (2, 3); numba's own assignment would compile 3 s of text for an error that cannot occur."""
+    for side in range(2):
+        for x in range(3):
+            out[side, x] = vectors[side, x]
 
 
 @njit(nogil=True, error_model="numpy")
