@@ -15,6 +15,7 @@ from sonic_bullet.files import read_log
 from sonic_bullet.records import Air, Body
 from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
 from sonic_bullet.render.resonator import build_resonator
+from sonic_bullet.session.gltf_in.own_words import without_mounting
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from tests.cli.called_here import call_here
 from tests.made import baked as made
@@ -88,7 +89,7 @@ def check_same_sound(scene: RigidScene, log_of: Path, unstruck: str = "") -> Non
     assert set(theirs) == set(ours)
     for name, body in ours.items():
         baked = bake.bake_body(body)
-        order = np.argsort(baked.freq_hz, kind="stable")
+        order = np.argsort(without_mounting(baked.freq_hz, baked.decay_per_s, body.mounting)[0], kind="stable")
         found = theirs[name].model
         assert found is not None
         if body.mounting == "free":
@@ -96,7 +97,9 @@ def check_same_sound(scene: RigidScene, log_of: Path, unstruck: str = "") -> Non
             np.testing.assert_array_equal(found.decay_per_s, baked.decay_per_s[order])
         ringing = [build_resonator(one, (), 384_000, Air()) for one in (body_of(theirs[name]), body)]
         for field in ("omega_rad_s", "decay_per_s"):
-            np.testing.assert_allclose(*(getattr(one, field) for one in ringing), rtol=1e-12, err_msg=field)
+            # a mounting's loss, taken off and added again, may swap a pair of equal frequencies
+            theirs_now, ours_now = (np.sort(getattr(one, field)) for one in ringing)
+            np.testing.assert_allclose(theirs_now, ours_now, rtol=1e-12, err_msg=field)
         np.testing.assert_allclose(found.shape, baked.shape[:, :, order], rtol=1e-6, atol=1e-6 * found.shape.max())
         if name == unstruck:
             continue
