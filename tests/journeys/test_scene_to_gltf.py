@@ -156,6 +156,15 @@ def test_the_file_is_played_here_as_the_scene_was(ten: Path) -> None:
     assert level[1] == pytest.approx(level[0], abs=1.5)
 
 
+@pytest.mark.slow
+def test_its_animation_is_scored(ten: Path) -> None:
+    """Where physics are not to be simulated again, the recorded motion alone gives contacts and sound."""
+    done = call_here(ten, "score", "ten.glb", "--material", "steel", "--pascals", "-o", "scored.wav")
+    assert done.returncode == 0, done.stderr
+    sound = sb.read_audio(ten / "scored.wav")[0]
+    assert np.isfinite(sound).all() and np.abs(sound).max() > 0.1
+
+
 def test_a_log_goes_out_too(ten: Path) -> None:
     done = call_here(ten, "bake", "ten.npz", "-o", "log.gltf", "--seconds", "0.1")
     assert done.returncode == 0, done.stderr
@@ -217,3 +226,16 @@ def test_what_cannot_be_is_one_line(ten: Path, words: tuple[str, ...], said: str
 def test_what_a_file_says_in_words(ten: Path) -> None:
     told = json.loads((ten / "ten.json").read_text())
     assert len(told["bodies"]) == 9 and isinstance(told["notes"], list)
+
+
+def test_who_moved_and_is_in_no_record_is_named(tmp_path: Path) -> None:
+    (tmp_path / "scene.py").write_text(
+        "SECONDS = 0.05\n\n\ndef build(client):\n"
+        "    client.setGravity(0, 0, -9.81)\n"
+        "    box = client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.05, 0.01, 0.004])\n"
+        "    bar, _ = (client.createMultiBody(0.1, box, basePosition=[0, 0, height]) for height in (1, 2))\n"
+        "    return {bar: {'material': 'steel', 'name': 'bar'}}\n"
+    )
+    done = call_here(tmp_path, "bake", "scene.py", "-o", "scene.glb")
+    assert done.returncode == 0 and "motion of body 1 is not in the file" in done.stderr, done.stderr
+    assert [len(read_rigid_scene(tmp_path / "scene.glb").paths), done.stderr.count("motion of")] == [1, 1]
