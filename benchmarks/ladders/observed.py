@@ -17,6 +17,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.render import render_log
 from sonic_bullet.render.apart import render_apart
 from sonic_bullet.scene import RenderResult, render_scene
+from sonic_bullet.synth.surface_kernel import _PATCH, _ROWS, VOICE, _law
 
 SR = 48_000
 SECONDS = 2.0
@@ -40,6 +41,7 @@ class _Watch:
     force_n: list[Array] = field(default_factory=list)
     load_n: list[float] = field(default_factory=list)
     radius_m: float = 0.0
+    pair: Any = None
 
     def __call__(self, state: Any, number: int, step: Any, found: int, drives: int) -> None:
         frames = int(step["count"])
@@ -51,7 +53,7 @@ class _Watch:
         self.force_n.append(rows[0].copy() if drives else np.zeros(frames))
         if drives:
             pair = state.pairs.pair[state.scratch.slot[0]]
-            self.radius_m = float(pair["radius_m"])
+            self.radius_m, self.pair = float(pair["radius_m"]), pair.copy()
         self.load_n.append(float(state.pairs.pair[state.scratch.slot[0]]["load_n"]) if drives else 0.0)
 
 
@@ -97,6 +99,24 @@ class Observed:
         """Median load of what rubs."""
         loads = np.array(self._watch.load_n)
         return float(np.median(loads[loads > 0])) if (loads > 0).any() else 0.0
+
+    def patch_growth(self) -> float:
+        """Exponent of a patch's radius over its load, by the law that its oscillator runs: 1/3 of a ball, 0 of a punch.
+
+        Asked of the run time's own table of a pair, at the scene's load and at eight times as much.
+        """
+        _ = self._watch.force_n
+        voice, constants = np.zeros(1, VOICE)[0], np.zeros(_ROWS)
+        voice["load_n"] = self.load_n * np.array([1.0, 8.0])
+        _law(self._watch.pair, voice, SR, constants, 0)
+        first, last = constants[_PATCH : _PATCH + 2]
+        return float(np.log(last / first) / np.log(8.0))
+
+    def stick_fraction(self, start_s: float = 0.3) -> float:
+        """Fraction of the contacts' steps in which what slides stands: its slip is under a tenth of the median."""
+        rows = self.log.rows
+        slip = np.linalg.norm(rows.slip_m_s[self.log.time_s >= start_s], axis=1)
+        return float((slip < 0.1 * np.median(slip)).mean()) if len(slip) else 0.0
 
     def level_db(self, start_s: float = 0.3, end_s: float = SECONDS) -> float:
         """Level of a span re 20 µPa."""

@@ -188,10 +188,11 @@ def scene_log(
     materials: WantedMaterials,
     seconds: float | None,
     at_start: Callable[[Listener], object] | None = None,
+    at_end: Callable[[Listener], object] | None = None,
 ) -> ContactLog:
     """Return a log as it is to be baked, or that of a scene's first seconds, run without sound.
 
-    seconds None: the scene's own. at_start: called with a scene's listener before its first step.
+    seconds None: the scene's own. at_start, at_end: called with its listener before the first step, after the last.
     """
     if is_log(source):
         from sonic_bullet.files import read_log
@@ -203,7 +204,13 @@ def scene_log(
         with quiet_stderr():
             from sonic_bullet.scene import render_scene
 
-        asked: dict[str, Any] = {"seconds": seconds, "microphones": (), "at_start": at_start, **materials.options}
+        asked: dict[str, Any] = {
+            "seconds": seconds,
+            "microphones": (),
+            "at_start": at_start,
+            "at_end": at_end,
+            **materials.options,
+        }
         return render_scene(source, **asked, progress=progress, say=tell).log
 
 

@@ -27,7 +27,8 @@ def write_whole_scene(
     from sonic_bullet.cli.solids.bake_outputs import scene_log
 
     standing: list[StandingScene] = []
-    log = scene_log(source, materials, seconds, lambda listener: standing.append(_world_of(listener)))
+    looks = [lambda listener: standing.append(_world_of(listener))] * 2
+    log = scene_log(source, materials, seconds, *looks)
     if is_log(source) and seconds is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(f"{source} lasts {log.duration_s:.3f} s, shorter than {seconds} s", "give fewer seconds")
@@ -41,7 +42,8 @@ def write_whole_scene(
         for body in made.members:
             say("" if body is None else body.name)
             sounds.append(_sound_of(body, pruning))
-    notes = (*made.scene.notes, *write_scene(to, made.scene, sounds))
+    unrecorded = _unrecorded(standing, {(body.body_id, body.link) for body in made.members if body is not None})
+    notes = (*made.scene.notes, *unrecorded, *write_scene(to, made.scene, sounds))
     scene = made.scene
     joints = f", {format_count(len(scene.joints), 'joint')}" if scene.joints else ""
     line = (
@@ -49,6 +51,22 @@ def write_whole_scene(
         f"{log.duration_s:.3g} s of motion of {len(scene.paths)}"
     )
     return [one.model for one in sounds if one.model is not None], line, notes
+
+
+def _unrecorded(standing: list[StandingScene], recorded: set[tuple[int, int]]) -> tuple[str, ...]:
+    """Name who moved from the first look at the world to the last, and is in no record of the log."""
+    if len(standing) < 2:
+        return ()
+    last = dict(zip(standing[-1].links, standing[-1].scene.bodies, strict=True))
+    moved = [
+        body.name
+        for link, body in zip(standing[0].links, standing[0].scene.bodies, strict=True)
+        if link in last and link not in recorded and (body.position_m != last[link].position_m).any()
+    ]
+    if not moved:
+        return ()
+    who = moved[0] + (f" and {len(moved) - 1} more" if len(moved) > 1 else "")
+    return (f"motion of {who} is not in the file: a contact log has that of who sounds or is touched",)
 
 
 def _world_of(listener: Listener) -> StandingScene:
