@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any
@@ -13,12 +13,10 @@ import pybullet
 
 from sonic_bullet.listener.frames import NO_NUMBER, Roster, decode, encode, link_words
 from sonic_bullet.listener.known_bodies import sounding_body
-from sonic_bullet.listener.memory import make_ready
-from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces, described_pieces
 from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft, read_motion, read_roster
-from sonic_bullet.listener.world import World
+from sonic_bullet.listener.tables.known_world import KnownWorld
 from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.arrays import store
@@ -27,7 +25,7 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
-from sonic_bullet.records.simulated import Simulator, Values, finite, with_body_id
+from sonic_bullet.records.simulated import Values, finite, with_body_id
 
 HEAVIEST_KG = 1e12
 DYNAMICS = {
@@ -249,11 +247,10 @@ def likeness(client_id: int, body: int, link: int) -> Hashable:
     )
 
 
-class AskedLinks(World):
-    """The queries of a world that need no step. client_id: the client; properties: names and values set."""
+class AskedLinks(KnownWorld):
+    """The queries of a world that need no step. client_id: the client."""
 
     client_id: int
-    properties: Properties
 
     @property
     def left_out(self) -> BodiesLeftOut:
@@ -289,10 +286,6 @@ class AskedLinks(World):
 
         return links_with_shapes(self.client_id) if is_connected(self.client_id) else ()
 
-    def silence(self, names: Collection[str]) -> None:
-        """Mark as `silent`, from now on, records of links, or of all links of bodies, of these names."""
-        self.properties.names.silent = frozenset(names)
-
     def link_name(self, body: int, link: int) -> str:
         """Return the link's own name, without its body's."""
         return link_names(self.client_id, body)[link + 1]
@@ -319,15 +312,6 @@ class AskedLinks(World):
         motions = touched_motions(self.client_id, self.felt, known, touched)
         return step if motions is None else step.with_motions(motions)
 
-    def make_ready(self) -> None:
-        """Compile, or load, the machine code for which the first step would else wait."""
-        make_ready()
-
-    def call(self, body: int, link: int, name: str) -> None:
-        """Give a link a name; SceneError where another living link has it."""
-        self.properties.names.call(int(encode(body, link)), name)
-
-    @property
-    def simulator(self) -> Simulator:
-        """Properties that PyBullet reports; without hooks, only those it reported at the first step."""
-        return self.properties.simulator({"pybullet": find_version("pybullet")})
+    def versions(self) -> dict[str, str]:
+        """Return PyBullet's version."""
+        return {"pybullet": find_version("pybullet")}

@@ -16,7 +16,7 @@ from __future__ import annotations
 import inspect
 import numbers
 import weakref
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -25,7 +25,7 @@ import numpy as np
 
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, encode, rows_of, same_motion, without
 from sonic_bullet.listener.known_bodies import KnownBodies, alike
-from sonic_bullet.listener.memory import Memory, make_ready
+from sonic_bullet.listener.memory import Memory
 from sonic_bullet.listener.polling import Touches, loaded
 from sonic_bullet.listener.properties import Properties
 from sonic_bullet.listener.pybullet import body_facts as facts
@@ -35,7 +35,7 @@ from sonic_bullet.listener.pybullet.left_out import BodiesLeftOut
 from sonic_bullet.listener.pybullet.poses import check_connected, read_roster, undone
 from sonic_bullet.listener.pybullet.questions import contact_points, engine, settings
 from sonic_bullet.listener.pybullet.substeps import SubstepLog
-from sonic_bullet.listener.start import LEFT_OUT, NOBODY, hooked_start, jumped, polled_start
+from sonic_bullet.listener.start import NOBODY, hooked_start, jumped, polled_start
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
@@ -86,21 +86,6 @@ class PyBulletWorld(facts.AskedLinks):
         return self._census.left_out
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, as Contacts.a and Contacts.b count them; only the living where not `logged`."""
-        return tuple(self._known.records.values())
-
-    @property
-    def records(self) -> Mapping[int, Body]:
-        """The same by index."""
-        return self._known.records
-
-    @property
-    def living(self) -> tuple[Body, ...]:
-        """Those of `bodies` that are there now."""
-        return tuple(self._known.records[index] for index in self._known.live.values())
-
-    @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies that were in the world at the last step and have had no contact yet."""
         return frozenset(body for body, _, _ in self._past.roster.bodies) - {body.body_id for body in self.living}
@@ -116,10 +101,6 @@ class PyBulletWorld(facts.AskedLinks):
             return False
         self.hook(self.before_step, after)
         return True
-
-    def make_ready(self) -> None:
-        """Compile, or load, the machine code for which the first step would else wait."""
-        make_ready()
 
     @property
     def has_bodies(self) -> bool:
@@ -283,7 +264,7 @@ class PyBulletWorld(facts.AskedLinks):
 
     def _unusual(self, now: Motion, hooked: bool, touches: Touches | None) -> Step:
         """Return any step; touches: of sub-steps, else those of the memory."""
-        memory, known, (dt, _, gravity) = self._memory, self._known, self._settings
+        memory, (dt, _, gravity) = self._memory, self._settings
         first, past_touches = self.step_count == 0, memory.touches
         if first:
             self.properties.first_step()
@@ -300,17 +281,9 @@ class PyBulletWorld(facts.AskedLinks):
                 self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first
             )
         memory.touches, self._past = touches, now
-        known.enter(start)
-        row, made = memory.made(known, start, touches, past_touches, dt)
-        if made < 0:
-            for code in start["code"][start["met"] != 0].tolist():
-                record = self._census.described(code, self.epoch)
-                if record is not None:
-                    self._append(code, replace(record, since_step=self.step_count))
-            known.enter(start)
-            start["index"][start["index"] < 0] = LEFT_OUT
-            row, made = memory.made(known, start, touches, past_touches, dt)
-        return memory.unusual(known, start, row, made, dt, gravity)
+        silent = partial(self._census.described, epoch=self.epoch)
+        row, made = self._rows(start, touches, past_touches, dt, silent)
+        return memory.unusual(self._known, start, row, made, dt, gravity)
 
     def _bury(self, roster: Roster) -> None:
         """Close the records of bodies that were removed without a hook observing it."""
@@ -332,18 +305,8 @@ class PyBulletWorld(facts.AskedLinks):
                 self.epoch += 1
                 self._lose([code])
 
-    def _close(self, codes: Collection[int]) -> None:
-        """End the records of links."""
-        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
-        self._known.close(codes, self.step_count, keep=self.logged)
-
     def _lose(self, codes: Collection[int]) -> None:
         """End the records and free the names of links that are gone."""
         self._close(codes)
         self._added.forget(codes)
         self.properties.names.forget(codes)
-
-    def _append(self, code: int, record: Body) -> Body:
-        record = self.properties.begin(code, self._known.count, record)
-        self._known.append(code, record)
-        return record

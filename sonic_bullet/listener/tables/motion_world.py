@@ -11,7 +11,7 @@ taken for asleep or made inside another.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,20 +19,20 @@ import numpy as np
 
 from sonic_bullet.listener.frames import LINK_SPAN, Motion, Roster, decode, encode
 from sonic_bullet.listener.known_bodies import KnownBodies, sounding_body
-from sonic_bullet.listener.memory import Memory, make_ready
+from sonic_bullet.listener.memory import Memory
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.properties import Properties
-from sonic_bullet.listener.start import LEFT_OUT, hooked_start
+from sonic_bullet.listener.start import hooked_start
+from sonic_bullet.listener.tables.known_world import KnownWorld
 from sonic_bullet.listener.tables.soft_impacts import SoftImpacts
-from sonic_bullet.listener.world import World
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
-from sonic_bullet.records.simulated import Simulator, Values, with_body_id
+from sonic_bullet.records.simulated import Values, with_body_id
 
 
-class MotionWorld(World):
+class MotionWorld(KnownWorld):
     """Records, names and steps of a world that is read as tables; no body is ever removed."""
 
     impacts: SoftImpacts | None = None
@@ -78,30 +78,6 @@ class MotionWorld(World):
         """Return the settings of the simulator."""
         return {}
 
-    def versions(self) -> dict[str, str]:
-        """Return the versions of the simulator, by name."""
-        return {}
-
-    @property
-    def simulator(self) -> Simulator:
-        """Settings and versions of the simulator, and what changed."""
-        return self.properties.simulator(self.versions())
-
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """All bodies ever met, as Contacts.a and Contacts.b count them."""
-        return tuple(self._known.records.values())
-
-    @property
-    def records(self) -> Mapping[int, Body]:
-        """The same by index."""
-        return self._known.records
-
-    @property
-    def living(self) -> tuple[Body, ...]:
-        """Those of `bodies` whose records have not ended."""
-        return tuple(self._known.records[index] for index in self._known.live.values())
-
     @property
     def untouched(self) -> frozenset[int]:
         """Ids of the bodies in the world that have had no contact yet."""
@@ -127,14 +103,6 @@ class MotionWorld(World):
         return self.properties.names.expected(
             [(self._code(body, link), self.described(body, link).name, given) for body, link, given in links]
         )
-
-    def silence(self, names: Collection[str]) -> None:
-        """Mark as `silent`, from now on, records of links, or of all links of bodies, of these names."""
-        self.properties.names.silent = frozenset(names)
-
-    def call(self, body: int, link: int, name: str) -> None:
-        """Give a link a name; raises SceneError where another link has it."""
-        self.properties.names.call(self._code(body, link), name)
 
     def add(
         self,
@@ -166,10 +134,6 @@ class MotionWorld(World):
         for code, how in added.items():
             self._append(code, sounding_body(self.described(*decode(code)), **how))
 
-    def make_ready(self) -> None:
-        """Compile, or load, the machine code for which the first step would else wait."""
-        make_ready()
-
     def unhook(self) -> None:
         """Do nothing: there is no hook."""
 
@@ -194,23 +158,15 @@ class MotionWorld(World):
         moved
             Ids of bodies set elsewhere by hand since the step before.
         """
-        memory, known = self._memory, self._known
         if self._past is None:
             self.properties.first_step()
         start = hooked_start(self._past, now, moved, dt_s)
         start["born"] = 0
-        known.enter(start)
-        row, made = memory.made(known, start, touches, None, dt_s)
-        if made < 0:
-            for code in start["code"][start["met"] != 0].tolist():
-                self._append(code, replace(self.described(*decode(code)), since_step=self.step_count))
-            known.enter(start)
-            start["index"][start["index"] < 0] = LEFT_OUT
-            row, made = memory.made(known, start, touches, None, dt_s)
+        row, made = self._rows(start, touches, None, dt_s, lambda code: self.described(*decode(code)))
         if self.impacts is not None:
             row = self._collected(row[:made], dt_s, gravity_m_s2)
             made = len(row)
-        step = memory.unusual(known, start, row, made, dt_s, gravity_m_s2)
+        step = self._memory.unusual(self._known, start, row, made, dt_s, gravity_m_s2)
         self._past, self.stepped = now, True
         self.step_count += 1
         return step
@@ -234,15 +190,6 @@ class MotionWorld(World):
 
     def _code(self, body: int, link: int) -> int:
         return int(encode(*self.own(body, link)))
-
-    def _close(self, codes: Collection[int]) -> None:
-        self.properties.end(self._known.live[code] for code in codes if code in self._known.live)
-        self._known.close(codes, self.step_count, keep=self.logged)
-
-    def _append(self, code: int, record: Body) -> Body:
-        record = self.properties.begin(code, self._known.count, record)
-        self._known.append(code, record)
-        return record
 
 
 def roster_of(code: Sequence[int], static: Sequence[bool]) -> Roster:
