@@ -45,7 +45,7 @@ def test_a_response_becomes_the_velocity_after_an_impulse(tmp_path: Path, quanti
     for f, d, psi in zip(FREQ_HZ, DECAY, WEIGHT, strict=True):
         pole = -d + 2j * np.pi * f
         truth += np.real(psi * (1 + 1j * d / (2 * np.pi * f)) * np.exp(pole * t) / (1 - np.exp(pole * t[-1])))
-    assert np.abs(sound - truth)[: sr // 2].max() < 5e-3 * np.abs(truth).max()
+    assert np.abs(sound - truth)[: sr // 2].max() < 1e-4 * np.abs(truth).max()
 
 
 def test_units_of_the_file(tmp_path: Path) -> None:

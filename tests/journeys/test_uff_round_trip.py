@@ -129,6 +129,7 @@ def test_a_bar_with_its_mesh_and_out_again(capfd: pytest.CaptureFixture[str]) ->
     assert run("case", "new", "again", "out.uff", *new[4:]) == 0
     assert run(*(word.replace("mine", "again").replace("out", "out2") for word in fit)) == 0
     second = told()
+    assert len(second["lines"]) == len(first["lines"])  # of a response without noise as of one with it
     for name in ("gamma_m2_s2", "alpha_per_s", "beta_s", "sigma"):
         assert second[name] == pytest.approx(first[name], rel=2e-3), name
     capfd.readouterr()

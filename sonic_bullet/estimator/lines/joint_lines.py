@@ -34,7 +34,6 @@ LATE_S = (0.03, 0.1)
 DEAD = 9.0  # of ln amplitude: 78 dB
 PLAINLY = 0.75  # of what other lines leave, in squares
 SILENT = 1e-9  # rms, of full scale 1
-FLOOR = 1e-9  # rms, of full scale 1: no noise
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
 
@@ -121,7 +120,7 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
 
     Recordings without a noise of their own are held against what their lines leave.
     """
-    if (noise <= FLOOR).all():
+    if (noise <= SILENT).all():
         return _over_what_is_left(signals, noise, pole, sr, low, high)
     colour = _colour(signals, noise, sr)
     for turn in range(3):
@@ -193,7 +192,7 @@ def noise_rms(signals: Array, sr: int) -> Array:
     power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
     # exponential law: its lower quartile is ln(4/3) of the mean
     density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)
-    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), FLOOR))
+    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), SILENT))
 
 
 def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:

@@ -25,6 +25,7 @@ from sonic_bullet.records.errors import FileError
 
 LOWEST_HZ = 20.0
 BAND = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
+BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
 OFF_RATE = 5e-5  # relative: six figures of a step, and their last
 ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
 STEPS = 4001  # of an edge
@@ -54,7 +55,6 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     FileError
         Its rate is not a whole number of Hz, or it unpacks to too many samples.
     """
-    about_jump = 40  # samples at twice the highest frequency: W rings √(π² + β²)/(π·0.2)/2 periods of it, 34 samples
     off_grid = 0.01  # of a step
     power = MOTION.get(response.quantity, 0)
     if not response.spectral:
@@ -71,7 +71,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     spectrum = np.zeros(count // 2 + 1, complex)
     spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, BAND * freq[-1])
     sound = np.fft.irfft(spectrum, count) * sr
-    jump = math.ceil(about_jump * sr / (2 * freq[-1]))
+    jump = math.ceil(math.hypot(math.pi, BETA) / (math.pi * (1 - BAND) * freq[-1]) * sr)  # W rings no longer
     return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, BAND * float(freq[-1]))
 
 
@@ -112,10 +112,9 @@ def _derived(value: Array, freq_hz: Array, power: int) -> Array:
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
     """Return one between two frequencies; falls to zero at half the first and at the last frequency."""
-    beta = 10.0  # of the Kaiser window: side lobes of 1e-5
     below = (freq_hz - low_hz / 2) / (low_hz / 2)
     above = (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
-    step = np.cumsum(np.kaiser(STEPS, beta))
+    step = np.cumsum(np.kaiser(STEPS, BETA))
     at = np.linspace(0, 1, STEPS)
     return np.asarray(np.interp(below, at, step) * np.interp(above, at, step) / step[-1] ** 2)
 
