@@ -75,21 +75,9 @@ def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, pl
 
 def _ellipsoid(radius_m: Array) -> tuple[Array, Array]:
     """Return vertices and triangles of an ellipsoid about the origin."""
-    around = 2 * RINGS
-    polar = np.pi * np.arange(1, RINGS)[:, None] / RINGS
-    azimuth = 2 * np.pi * np.arange(around) / around
-    ring = np.stack(
-        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0 * azimuth], axis=-1
-    ).reshape(-1, 3)
-    vertex = np.concatenate([ring, [[0, 0, 1], [0, 0, -1]]])
-    i, j = np.meshgrid(np.arange(RINGS - 2), np.arange(around), indexing="ij")
-    a, b = i * around + j, i * around + (j + 1) % around
-    c, d = a + around, b + around
-    sides = np.stack([np.stack([a, c, b], axis=-1), np.stack([b, c, d], axis=-1)]).reshape(-1, 3)
-    step = np.arange(around)
-    top, bottom, last = len(ring), len(ring) + 1, (RINGS - 2) * around
-    caps = [np.stack([np.full(around, top), step, (step + 1) % around], axis=1)]
-    caps += [np.stack([np.full(around, bottom), last + (step + 1) % around, last + step], axis=1)]
-    face = np.concatenate([sides, *caps]).astype(np.int32)
+    from trimesh.creation import uv_sphere
+
+    made = uv_sphere(radius=1, count=[RINGS, 2 * RINGS])
+    vertex, face = np.array(made.vertices), made.faces.astype(np.int32)
     fuller = np.cbrt(4 / 3 * np.pi / volume_m3(vertex, face))  # of the same volume
     return fuller * vertex * radius_m, face

@@ -18,9 +18,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sonic_bullet.radiation.far_field import spread_directions
 from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Microphone, ShoeboxRoom
 from sonic_bullet.render.space.ambisonic_encoding import harmonics
 from sonic_bullet.render.space.ear_filters import MARGIN, ear_filters
+from sonic_bullet.synth.minimum_phase import minimum_phase
 
 LOWEST_HZ = 125.0
 """Of the octaves that absorption is given for: those of the tables [ISO 354:2003]."""
@@ -56,11 +58,7 @@ def early_filters(room: ShoeboxRoom, orders: Array, sr: int) -> Array:
     """Make filters (g, t) of so many reflections each: of least phase, for a wall sends nothing back ahead of time."""
     size = 4 * EARLY_TAPS
     alpha = room.absorption @ band_weights(np.fft.rfftfreq(size, 1 / sr), len(room.absorption))
-    level = 0.5 * np.asarray(orders)[:, None] * np.log(np.maximum(1 - alpha, 1e-12))
-    cepstrum = np.fft.irfft(level, size)
-    cepstrum[:, 1 : size // 2] *= 2
-    cepstrum[:, size // 2 + 1 :] = 0
-    return np.fft.irfft(np.exp(np.fft.rfft(cepstrum, size)), size)[:, :EARLY_TAPS]
+    return minimum_phase(0.5 * np.asarray(orders)[:, None] * np.log(np.maximum(1 - alpha, 1e-12)))[:, :EARLY_TAPS]
 
 
 def late_filters(
@@ -80,9 +78,11 @@ def late_filters(
     x, y, z = room.size_m
     level = np.sqrt(4 * np.pi * air.sound_speed_m_s / (x * y * z) / sr / len(TETRAHEDRON)) * np.sqrt(size / 2 / WAVES)
     middle = np.mean([one.position_m for one, _ in receivers], axis=0)
+    half = spread_directions(WAVES // 2)[0]
+    from_all_around = np.concatenate([half, -half])
     for far in range(len(TETRAHEDRON)):
         spectrum = np.zeros((channels, len(frequency_hz)), complex)
-        for direction in _sphere(WAVES):
+        for direction in from_all_around:
             wave = rng.standard_normal(2 * len(frequency_hz)).view(complex)
             for microphone, first in receivers:
                 early_s = direction @ (microphone.position_m - middle) / air.sound_speed_m_s
@@ -111,11 +111,3 @@ def _response_of(microphone: Microphone, direction: Array, frequency_hz: Array, 
         size = 2 * (len(frequency_hz) - 1)
         return np.asarray(np.fft.rfft(response, size) * np.exp(2j * np.pi * MARGIN / sr * frequency_hz))
     return np.ones((1, 1))
-
-
-def _sphere(count: int) -> Array:
-    """Spread points (count, 3) over a sphere: Fibonacci's lattice [González, Math. Geosci. 42, 2010]."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    angle = np.pi * (1 + np.sqrt(5)) * np.arange(count)
-    rho = np.sqrt(1 - z**2)
-    return np.stack([rho * np.cos(angle), rho * np.sin(angle), z], axis=1)

@@ -3,8 +3,8 @@
     ContactMicrophone: velocity -> d/dt -> acceleration -> its frequency response, minimum phase -> + white noise
 
 d/dt: antisymmetric taps of even number, least squares of the relative error to 0.85 of half the rate [Oppenheim,
-Schafer 2010, sec. 7.5: type IV]: within 0.1 %, and (TAPS - 1)/2 samples late. Minimum phase: the causal part, doubled,
-of the cepstrum of the magnitude [ibid., sec. 13.4]. Noise of sample n depends on seed, sensor and n alone.
+Schafer 2010, sec. 7.5: type IV]: within 0.1 %, and (TAPS - 1)/2 samples late. Noise of sample n depends on seed, sensor
+and n alone.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorResponse
+from sonic_bullet.synth.minimum_phase import minimum_phase
 
 TAPS = 16
 REACH = 0.85
@@ -42,10 +43,7 @@ def response_taps(response: SensorResponse, sr: int) -> Array:
     """Return taps (≤ RESPONSE_TAPS,) of a response at a rate in Hz, of minimum phase."""
     size = 4 * RESPONSE_TAPS
     magnitude = response.at(np.fft.rfftfreq(size, 1 / sr))
-    cepstrum = np.fft.irfft(np.log(magnitude), size)
-    cepstrum[1 : size // 2] *= 2
-    cepstrum[size // 2 + 1 :] = 0
-    taps = np.fft.irfft(np.exp(np.fft.rfft(cepstrum)), size)[:RESPONSE_TAPS]
+    taps = minimum_phase(np.log(magnitude))[:RESPONSE_TAPS]
     rest = np.sqrt(np.cumsum(taps[::-1] ** 2)[::-1])
     return np.asarray(taps[: max(1, int(np.count_nonzero(rest > LEFT_OUT * rest[0])))])
 
