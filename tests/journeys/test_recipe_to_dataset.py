@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import signal
 import subprocess
@@ -13,9 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sonic_bullet.dataset import sample_folder
 from sonic_bullet.dataset.job_processes import TRIES, Failed, run_jobs
 from sonic_bullet.dataset.sample_folder import open_folder
 from sonic_bullet.files import read_audio
+from sonic_bullet.files.atomic import cannot
 from sonic_bullet.records.errors import FileError
 from tests.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
@@ -107,6 +110,27 @@ def test_kills_change_no_byte(place: Path, kills: int) -> None:
     while run(*words) and time.monotonic() < until:  # a killed run's processes may still be ending
         time.sleep(0.1)
     assert contents("cut") == contents("whole")
+
+
+def test_a_full_disk_keeps_what_is_whole_and_is_gone_on_from(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    real = sample_folder.write_audio
+
+    def until_it_is_full(path: Path, *more: Any, **how: Any) -> None:
+        if path.name == "000002.wav":
+            raise cannot("write", path, OSError(errno.ENOSPC, "No space left on device"))
+        real(path, *more, **how)
+
+    how = ("fall.py", "-o", "one", "--count", 3, "--workers", 1)
+    monkeypatch.setattr(sample_folder, "write_audio", until_it_is_full)
+    assert dataset(*how) == 2
+    assert "disk full" in capfd.readouterr().err
+    assert [one["number"] for one in manifest("one")] == [0, 1]
+    monkeypatch.setattr(sample_folder, "write_audio", real)
+    assert dataset(*how) == 0
+    assert dataset("fall.py", "-o", "two", "--count", 3) == 0
+    assert contents("one") == contents("two")
 
 
 def test_what_fails_is_listed_and_the_rest_goes_on(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
