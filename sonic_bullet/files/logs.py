@@ -13,7 +13,7 @@ their own:
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
                                             sweep_m_s, approach_m_s, gap_m f8
       step_motion_count (s,) i8, motion_<field> (r, …)   only where a sensor is on a jointed body
-          how its links move, the fields of `records.touching.link_motions.MOTION`
+          how its links move, the fields of `records.touching.link_motions.LINK_MOTION`
       body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
       material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`

@@ -235,7 +235,7 @@ class Step:
         World frame; a body that falls for one step gains that speed, which is no impact (see synth.strikes).
     body : Array, shape (b,)
         Ascending indices of these bodies into the log's `bodies`, by default the first b; a removed body never returns.
-    motions : Array of MOTION, shape (r,)
+    motions : Array of LINK_MOTION, shape (r,)
         How links of jointed bodies move from this step on, where it is known anew; see `records.touching.link_motions`.
     """
 
@@ -299,7 +299,7 @@ class Step:
         return made
 
     def with_motions(self, motions: Array) -> Step:
-        """Return the step with rows of MOTION checked before."""
+        """Return the step with rows of LINK_MOTION checked before."""
         made = Step.trusted(*(getattr(self, name) for name in STEP_FIELDS[:-1]))
         object.__setattr__(made, "motions", motions)
         return made

@@ -24,7 +24,7 @@ from sonic_bullet.records.errors import (
     SceneError,
     SonicBulletError,
 )
-from sonic_bullet.records.touching.link_motions import MOTION
+from sonic_bullet.records.touching.link_motions import LINK_MOTION
 from tests.made import heads
 from tests.made.models import STEEL
 from tests.made.worlds import box, plate_model
@@ -63,7 +63,7 @@ STEP = {
     "contacts": sb.Contacts.none(),
     "gravity_m_s2": [0, 0, -9.8],
     "body": [0, 1],
-    "motions": np.zeros(1, MOTION),
+    "motions": np.zeros(1, LINK_MOTION),
 }
 MATERIAL = {
     "name": "m",
@@ -524,7 +524,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "contacts": [*RECORD, None],
         "gravity_m_s2": [*ARRAY, 5],
         "body": [*[value for value in ARRAY if value is not None], 5, [1, 0], [-1, 0], [0, 0], [0.5, 1]],
-        "motions": [*ARRAY, 5, np.full(1, 7, MOTION), np.full(1, -1, MOTION)],
+        "motions": [*ARRAY, 5, np.full(1, 7, LINK_MOTION), np.full(1, -1, LINK_MOTION)],
     },
     "Vibrometer": ON_SURFACE,
     "ContactMicrophone": ON_SURFACE | {"response": ["x", 5, [1], {}, object()], "noise_m_s2_rthz": [*NUMBER, -1]},

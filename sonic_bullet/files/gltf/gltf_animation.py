@@ -11,6 +11,8 @@ import numpy as np
 from sonic_bullet.files.gltf.gltf_tree import GltfTree
 from sonic_bullet.records import Array
 
+STRETCH = 1e-3
+"""Relative change of a scale, or obliqueness of the axes of a transform, that is still rounding."""
 REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 

@@ -1,12 +1,12 @@
 """Steps of a contact log as columns, in memory and on disk, for logs of hours.
 
-Step -> StepLog -> STEP row + POSE rows + CONTACT rows + MOTION rows (spools) -> LogSteps -> Step, on request
+Step -> StepLog -> STEP row + POSE rows + CONTACT rows + LINK_MOTION rows (spools) -> LogSteps -> Step, on request
 npz  -> the same four tables, read from the file (step_entries) -> LogSteps -> Step
 
 STEP       length, gravity, and the end of its rows among all poses, contacts and motions
 POSE       index of the body into the log's `bodies`, moved by hand or not, position, quaternion
 CONTACT    records.contacts
-MOTION     records.touching.link_motions
+LINK_MOTION     records.touching.link_motions
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sonic_bullet.files.rows.spool import Spool
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
-from sonic_bullet.records.touching.link_motions import MOTION
+from sonic_bullet.records.touching.link_motions import LINK_MOTION
 
 KINDS = ("pose", "contact", "motion")
 """Tables whose rows belong to steps."""
@@ -51,7 +51,7 @@ class StepBlock(NamedTuple):
 
     Parameters
     ----------
-    step, pose, contact, motion : Array of STEP, POSE, CONTACT, MOTION
+    step, pose, contact, motion : Array of STEP, POSE, CONTACT, LINK_MOTION
         The ends in step count from this block's first rows.
     """
 
@@ -99,7 +99,7 @@ class LogSteps(Sequence[Step]):
     Parameters
     ----------
     step, pose, contact, motion
-        Tables of STEP, POSE, CONTACT, MOTION; they may grow beyond ``stop``.
+        Tables of STEP, POSE, CONTACT, LINK_MOTION; they may grow beyond ``stop``.
     known
         More than the largest index of a body in the tables.
     """
@@ -208,7 +208,7 @@ class StepLog:
 
     def __init__(self, instead: str = "") -> None:
         self._tables = tuple(
-            Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT, MOTION)
+            Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT, LINK_MOTION)
         )
         self._fresh: list[Step] = []
         self._known = 0
@@ -248,6 +248,6 @@ class StepLog:
         self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
         steps.append(step)
         contacts, motions = joined([one.contacts.row for one in fresh], CONTACT), [one.motions for one in fresh]
-        for table, rows in zip(tables, (pose, contacts, joined(motions, MOTION)), strict=True):
+        for table, rows in zip(tables, (pose, contacts, joined(motions, LINK_MOTION)), strict=True):
             table.append(rows)
         self._fresh = []  # last: an interrupt loses nothing

@@ -19,7 +19,7 @@ from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS
 from sonic_bullet.records.errors import LogError
-from sonic_bullet.records.touching.link_motions import MOTION, MOTION_FIELDS, check_motions
+from sonic_bullet.records.touching.link_motions import LINK_MOTION, MOTION_FIELDS, check_motions
 
 POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "position_m": (float, (3,)),
@@ -124,7 +124,7 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
         )
     )  # fmt: skip
     step.flags.writeable = False
-    tables = Fields(POSE, p, poses), Fields(CONTACT, k, contacts), Fields(MOTION, m, motions)
+    tables = Fields(POSE, p, poses), Fields(CONTACT, k, contacts), Fields(LINK_MOTION, m, motions)
     steps = LogSteps(step, *tables, 0, len(dt), bodies, [0, ()])
     for block in steps.blocks():
         _check(block, bodies, path)

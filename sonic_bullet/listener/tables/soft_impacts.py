@@ -29,7 +29,7 @@ REST, TAIL = 0.05, 0.03
 LONGEST_S = 0.1
 """Longest impact: what brakes a body for longer is a cushion, which is silent."""
 
-IMPACT = np.dtype(
+SOFT_IMPACT = np.dtype(
     [
         ("key", "i8"),  # lower body << 32 | higher body
         ("approach_m_s", "f8"),  # largest closing speed so far
@@ -42,7 +42,7 @@ IMPACT = np.dtype(
     ],
     align=True,
 )
-HELD = np.dtype(
+HELD_POINT = np.dtype(
     [
         ("key", "i8"),
         ("row", CONTACT),  # sums so far: impulse; points and normal weighted by load; slip, sweep of the first
@@ -77,8 +77,8 @@ class SoftImpacts:
     """Impacts under way in one world."""
 
     def __init__(self) -> None:
-        self._impact: Array = np.zeros(0, IMPACT)
-        self._held: Array = np.zeros(0, HELD)
+        self._impact: Array = np.zeros(0, SOFT_IMPACT)
+        self._held: Array = np.zeros(0, HELD_POINT)
         self._before: Array = np.zeros(0, LOAD)
 
     def collect(self, row: Array, dt_s: float, gravity_m_s2: tuple[float, ...], mass_kg: Array) -> Array:
@@ -97,8 +97,8 @@ class SoftImpacts:
         if not k and not len(self._impact):
             self._before = self._before[:0]
             return row
-        impact = np.concatenate([self._impact, np.zeros(k, IMPACT)])
-        held = np.concatenate([self._held, np.zeros(k, HELD)])
+        impact = np.concatenate([self._impact, np.zeros(k, SOFT_IMPACT)])
+        held = np.concatenate([self._held, np.zeros(k, HELD_POINT)])
         out, now = np.zeros(k + len(held), CONTACT), np.zeros(k, LOAD)
         counts = np.array([len(self._impact), len(self._held), 0, 0])
         g = float(np.linalg.norm(gravity_m_s2))

@@ -1,6 +1,6 @@
 """Rigid motions of the links of a jointed body, as a log holds them: mass-normalised, a row for each link and motion.
 
-    joints and poses of a robot -> rigid_modes (listener) -> rows of MOTION in a Step -> velocity of a link's surface
+    joints and poses of a robot -> rigid_modes (listener) -> rows of LINK_MOTION in a Step -> speed of a link's surface
 
 A pulse of impulse j at r on link l moves link s by Σ_d Ψ_s,d (Ψ_l,d · (j, r × j)): the articulated body's J M⁻¹ Jᵀ.
 """
@@ -13,7 +13,7 @@ from sonic_bullet.records.arrays import LARGEST, Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import LogError
 
-MOTION = np.dtype([("body", "i4"), ("mode", "i4"), ("rate_rad_s", "f8"), ("shape", "f8", (6,))], align=True)
+LINK_MOTION = np.dtype([("body", "i4"), ("mode", "i4"), ("rate_rad_s", "f8"), ("shape", "f8", (6,))], align=True)
 """body: index in the log. mode: number of the motion, which links of one body share. rate_rad_s: of a motion that joint
 stiffness holds, 0 of a free one. shape: translation of the centre of mass in 1/√kg, rotation in 1/(√kg·m), body
 frame."""
@@ -24,16 +24,16 @@ MOTION_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "shape": (float, (6,)),
 }
 """The same fields one by one, as files hold them."""
-NO_MOTIONS = np.zeros(0, MOTION)
+NO_MOTIONS = np.zeros(0, LINK_MOTION)
 NO_MOTIONS.setflags(write=False)
 
 
 def as_motions(rows: object, body: Array) -> Array:
-    """Return rows (r,) of MOTION of the bodies (b,) of a step, read-only. Raises LogError."""
+    """Return rows (r,) of LINK_MOTION of the bodies (b,) of a step, read-only. Raises LogError."""
     if rows is NO_MOTIONS:
         return NO_MOTIONS
-    if not isinstance(rows, np.ndarray) or rows.dtype != MOTION or rows.ndim != 1:
-        raise LogError(f"step: motions is {shown(rows)}", "give rows (r,) of MOTION")
+    if not isinstance(rows, np.ndarray) or rows.dtype != LINK_MOTION or rows.ndim != 1:
+        raise LogError(f"step: motions is {shown(rows)}", "give rows (r,) of LINK_MOTION")
     check_motions(rows, "step")
     if not np.isin(rows["body"], body).all():
         raise LogError("step: motions name a body that the step does not know", "use an unbroken contact log")
@@ -44,7 +44,7 @@ def as_motions(rows: object, body: Array) -> Array:
 
 
 def check_motions(rows: Array, where: object) -> None:
-    """Raise LogError where a number of MOTION rows is not finite or below what it may be."""
+    """Raise LogError where a number of LINK_MOTION rows is not finite or below what it may be."""
     numbers = np.column_stack([rows["rate_rad_s"], rows["shape"]])
     finite = numbers.max(initial=0) <= LARGEST and numbers.min(initial=0) >= -LARGEST  # False for NaN too
     if not finite or (rows["rate_rad_s"] < 0).any() or (rows["mode"] < 0).any():

@@ -21,7 +21,7 @@ from sonic_bullet.records import Array, Body, Sensor, Vibrometer
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.synth.bank import ModeSet
 
-RIGID = 6
+RIGID_MOTIONS = 6
 LOWEST_HZ = 8.0
 """Below hearing, and below what the steady forces of a simulation are made of: a step of 1/240 s, a motor, a fall."""
 
@@ -33,14 +33,14 @@ def surface_sensors(sensors: Sequence[Sensor]) -> tuple[Vibrometer, ...]:
 
 def rigid_rows(sensors: Sequence[Sensor]) -> int:
     """Return the number of weight sets that read V: six, or none where no sensor is on a surface."""
-    return RIGID if surface_sensors(sensors) else 0
+    return RIGID_MOTIONS if surface_sensors(sensors) else 0
 
 
 def rigid_columns(body: Body, sensors: Sequence[Sensor]) -> int:
     """Return how many rigid motions of a body are played: six where a sensor is on it, or on a link joined to it."""
     felt = any(one.body_id == body.body_id for one in surface_sensors(sensors))
     clamped = body.options is not None and len(body.options.fixed) > 0
-    return RIGID if felt and body.mass_kg > 0 and not clamped else 0
+    return RIGID_MOTIONS if felt and body.mass_kg > 0 and not clamped else 0
 
 
 def rigid_shape(vertex_m: Array) -> Array:
@@ -54,11 +54,12 @@ def with_rigid(modes: ModeSet, columns: int, gain: float) -> ModeSet:
     """Append a body's six rigid motions to its modes; gain: of its sound at sensors."""
     if not columns:
         return modes
-    sets, rate = len(modes.weight), np.full(RIGID, np.sqrt(2) * np.pi * LOWEST_HZ)
-    weight = np.zeros((sets, RIGID), complex)
-    weight[sets - RIGID :] = gain * np.eye(RIGID)
+    sets, rate = len(modes.weight), np.full(RIGID_MOTIONS, np.sqrt(2) * np.pi * LOWEST_HZ)
+    weight = np.zeros((sets, RIGID_MOTIONS), complex)
+    weight[sets - RIGID_MOTIONS :] = gain * np.eye(RIGID_MOTIONS)
     bend, growth = (
-        None if law is None else np.concatenate([law, np.zeros(RIGID)]) for law in (modes.bend, modes.damping_growth)
+        None if law is None else np.concatenate([law, np.zeros(RIGID_MOTIONS)])
+        for law in (modes.bend, modes.damping_growth)
     )
     return replace(
         modes,
@@ -72,7 +73,7 @@ def with_rigid(modes: ModeSet, columns: int, gain: float) -> ModeSet:
 
 def free_motion(body: Body) -> Array:
     """Return Ψ (6, 6) of a body that nothing is joined to: ΨᵀΨ = 1/m and I⁻¹."""
-    motion = np.zeros((RIGID, RIGID))
+    motion = np.zeros((RIGID_MOTIONS, RIGID_MOTIONS))
     if body.mass_kg <= 0:
         return motion
     motion[:3, :3] = np.eye(3) / np.sqrt(body.mass_kg)
@@ -100,7 +101,7 @@ def sensor_gains(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence[A
 
     jointed: Ψ (d, 6) of bodies whose links are known to be joined, None of the others.
     """
-    gains = np.zeros((len(bodies), RIGID))
+    gains = np.zeros((len(bodies), RIGID_MOTIONS))
     reads = np.concatenate([sensor.direction, np.cross(sensor.point_m, sensor.direction)])
     for own, body in enumerate(bodies):
         if (body.body_id, body.link) != (sensor.body_id, sensor.link):

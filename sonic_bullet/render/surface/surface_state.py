@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.records import Array, Body, ContactMicrophone, Sensor, Vibrometer, channels_of
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.render.surface.rigid_motion import RIGID, sensor_gains, surface_sensors
+from sonic_bullet.render.surface.rigid_motion import RIGID_MOTIONS, sensor_gains, surface_sensors
 from sonic_bullet.render.surface.sensor_chain import filter_rows, sensor_noise, sensor_taps
 
 
@@ -29,8 +29,9 @@ def start_surface(sensors: tuple[Sensor, ...], sr: int, seed: int, *, apart: boo
 class SurfaceState:
     """State of sensors on surfaces.
 
-    waiting: motions of steps taken in and not rendered, each (r,) of MOTION. jointed: Ψ (d, 6) by a body's index in the
-    log. past: of each filtered channel (groups, taps - 1), what came last; a group a body where they are `apart`.
+    waiting: motions of steps taken in and not rendered, each (r,) of LINK_MOTION. jointed: Ψ (d, 6) by a body's index
+    in the log. past: of each filtered channel (groups, taps - 1), what came last; a group a body where they are
+    `apart`.
     """
 
     sensors: tuple[Sensor, ...]
@@ -61,7 +62,7 @@ class SurfaceState:
         number (b,): of the bodies in the log; table: STEP rows of the steps taken in.
         """
         total, width = out.shape[1], len(self.sensors)
-        by_body = out.reshape(len(bodies), width + RIGID, total)
+        by_body = out.reshape(len(bodies), width + RIGID_MOTIONS, total)
         made, moved = by_body[:, :width].copy(), by_body[:, width:]
         self.waiting = (*self.waiting, *(one.motions for one in steps))
         gains, at = None, 0
@@ -75,7 +76,7 @@ class SurfaceState:
                 gains = self._gains(number, bodies)
             stop = at + int(row["count"])
             for s, gain in gains:
-                for i in range(RIGID):
+                for i in range(RIGID_MOTIONS):
                     made[:, s, at:stop] += gain[:, i, None] * moved[:, i, at:stop]
             at = stop
         return made.reshape(len(bodies) * width, total)

@@ -9,15 +9,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sonic_bullet.files.gltf.gltf_animation import Sampler, local_transforms, read_channels
+from sonic_bullet.files.gltf.gltf_animation import STRETCH, Sampler, local_transforms, read_channels
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import BodyPath, RigidBody
 from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
 from sonic_bullet.session.gltf_in.physics import PHYSICS, body_frame
 
 KEYS_MOST = 1_000_000
-STRETCH = 1e-3
-"""Relative change of a scale that is still rounding."""
 
 
 def paths_of(

@@ -21,11 +21,10 @@ from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.mounting import Mounting, as_mounting, loss_factor
 from sonic_bullet.records.roughness import LONGEST_M, WAVE_M
 from sonic_bullet.residual.code import ResidualForm, residual_of
+from sonic_bullet.session.gltf_in.finishes import CORRELATION_M
 
 EXTRAS = "sonic_bullet"
 FREE: Mounting = "free"
-CORRELATION_M = 5e-5
-"""The draft's own ℓ, of a machined finish."""
 Row = tuple[float, float, float, float, float, float]
 
 

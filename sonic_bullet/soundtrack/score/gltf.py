@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.gltf.gltf_animation import Sampler, local_transforms, read_channels
+from sonic_bullet.files.gltf.gltf_animation import STRETCH, Sampler, local_transforms, read_channels
 from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.reading import reading
@@ -33,8 +33,6 @@ BYTES_MAX = 1 << 30
 POSES_MAX = 2_000_000
 """Of all nodes: half a gigabyte while they are read."""
 _REMEDY = "export it again as glTF 2.0 (.glb)"
-STRETCH = 1e-3
-"""Relative change of a scale, or obliqueness of the axes of a transform, that is still rounding."""
 
 
 def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:

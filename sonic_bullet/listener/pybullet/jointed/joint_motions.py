@@ -1,4 +1,4 @@
-"""How links of jointed PyBullet bodies move, as rows of MOTION: poses, masses and joint axes -> rigid_modes -> rows.
+"""How links of jointed PyBullet bodies move, as rows of LINK_MOTION: poses, masses, axes -> rigid_modes -> rows.
 
 Read after the step, of bodies that a sensor is on, once something touches them: joints turn by less than a part in a
 hundred in a step. The joint's axis is given in the child's principal frame; spherical and planar joints move along no
@@ -14,7 +14,7 @@ import pybullet
 
 from sonic_bullet.listener.rigid_modes import JointedBody, rigid_modes
 from sonic_bullet.records import Array, Body
-from sonic_bullet.records.touching.link_motions import MOTION
+from sonic_bullet.records.touching.link_motions import LINK_MOTION
 
 
 def jointed_body(client_id: int, body: int) -> JointedBody:
@@ -49,10 +49,10 @@ def jointed_body(client_id: int, body: int) -> JointedBody:
 
 
 def link_motions(client_id: int, body: int, recorded: Mapping[int, int]) -> Array:
-    """Return rows (r,) of MOTION of a body's recorded links: indices in the log by link, ascending in both."""
+    """Return rows (r,) of LINK_MOTION of a body's recorded links: indices in the log by link, ascending in both."""
     shape, rate = rigid_modes(jointed_body(client_id, body))
     links = [link for link in recorded if link + 1 < shape.shape[1]]
-    rows = np.zeros((len(links), len(rate)), MOTION)
+    rows = np.zeros((len(links), len(rate)), LINK_MOTION)
     rows["body"] = np.array([recorded[link] for link in links], np.int32).reshape(-1, 1)
     rows["mode"], rows["rate_rad_s"] = np.arange(len(rate)), rate
     rows["shape"] = shape[:, [link + 1 for link in links]].transpose(1, 0, 2)
@@ -60,7 +60,7 @@ def link_motions(client_id: int, body: int, recorded: Mapping[int, int]) -> Arra
 
 
 def touched_motions(client_id: int, felt: Collection[int], living: Mapping[int, Body], touched: Array) -> Array | None:
-    """Return rows of MOTION of jointed bodies of the ids ``felt`` that something touches; None where nothing does.
+    """Return rows of LINK_MOTION of jointed bodies of the ids ``felt`` that something touches; None where nothing does.
 
     living: records by index; touched: indices of bodies with contacts.
     """
