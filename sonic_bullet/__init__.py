@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sonic_bullet.comparing.compared_sides import compare
     from sonic_bullet.files import read_audio, read_log, write_audio
     from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.files.responses.room_responses import read_room_response
     from sonic_bullet.files.responses.sensor_responses import read_response
     from sonic_bullet.files.sofa.heads import read_head
     from sonic_bullet.listener import keep_restitution
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         MicrophonePath,
         ModalModel,
         ModalSum,
+        RoomResponse,
         SensorResponse,
         Shape,
         ShoeboxRoom,
@@ -60,6 +62,7 @@ _HOME = {
     "MicrophonePath": "records",
     "ModalModel": "records",
     "ModalSum": "records",
+    "RoomResponse": "records",
     "SensorResponse": "records",
     "ShoeboxRoom": "records",
     "Shape": "records",
@@ -76,6 +79,7 @@ _HOME = {
     "read_head": "files.sofa.heads",
     "read_log": "files",
     "read_response": "files.responses.sensor_responses",
+    "read_room_response": "files.responses.room_responses",
     "render_log": "render",
     "write_audio": "files",
 }
@@ -95,6 +99,7 @@ __all__ = [
     "MicrophonePath",
     "ModalModel",
     "ModalSum",
+    "RoomResponse",
     "SensorResponse",
     "Shape",
     "ShoeboxRoom",
@@ -111,6 +116,7 @@ __all__ = [
     "read_head",
     "read_log",
     "read_response",
+    "read_room_response",
     "render_log",
     "write_audio",
 ]

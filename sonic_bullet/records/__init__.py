@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         ShapeKind,
         isotropic_stiffness_pa,
     )
-    from sonic_bullet.records.receivers import Head, MicrophonePath, ShoeboxRoom
+    from sonic_bullet.records.receivers import Head, MicrophonePath, RoomResponse, ShoeboxRoom
     from sonic_bullet.records.residual import Residual
     from sonic_bullet.records.sensors import (
         Air,
@@ -54,6 +54,7 @@ __all__ = [
     "ModalModel",
     "ModalSum",
     "Residual",
+    "RoomResponse",
     "Sensor",
     "SensorResponse",
     "Shape",
@@ -82,6 +83,7 @@ _HOME = {
     "ModalSum": "sensors",
     "ORTHOTROPIC": "bodies",
     "Residual": "residual",
+    "RoomResponse": "receivers",
     "ShoeboxRoom": "receivers",
     "Sensor": "sensors",
     "SensorResponse": "touching.sensor_response",

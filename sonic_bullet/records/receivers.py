@@ -13,6 +13,8 @@ LEAST_ROOM_M, MOST_ROOM_M = 0.1, 200.0
 """A box for shoes, and the nave of a cathedral."""
 MOST_OCTAVES = 8
 """125 Hz to 16 kHz."""
+LONGEST_RESPONSE_S = 30.0
+"""A mausoleum's."""
 AHEAD_XYZW = np.array([0.0, 0.0, 0.0, 1.0])
 """Turned nowhere: x is ahead, y left, z up, in the world as in ambiX and in SOFA files."""
 
@@ -113,6 +115,31 @@ class ShoeboxRoom:
         store(self, size_m=size, absorption=alpha)
         if self.corner_m is not None:
             store(self, corner_m=frozen_array(self.corner_m, float, (3,), "room: corner_m"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomResponse:
+    """Measured impulse response of a room, from a source to a microphone in it.
+
+    response (c, n) at sr Hz, of any scale: what follows its direct sound is heard over that. c is 1, for all channels
+    of a render, or one a channel.
+    """
+
+    response: Array
+    sr: int
+    name: str = "response"
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        name = as_text(self.name, "room response: name", "give a text")
+        sr = as_whole(self.sr, "room response: sr", "give the rate in Hz", least=1000, most=1_000_000)
+        response = frozen_array(self.response, float, (None, None), "room response: response")
+        require(response.shape[0] > 0, "room response: response has no channel", "give at least one channel")
+        silent = not response.shape[1] or not np.abs(response).max(axis=1).all()
+        require(not silent, "room response: response is silent", "give the room's impulse response")
+        short = response.shape[1] <= LONGEST_RESPONSE_S * sr
+        require(short, f"room response: response lasts over {LONGEST_RESPONSE_S:g} s", "give an impulse response alone")
+        store(self, response=response, sr=sr, name=name)
 
 
 def _numbers(value: object) -> object:

@@ -19,14 +19,15 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.radiation.radiated import radiation_of
-from sonic_bullet.records import Air, Array, Microphone, ShoeboxRoom, channels_of
+from sonic_bullet.records import Air, Array, Microphone, RoomResponse, ShoeboxRoom, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import LogError, SonicBulletError
 from sonic_bullet.render.ringing_on import TAIL_DB, as_tail_db
+from sonic_bullet.render.room import room_of
 from sonic_bullet.render.room.room_convolution import add_room, keep_with_room
-from sonic_bullet.render.room.room_plan import RoomPlan, plan_room
+from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.silence import body_notes, render_notes, silence_notes, why_silent
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 
@@ -56,7 +57,7 @@ def render_log(
     *,
     sr: int | None = None,
     residual: bool | None = None,
-    room: ShoeboxRoom | None = None,
+    room: ShoeboxRoom | RoomResponse | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Array:
@@ -70,7 +71,7 @@ def render_log(
     residual
         Whether materials' residuals sound, None: as the log says.
     room
-        A room around it; None: free air.
+        A room around it, a box or one that was measured; None: free air.
     progress
         Called with the fraction done.
     say
@@ -83,7 +84,7 @@ def render_log(
     LogError
         ``log`` is no log.
     SceneError
-        The room is smaller than what is in it.
+        The room is smaller than what is in it, or its response has other channels.
     """
     blocks = [*render_blocks(log, sr=sr, residual=residual, room=room, progress=progress, say=say)]
     return np.ascontiguousarray(np.concatenate(blocks, axis=1))
@@ -94,7 +95,7 @@ def render_blocks(
     *,
     sr: int | None = None,
     residual: bool | None = None,
-    room: ShoeboxRoom | None = None,
+    room: ShoeboxRoom | RoomResponse | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[Array]:
@@ -105,7 +106,7 @@ def render_blocks(
     log, residual = _checked(log, sr, residual, progress, say)
     if room is None:
         return _blocks(log, _synthesizer(log, residual), progress, say)
-    plan = plan_room(as_kind(room, ShoeboxRoom, "room", "give a ShoeboxRoom, such as ShoeboxRoom([6, 4, 3])"), log)
+    plan = room_of(room, log)
     log = replace(log, sensors=plan.sensors)
     return add_room(plan, _blocks(log, _synthesizer(log, residual, plan.mixing), progress, say))
 

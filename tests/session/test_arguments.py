@@ -231,6 +231,11 @@ def reading_audio(_: Any, folder: Path) -> Made:
     return sb.read_audio, {"path": folder / "a.wav"}
 
 
+def reading_room_response(_: Any, folder: Path) -> Made:
+    sb.write_audio(folder / "a.wav", np.ones((1, 10)), 8000)
+    return sb.read_room_response, {"path": folder / "a.wav"}
+
+
 def reading_response(_: Any, folder: Path) -> Made:
     (folder / "a.csv").write_text("100,0.5\n1000,1\n")
     return sb.read_response, {"path": folder / "a.csv"}
@@ -294,6 +299,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "ModalModel": lambda *_: (sb.ModalModel, MODEL),
     "ModalSum": lambda *_: (sb.ModalSum, {"scale": 1}),
     "ShoeboxRoom": lambda *_: (sb.ShoeboxRoom, {"size_m": [6, 4, 3], "absorption": 0.2, "corner_m": None}),
+    "RoomResponse": lambda *_: (sb.RoomResponse, {"response": np.ones((1, 4)), "sr": 48_000, "name": "hall"}),
     "Shape": lambda *_: (sb.Shape, SHAPE),
     "Step": lambda *_: (sb.Step, STEP),
     "Vibrometer": lambda *_: (sb.Vibrometer, {"body_id": 0, "point_m": [0, 0, 0], "direction": [0, 0, 1], "link": -1}),
@@ -321,6 +327,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "read_baked": reading_baked,
     "read_head": lambda _, folder: (sb.read_head, {"path": written_head(folder)}),
     "read_log": reading_log,
+    "read_room_response": reading_room_response,
     "render_log": lambda *_: (
         sb.render_log,
         {"log": sb.ContactLog(**LOG), "sr": None, "residual": True, "room": None, "progress": None, "say": None},
@@ -558,6 +565,12 @@ BAD: dict[str, dict[str, list[Any]]] = {
     "read_baked": {"path": PATH},
     "read_head": {"path": PATH},
     "read_log": {"path": PATH},
+    "read_room_response": {"path": PATH},
+    "RoomResponse": {
+        "response": [*ARRAY, np.zeros((1, 4)), np.ones((1, 0)), np.full((1, 4), math.nan), np.ones(4)],
+        "sr": [*NUMBER, 0],
+        "name": TEXT,
+    },
     "ShoeboxRoom": {
         "size_m": [*ARRAY, [6, 4], [6, 4, 0]],
         "absorption": [*ARRAY, 0, 1.1, [0.1] * 9],

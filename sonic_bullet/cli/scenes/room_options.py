@@ -1,6 +1,6 @@
-"""The room that a render is heard in: a box whose walls send sound back.
+"""The room that a render is heard in: a box whose walls send sound back, or one that was measured.
 
-options -> RoomWish, checked -> ShoeboxRoom of `Wish` -> plan_room -> render (render/room)
+options, checked -> ShoeboxRoom or RoomResponse of `Wish` -> room_of (render/room) -> render
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from sonic_bullet.cli.parameters import Numbers
 from sonic_bullet.records.errors import FileError
 
 if TYPE_CHECKING:
-    from sonic_bullet.records import ShoeboxRoom
+    from sonic_bullet.records import RoomResponse, ShoeboxRoom
 
-OPTIONS = ("room", "absorption", "room_corner")
+OPTIONS = ("room", "absorption", "room_corner", "response")
 
 
 def room_options(command: Any) -> Any:
@@ -39,6 +39,12 @@ def room_options(command: Any) -> Any:
                 type=Numbers("X,Y,Z"),
                 help="The room's corner of least x, y, z, in m. [default: the scene in its middle, on its floor]",
             ),
+            click.option(
+                "--response",
+                metavar="FILE.wav",
+                help="Hear it in the room of a measured impulse response, of one channel, or one a microphone; direct "
+                "sound stays as it is.",
+            ),
         )
     ):
         command = option(command)
@@ -46,14 +52,23 @@ def room_options(command: Any) -> Any:
 
 
 def read_room(
-    room: str | None, absorption: str | None, room_corner: tuple[float, float, float] | None
-) -> ShoeboxRoom | None:
+    room: str | None,
+    absorption: str | None,
+    room_corner: tuple[float, float, float] | None,
+    response: str | None,
+) -> ShoeboxRoom | RoomResponse | None:
     """Read the options; None: free air. Raises FileError where one cannot be, RecordError where no room is such."""
+    if room is not None and response is not None:
+        raise FileError("--room and --response say both what room it is", "give one of both")
     if room is None:
         for option, given in (("--absorption", absorption), ("--room-corner", room_corner)):
             if given is not None:
                 raise FileError(f"{option} is of a room, and none is asked for", "give --room 6x4x3 too")
-        return None
+        if response is None:
+            return None
+        from sonic_bullet.files.responses.room_responses import read_room_response
+
+        return read_room_response(response)
     from sonic_bullet.records import ShoeboxRoom
 
     size = _numbers("--room", room, "x", "give metres along x, y and z, such as 6x4x3")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.files.rows.spool import KeptSound
     from sonic_bullet.listener.pictures import Standing
-    from sonic_bullet.records import ShoeboxRoom
+    from sonic_bullet.records import RoomResponse, ShoeboxRoom
     from sonic_bullet.render.room.room_plan import RoomPlan
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
@@ -83,7 +83,7 @@ class Wish:
     say: Callable[[str], None]
     at_end: Callable[[Listener], object] | None = None
     tail_db: float | None = None
-    room: ShoeboxRoom | None = None
+    room: ShoeboxRoom | RoomResponse | None = None
     feels_all: bool = False
 
 
@@ -184,11 +184,11 @@ def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
 def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
     """Render a log as it is."""
     from sonic_bullet.render import render_kept, render_notes
-    from sonic_bullet.render.room.room_plan import plan_room
+    from sonic_bullet.render.room import room_of
 
     rate, plan = wish.rate or log.sr, None
     if wish.room is not None:
-        plan = plan_room(wish.room, replace(log, sr=rate))
+        plan = room_of(wish.room, replace(log, sr=rate))
         said = (*said, plan.note)
     try:
         sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, plan=plan, progress=wish.progress, say=wish.say)

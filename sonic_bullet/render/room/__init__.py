@@ -8,5 +8,34 @@
         -> render (Setup.mixing) -> rows: own and flat early sound, early sound by reflections, far sound
         -> room_convolution: rows through their filters -> the log's own channels
 
+    RoomResponse + log -> measured_room: what follows the direct sound, over it -> RoomPlan without further microphones
+
 No level is chosen: images have 1/r and what walls keep, the late field the energy of the images that it stands for.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sonic_bullet.records import RoomResponse, ShoeboxRoom
+from sonic_bullet.records.coerce import as_kind
+
+if TYPE_CHECKING:
+    from sonic_bullet.files.contact_log import ContactLog
+    from sonic_bullet.render.room.room_plan import RoomPlan
+
+
+def room_of(room: object, log: ContactLog) -> RoomPlan:
+    """Plan a room of either kind for a log.
+
+    Raises RecordError where it is none, SceneError where it does not go with the log, AudioError where pyroomacoustics
+    is missing.
+    """
+    if isinstance(room, RoomResponse):
+        from sonic_bullet.render.room.measured_room import plan_response
+
+        return plan_response(room, log)
+    from sonic_bullet.render.room.room_plan import plan_room
+
+    remedy = "give a ShoeboxRoom, such as ShoeboxRoom([6, 4, 3]), or a RoomResponse"
+    return plan_room(as_kind(room, ShoeboxRoom, "room", remedy), log)
