@@ -121,7 +121,7 @@ class ShoeboxRoom:
 class RoomResponse:
     """Measured impulse response of a room, from a source to a microphone in it.
 
-    response (c, n) at sr Hz, of any scale: what follows its direct sound is heard over that. c is 1, for all channels
+    response (c, n) at sr Hz, of any scale: what follows its direct sound is added, over that. c is 1, for all channels
     of a render, or one a channel.
     """
 

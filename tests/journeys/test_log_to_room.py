@@ -26,7 +26,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.chdir(folder)
         assert run("render", "scene.py", "-o", "dry.wav", "--contacts", "log.npz", *FLAT) == 0
         assert run("render", "log.npz", "-o", "wet.wav", *ROOM, *FLAT) == 0
-    soundfile.write(folder / "hall.wav", hall(0.4, 44_100), 44_100, "FLOAT")
+    soundfile.write(folder / "church.wav", hall(0.4, 44_100), 44_100, "FLOAT")
     for name, samples in (("nan", [1.0, np.nan]), ("mute", [0.0, 0.0]), ("two", np.ones((9, 2)))):
         soundfile.write(folder / f"{name}.wav", np.array(samples), 48_000, "FLOAT")
     return folder
@@ -54,16 +54,18 @@ def test_a_room_adds_to_the_dry_sound_and_says_what_it_is(capfd: pytest.CaptureF
 
 def test_a_measured_room_follows_the_direct_sound(capfd: pytest.CaptureFixture[str]) -> None:
     """Up to 2.4 ms after the first sound it is the dry one; T60 and the other rate are said; it rings on."""
-    assert run("render", "log.npz", "-o", "hall.wav.wav", "--response", "hall.wav", "--pascals", "--tail", "-60") == 0
-    assert "hall.wav: T60 0.40 s, resampled from 44100 Hz to 48000 Hz" in capfd.readouterr().err
-    dry, wet = (soundfile.read(name)[0] for name in ("dry.wav", "hall.wav.wav"))
+    assert (
+        run("render", "log.npz", "-o", "church-wet.wav", "--response", "church.wav", "--pascals", "--tail", "-60") == 0
+    )
+    assert "church.wav: T60 0.40 s, resampled from 44100 Hz to 48000 Hz" in capfd.readouterr().err
+    dry, wet = (soundfile.read(name)[0] for name in ("dry.wav", "church-wet.wav"))
     echo = int(np.flatnonzero(dry)[0]) + round(0.0024 * 48_000)
     more = np.abs(wet[: len(dry)] - dry)
     assert more[:echo].max() < 1e-6 * np.abs(dry).max() < 1e-2 * more.max()
     assert len(wet) > len(dry) + 0.1 * 48_000
 
 
-@pytest.mark.parametrize("room", [ROOM, ("--response", "hall.wav")])
+@pytest.mark.parametrize("room", [ROOM, ("--response", "church.wav")])
 def test_stems_in_a_room_add_up(room: tuple[str, ...]) -> None:
     assert run("render", "log.npz", "-o", "mix.wav", "--stems", "stems", *room, "--tail", "-40", "--pascals") == 0
     stems = [soundfile.read(one)[0] for one in Path("stems").glob("*.wav")]
@@ -98,8 +100,8 @@ def test_a_scene_and_its_log_give_the_same_bytes(words: tuple[str, ...]) -> None
         (("--response", "nan.wav"), "nan.wav: room response: response holds NaN"),
         (("--response", "mute.wav"), "response is silent"),
         (("--response", "two.wav"), "two.wav has 2 channels, and the render 1"),
-        (("--response", "hall.wav", "--room", "6x4x3"), "give one of both"),
-        (("--response", "hall.wav", "--absorption", "0.1"), "none is asked for"),
+        (("--response", "church.wav", "--room", "6x4x3"), "give one of both"),
+        (("--response", "church.wav", "--absorption", "0.1"), "none is asked for"),
     ],
 )
 def test_what_cannot_be_is_one_line(words: tuple[str, ...], said: str, capfd: pytest.CaptureFixture[str]) -> None:

@@ -2,9 +2,10 @@
 
     out = own + h' * own,   h'(t) = w(t) h(t0 + t)/A,   A² = Σ h² from t0 - DIRECT_S to t0 + DIRECT_S
 
-t0: where the response first comes within 20 dB of its peak; A has the sign of that peak. w: 0 up to DIRECT_S after t0, a quarter of a cosine later
-1 [Zahorik, JASA 112(5), 2002: 2.5 ms part direct from reverberant sound]. The render's own direct sound stays as it is,
-distance and all; no level is chosen. A wall or a floor nearer than 0.4 m is lost, as part of the direct sound.
+t0: where the response first comes within 20 dB of its peak; A has the sign of that peak. w: 0 up to DIRECT_S after t0,
+a quarter of a cosine later 1 [Zahorik, JASA 112(5), 2002: 2.5 ms part direct from reverberant sound]. The render's own
+direct sound stays as it is, distance and all; no level is chosen. A wall or a floor nearer than 0.4 m is lost, as part
+of the direct sound.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ rows = mixing @ channels: own, with images whose walls are the same at all frequ
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +16,15 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Microphone, Sensor, ShoeboxRoom, channels_of
 from sonic_bullet.render.room.image_microphones import find_images, mirrored, own_channels
 from sonic_bullet.render.room.late_field import TETRAHEDRON, early_filters, late_filters, reverberation_time_s
-from sonic_bullet.render.room.room_fit import place_room
+from sonic_bullet.render.room.room_fit import RoomPlace, place_room
 
 IMAGES = 24
 """Images that are followed, on average over places: up to 22 ms in 72 m³, where the echoes come too close to be told
 apart at 20 V/S + 12 = 25 ms [Lindau, Kosanke, Weinzierl, J. Audio Eng. Soc. 60(11), 2012, eq. 8]. Each costs 4 % of a
 table-top."""
+ECHO_DB = 10.0
+"""How far Eyring's law has fallen when the images end, at the latest: else those of absorbing walls, which fall more
+slowly [Kuttruff 2000, eq. 5.41], are all that T60 is read from."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +58,8 @@ def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
     own = own_channels(log.sensors)
     place = place_room(room, log, [one for one, _ in own])
     channels = channels_of(log.sensors)
-    radius_m = max((3 * IMAGES * float(np.prod(room.size_m)) / (4 * np.pi)) ** (1 / 3), 2 * place.reach_m)
+    t60_s = reverberation_time_s(room, log.air)
+    radius_m = _early_radius_m(room, place, own, log.air.sound_speed_m_s * float(t60_s.max()) * ECHO_DB / 60)
     images = find_images(room, place.corner_m, place.centre_m, radius_m)
     flat = len(room.absorption) == 1
     orders = np.unique(images.order)
@@ -78,10 +83,19 @@ def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
     begin_s = radius_m / log.air.sound_speed_m_s
     late = late_filters(room, log.air, own, channels, log.sr, begin_s)
     early = np.zeros((0, 1)) if flat else early_filters(room, orders, log.sr)
-    t60_s = reverberation_time_s(room, log.air)
     t60 = ", ".join(f"{one:.2f}" for one in t60_s)
     size, corner = (" x ".join(f"{x:g}" for x in one) for one in (room.size_m, np.round(place.corner_m, 3) + 0.0))
     note = f"room of {size} m from {corner.replace(' x ', ', ')}: T60 {t60} s by Eyring"
     return RoomPlan(
         tuple(sensors), np.concatenate(parts, axis=1), channels, early, late, begin_s, float(t60_s.max()), note
     )
+
+
+def _early_radius_m(
+    room: ShoeboxRoom, place: RoomPlace, own: Sequence[tuple[Microphone, int]], fallen_m: float
+) -> float:
+    """Find how far away images are followed: `IMAGES` of them, or to fallen_m, but beyond all that sounds and hears."""
+    dense_m = (3 * IMAGES * float(np.prod(room.size_m)) / (4 * np.pi)) ** (1 / 3)
+    places = [one.position_m[None] if one.path is None else one.path.position_m for one, _ in own]
+    away_m = max((float(np.linalg.norm(at - place.centre_m, axis=1).max()) for at in places), default=0.0)
+    return max(min(dense_m, max(fallen_m, away_m + place.reach_m)), 2 * place.reach_m)
