@@ -5,6 +5,7 @@
         pascals, contacts as labels, parameters, provenance
     jobs -> processes (job_processes) -> Sample, or the reason why there is none
         -> SampleFolder: NAME.wav, then NAME.json, each renamed when whole -> manifest.jsonl, failures.jsonl
+        -> layouts of loaders (`sonic_bullet.dataset.loaders`)
 
 A sample depends on recipe, seed and number alone, so that workers, order and interruptions change no byte, and a job
 whose NAME.json is there is never done again.

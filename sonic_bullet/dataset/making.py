@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 from sonic_bullet.dataset.job_processes import Failed, run_jobs
+from sonic_bullet.dataset.loaders.layouts import check_formats, write_layout
 from sonic_bullet.dataset.recipes import Recipe
 from sonic_bullet.dataset.sample_folder import SampleFolder, open_folder
 from sonic_bullet.dataset.samples import Job, Sample, make_sample, warm_up
@@ -23,12 +24,17 @@ from sonic_bullet.session.keeping import package_versions
 
 @dataclass(frozen=True, slots=True)
 class DatasetSummary:
-    """What a run made. made: in this run; samples, objects: in the folder, by split; failures: reasons by number."""
+    """What a run made.
+
+    made: in this run; samples, objects: in the folder, by split; failures: reasons by number; layouts: folders by
+    format.
+    """
 
     made: int
     samples: Mapping[str, int]
     objects: Mapping[str, int]
     failures: Mapping[int, str] = field(default_factory=dict)
+    layouts: Mapping[str, str] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
         """Describe it, a line a thing."""
@@ -40,6 +46,7 @@ class DatasetSummary:
             f"{format_count(total, 'sample')}, {self.made} made now: {', '.join(parts) or 'none'}",
             *listed,
             *([f"{rest} more without sound, in failures.jsonl"] if rest > 0 else []),
+            *(f"{name}: {place}" for name, place in self.layouts.items()),
         ]
 
 
@@ -52,6 +59,7 @@ def make_dataset(
     sr: int = 48_000,
     workers: int = 1,
     limit_s: float = 300.0,
+    formats: Sequence[str] = (),
     say: Say = lambda text: None,
 ) -> DatasetSummary:
     """Make the samples below ``count`` that the folder has not.
@@ -62,6 +70,8 @@ def make_dataset(
         Processes at once.
     limit_s
         Wall time of a sample, after which its process is ended.
+    formats
+        Of `FORMATS`: layouts in which the folder's samples are written once more.
     say
         Called with how far it is.
 
@@ -77,6 +87,7 @@ def make_dataset(
         "sr": check_sr(sr),
         "versions": package_versions(),
     }
+    check_formats(formats)
     job = partial(_make, recipe, seed, sr)
     with open_folder(folder, made_by) as kept:
         missing = [number for number in range(count) if not kept.is_done(number)]
@@ -99,17 +110,22 @@ def make_dataset(
                 kept.write_lists(count, failures)
             raise
         kept.write_lists(count, failures)
-        return _summary(kept, count, made, failures)
+        layouts = {name: str(write_layout(name, kept, count, say)) for name in dict.fromkeys(formats)}
+        return _summary(kept, count, made, failures, layouts)
 
 
 def _make(recipe: Recipe, seed: int, sr: int, number: int) -> Sample:
     return make_sample(Job(recipe, seed, number, sr))
 
 
-def _summary(kept: SampleFolder, count: int, made: int, failures: Mapping[int, str]) -> DatasetSummary:
+def _summary(
+    kept: SampleFolder, count: int, made: int, failures: Mapping[int, str], layouts: Mapping[str, str]
+) -> DatasetSummary:
     samples, objects = Counter[str](), dict[str, set[str]]()
     one: dict[str, Any]
     for one in kept.labels(count):
         samples[one["split"]] += 1
         objects.setdefault(one["split"], set()).add(one["object"])
-    return DatasetSummary(made, dict(samples), {split: len(names) for split, names in objects.items()}, failures)
+    return DatasetSummary(
+        made, dict(samples), {split: len(names) for split, names in objects.items()}, failures, layouts
+    )

@@ -12,7 +12,7 @@ Nothing in them depends on time, order or machine: equal runs give equal bytes.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,8 @@ try:
 except ImportError:  # Windows has no such locks: two runs there share a folder unnoticed
     fcntl = None  # type: ignore[assignment]
 
+LabelledSounds = Callable[[], Iterator[tuple[dict[str, Any], Path]]]
+"""Labels and sound file of each sample, by number, from the first at each call."""
 A_FOLDER = 1000
 """Samples in one folder: file systems slow down with many more."""
 

@@ -26,9 +26,22 @@ The same command again makes what is missing. Exit 1: some samples could not be 
     "--limit", "limit_s", type=click.FloatRange(0, min_open=True), default=300.0, show_default=True, metavar="S",
     help="Wall time a sample may take.",
 )  # fmt: skip
+@click.option(
+    "--format", "formats", multiple=True, metavar="NAME",
+    help="A layout for loaders, in DIR/NAME beside the samples: audiofolder, webdataset or zarr. Repeatable.",
+)  # fmt: skip
 @json_option
 def dataset(
-    recipe: str, folder: str, count: int, seed: int, workers: int | None, sr: int, limit_s: float, json_to: str | None
+    recipe: str,
+    folder: str,
+    *,
+    count: int,
+    seed: int,
+    workers: int | None,
+    sr: int,
+    limit_s: float,
+    formats: tuple[str, ...],
+    json_to: str | None,
 ) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
     import os
@@ -45,7 +58,7 @@ def dataset(
             from sonic_bullet.dataset.recipes import read_recipe
         made = make_dataset(
             read_recipe(recipe), root, count=count, seed=seed, sr=sr, workers=workers or cores or 1, limit_s=limit_s,
-            say=tell,
+            formats=formats, say=tell,
         )  # fmt: skip
         for line in made.lines():
             say(line)

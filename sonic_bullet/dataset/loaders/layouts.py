@@ -1,0 +1,83 @@
+"""From a data set's folder to a layout for loaders: SampleFolder -> FORMATS[name] -> DIR/name, renamed when whole."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sonic_bullet.dataset.loaders.audio_folder import write_audio_folder
+from sonic_bullet.dataset.loaders.maniwav import write_replay_buffers
+from sonic_bullet.dataset.loaders.tar_shards import write_tar_shards
+from sonic_bullet.dataset.sample_folder import LabelledSounds, SampleFolder
+from sonic_bullet.files.atomic import cannot
+from sonic_bullet.machine.progress import Say
+from sonic_bullet.records.coerce import nearest
+from sonic_bullet.records.errors import FileError
+
+
+@dataclass(frozen=True, slots=True)
+class LoaderFormat:
+    """A layout. write(samples, to): library: of its writer, "": none."""
+
+    write: Callable[[LabelledSounds, Path], None]
+    library: str = ""
+
+    def check_library(self) -> None:
+        """Raise FileError where its library is not installed."""
+        if self.library:
+            try:
+                __import__(self.library)
+            except ImportError as error:
+                what = f"the format needs {self.library}: {error}"
+                raise FileError(what, f"pip install 'sonic_bullet[{self.library}]'") from None
+
+
+FORMATS: Mapping[str, LoaderFormat] = {
+    "audiofolder": LoaderFormat(write_audio_folder),
+    "webdataset": LoaderFormat(write_tar_shards, "webdataset"),
+    "zarr": LoaderFormat(write_replay_buffers, "zarr"),
+}
+
+
+def check_formats(names: Iterable[str]) -> None:
+    """Raise FileError for a format that there is not, or whose library is not installed."""
+    for name in names:
+        if name == "lerobot":
+            what = "there is no format lerobot: its writer is lerobot itself, which needs PyTorch, diffusers and OpenCV"
+            raise FileError(what, "write zarr, and convert where LeRobot is installed")
+        if name not in FORMATS:
+            raise FileError(f"there is no format {name}", nearest(name, list(FORMATS)))
+        FORMATS[name].check_library()
+
+
+def write_layout(name: str, kept: SampleFolder, count: int, say: Say) -> Path:
+    """Write the samples below ``count`` in a format, in place of older ones, and return its folder.
+
+    Raises
+    ------
+    FileError
+        It cannot be written, or the format cannot hold these samples.
+    """
+    to = kept.root / name
+    partial = to.with_name(f".{name}.partial")
+
+    def samples() -> Iterator[tuple[dict[str, Any], Path]]:
+        for labels in kept.labels(count):
+            yield labels, kept.root / labels["audio"]
+
+    say(name)
+    try:
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir()
+        FORMATS[name].write(samples, partial)
+        if to.is_dir():
+            shutil.rmtree(to)
+        partial.replace(to)
+    except OSError as error:
+        raise cannot("write", to, error) from error
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    return to
