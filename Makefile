@@ -3,7 +3,7 @@
 # make test-all  the same with those marked slow: tests that take minutes, and all cases of what `make test` samples
 # make bench     one table: what sound costs, beside what must hold (benchmarks/README.md names the other scripts)
 # make gate      BASE=main [HEAD=branch]: does a revision keep every bit of another? One line a probe
-# make docs      the pages that are made of the code: API, commands, case.json and its schema, contact log
+# make docs      the pages that are made of the code, then all of docs/ as a site in build/site, links checked
 # Python 3.11, 3.12 or 3.13 is all that is needed. PYTHON=python3.13 or a path names one.
 
 SHELL := /bin/bash
@@ -64,8 +64,11 @@ bench: .venv/dev.stamp
 gate: .venv/dev.stamp
 	@$(BIN)/python tools/gate.py $(or $(BASE),main) $(or $(HEAD),HEAD)
 
-docs: .venv/dev.stamp
+docs: .venv/docs.stamp
 	$(BIN)/python docs/make_reference.py
+	$(BIN)/python docs/make_media.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "made build/site/index.html"
 
 clean:
 	rm -rf .venv out build
@@ -79,6 +82,11 @@ clean:
 	@echo "installing into .venv with the tools (once)"
 	@$(PIP) --editable '.[dev]'
 	@touch $@ .venv/run.stamp
+
+.venv/docs.stamp: .venv/dev.stamp
+	@echo "installing what builds the site into .venv (once)"
+	@$(PIP) --editable '.[dev,docs]'
+	@touch $@
 
 # made anew where it is missing, broken, of another Python than was asked for, or was made in another folder; else kept
 SOUND := $(shell [ -x .venv/bin/python ] && .venv/bin/python -c '$(IS_SUPPORTED)' 2>/dev/null && \

@@ -64,13 +64,19 @@ def api_page() -> str:
         "",
         "Errors, units and shapes are those the docstrings name. SI units throughout; `(k, 3)` is an array's shape.",
     ]
+    for module_name, what, names in api_names():
+        parts += ["", f"## {module_name}", "", what]
+        for name, thing in names:
+            parts += ["", *entry(name, thing, 3)]
+    return "\n".join(parts) + "\n"
+
+
+def api_names() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
+    """Yield each section of the API: module, what it is for, its names and what they stand for."""
     for module_name, what, asked in API:
         module = importlib.import_module(module_name)
         names = classes_of(module) if asked == "classes" else asked
-        parts += ["", f"## {module_name}", "", what]
-        for name in names or module.__all__:
-            parts += ["", *entry(name, getattr(module, name), 3)]
-    return "\n".join(parts) + "\n"
+        yield module_name, what, [(name, getattr(module, name)) for name in names or module.__all__]
 
 
 def classes_of(module: ModuleType) -> list[str]:

@@ -1,4 +1,4 @@
-"""The house stands: imports point down, the door opens fast, everything public says what it is."""
+"""The architecture: imports point down, importing is quick, everything public says what it is."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def slack() -> float:
     return max(1.0, best_s("import numpy") / NUMPY_S)
 
 
-def test_imports_point_down_and_rooms_keep_to_themselves() -> None:
+def test_imports_point_down_and_packages_keep_to_themselves() -> None:
     tool = Path(sys.executable).with_name("lint-imports")
     done = subprocess.run(
         [tool, "--no-cache", "--config", REPO / "pyproject.toml"],
@@ -70,15 +70,15 @@ def test_imports_point_down_and_rooms_keep_to_themselves() -> None:
     assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout), done.stdout
 
 
-def test_every_module_is_on_a_floor() -> None:
+def test_every_package_is_on_a_floor() -> None:
     text = (REPO / "pyproject.toml").read_text()
     known = set(re.findall(r"sonic_bullet\.(\w+)", text))
-    rooms = {
+    packages = {
         path.stem if path.is_file() else path.name
         for path in PACKAGE.iterdir()
         if path.suffix == ".py" or (path.is_dir() and any(path.glob("*.py")))
     }
-    assert rooms - known - {"__init__", "__main__"} == set()
+    assert packages - known - {"__init__", "__main__"} == set()
 
 
 def test_importing_is_quick() -> None:

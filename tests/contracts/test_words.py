@@ -1,4 +1,4 @@
-"""The words of the house: identifiers in the field's own, one meaning a name, rooms that one sees at a glance."""
+"""Words: identifiers in the field's own, one meaning a name, packages that one sees at a glance."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_no_two_public_classes_have_one_name() -> None:
     assert {name: where for name, where in places.items() if len(where) > 1} == {}
 
 
-def test_no_file_name_stands_in_two_rooms() -> None:
+def test_no_file_name_stands_in_two_packages() -> None:
     places = defaultdict(list)
     for path in MODULES:
         if path.name != "__init__.py":
