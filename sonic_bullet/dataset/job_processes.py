@@ -37,15 +37,15 @@ class Failed:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Running:
     number: int
-    tries: int
+    nth: int
     process: Any
     until_s: float
 
 
 def run_jobs(
-    do: Callable[[int], Made], numbers: Iterable[int], workers: int, limit_s: float
+    do: Callable[[int], Made], numbers: Iterable[int], workers: int, limit_s: float, *, tries: int = TRIES
 ) -> Iterator[tuple[int, Made | Failed]]:
-    """Yield (number, do(number)) as they are done, or `Failed` after three tries of at most limit_s seconds each.
+    """Yield (number, do(number)) as they are done, or `Failed` after ``tries`` of at most limit_s seconds each.
 
     ``do`` depends on its number alone.
     """
@@ -55,14 +55,14 @@ def run_jobs(
     try:
         while True:
             while len(running) < workers:
-                number, tries = again.popleft() if again else (next(todo, -1), 1)
+                number, nth = again.popleft() if again else (next(todo, -1), 1)
                 if number < 0:
                     break
                 ours, theirs = context.Pipe(duplex=False)
                 process = context.Process(target=_work, args=(do, number, theirs, os.getpid()), daemon=True)
                 process.start()
                 theirs.close()
-                running[ours] = _Running(number, tries, process, time.monotonic() + limit_s)
+                running[ours] = _Running(number, nth, process, time.monotonic() + limit_s)
             if not running:
                 return
             pause_s = max(0.0, min(job.until_s for job in running.values()) - time.monotonic())
@@ -76,8 +76,8 @@ def run_jobs(
                 job.process.join()
                 clear_stage(job.process.pid)
                 pipe.close()
-                if isinstance(found, Failed) and job.tries < TRIES:
-                    again.append((job.number, job.tries + 1))
+                if isinstance(found, Failed) and job.nth < tries:
+                    again.append((job.number, job.nth + 1))
                 else:
                     yield job.number, found
     finally:

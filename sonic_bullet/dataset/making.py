@@ -12,6 +12,7 @@ from typing import Any
 
 from sonic_bullet.dataset.job_processes import Failed, run_jobs
 from sonic_bullet.dataset.loaders.layouts import check_formats, write_layout
+from sonic_bullet.dataset.object_splits import SHARES, object_names, splits_of
 from sonic_bullet.dataset.recipes import Recipe
 from sonic_bullet.dataset.sample_folder import SampleFolder, open_folder
 from sonic_bullet.dataset.samples import Job, Sample, make_sample, warm_up
@@ -60,6 +61,7 @@ def make_dataset(
     workers: int = 1,
     limit_s: float = 300.0,
     formats: Sequence[str] = (),
+    shares: Mapping[str, float] = SHARES,
     say: Say = lambda text: None,
 ) -> DatasetSummary:
     """Make the samples below ``count`` that the folder has not.
@@ -72,6 +74,8 @@ def make_dataset(
         Wall time of a sample, after which its process is ended.
     formats
         Of `FORMATS`: layouts in which the folder's samples are written once more.
+    shares
+        Of the objects, by split.
     say
         Called with how far it is.
 
@@ -85,23 +89,29 @@ def make_dataset(
         "recipe_sha256": recipe.sha256,
         "seed": seed,
         "sr": check_sr(sr),
+        "shares": dict(shares),
         "versions": package_versions(),
     }
     check_formats(formats)
     job = partial(_make, recipe, seed, sr)
     with open_folder(folder, made_by) as kept:
         missing = [number for number in range(count) if not kept.is_done(number)]
-        made, failures = 0, dict[int, str]()
+        made, failures, splits = 0, dict[int, str](), dict[str, str]()
         try:
             if missing:
                 say("machine code")
                 warm_up()
+                say("objects")
+                names = object_names(recipe, seed, kept, missing, count, workers, limit_s)
+                splits = splits_of(names, shares)
                 say(f"0 of {len(missing)}")
             for number, found in run_jobs(job, missing, workers, limit_s):
                 if isinstance(found, Failed):
                     failures[number] = found.reason
+                elif found.labels["object"] not in splits:
+                    failures[number] = "the recipe drew another object the second time; draw all by rng"
                 else:
-                    kept.keep(found)
+                    kept.keep(found, splits[found.labels["object"]])
                     made += 1
                 failed = f", {len(failures)} failed" if failures else ""
                 say(f"{made} of {len(missing)}{failed}")

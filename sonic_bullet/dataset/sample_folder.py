@@ -50,14 +50,14 @@ class SampleFolder:
         """Tell whether there is such a sample, whole."""
         return self.place(number, ".json").is_file()
 
-    def keep(self, sample: Sample) -> None:
+    def keep(self, sample: Sample, split: str) -> None:
         """Write a sample: sound first, labels last."""
         audio = self.place(sample.number, ".wav")
         with _written(audio):
             audio.parent.mkdir(parents=True, exist_ok=True)
         write_audio(audio, sample.sound.astype(float), sample.sr, subtype="FLOAT")
         with replacing(self.place(sample.number, ".json")) as file:
-            file.write(json_bytes({"audio": str(audio.relative_to(self.root)), **sample.labels}))
+            file.write(json_bytes({"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}))
 
     def labels(self, count: int) -> Iterator[dict[str, Any]]:
         """Yield the labels of the samples below ``count``, by number."""

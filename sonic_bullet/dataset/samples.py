@@ -5,7 +5,6 @@ Job -> generator of (seed, number) -> Recipe.draw -> world, listener, steps -> S
 
 from __future__ import annotations
 
-import hashlib
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,9 +19,6 @@ from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError, SceneWarning
 from sonic_bullet.session import attach
-
-SPLITS = {"train": 0.8, "validation": 0.1, "test": 0.1}
-"""Fractions of the objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +65,6 @@ def make_sample(job: Job) -> Sample:
     labels = {
         "number": job.number,
         "object": scene.object,
-        "split": split_of(job.seed, scene.object),
         "sr": job.sr,
         "seconds": sound.shape[1] / job.sr,
         "channels": len(sound),
@@ -83,20 +78,6 @@ def make_sample(job: Job) -> Sample:
         "versions": dict(log.versions),
     }
     return Sample(job.number, job.sr, sound.astype(np.float32), labels)
-
-
-def split_of(seed: int, name: str) -> str:
-    """Return the split of an object: by its name's hash, so that it is the same in every sample and on every machine.
-
-    Fractions are of objects, met in the mean: few objects may leave a split empty.
-    """
-    drawn = int.from_bytes(hashlib.sha256(f"{seed}:{name}".encode()).digest()[:8]) / 2**64
-    below = 0.0
-    for split, fraction in SPLITS.items():
-        below += fraction
-        if drawn < below:
-            return split
-    return split
 
 
 def warm_up() -> None:

@@ -13,9 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sonic_bullet.dataset import sample_folder
 from sonic_bullet.dataset.job_processes import TRIES, Failed, run_jobs
+from sonic_bullet.dataset.object_splits import as_shares, splits_of
 from sonic_bullet.dataset.sample_folder import open_folder
 from sonic_bullet.files import read_audio
 from sonic_bullet.files.atomic import cannot
@@ -91,6 +94,33 @@ def test_every_sample_is_sound_with_its_labels_and_none_is_made_twice(
     assert dataset("fall.py", "-o", "two", "--count", 2, "--seed", 3, "--workers", 2) == 0
     assert dataset("fall.py", "-o", "two", "--count", 4, "--seed", 3, "--workers", 2) == 0
     assert contents("two") == before
+
+
+def test_few_objects_fill_their_splits_and_more_samples_move_none(place: Path) -> None:
+    assert dataset("fall.py", "-o", "one", "--count", 2, "--shares", "2,1,1") == 0
+    before = {one["number"]: one["split"] for one in manifest("one")}
+    assert dataset("fall.py", "-o", "one", "--count", 6, "--shares", "2,1,1") == 0
+    samples = manifest("one")
+    of = {one["object"]: one["split"] for one in samples}
+    assert sorted(of.values()) == ["test", "train", "validation"]
+    assert all(one["split"] == of[one["object"]] for one in samples)
+    assert {number: samples[number]["split"] for number in before} == before
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.floats(0.01, 1), min_size=3, max_size=3), st.lists(st.integers(0, 60), max_size=200))
+def test_each_split_has_its_share_to_within_one_object(weights: list[float], drawn: list[int]) -> None:
+    shares = as_shares(",".join(map(str, weights)))
+    splits = splits_of(map(str, drawn), shares)
+    for split, share in shares.items():
+        assert abs(list(splits.values()).count(split) - share * len(splits)) < 1
+    half = splits_of(map(str, drawn[: len(drawn) // 2]), shares)
+    assert half == {name: splits[name] for name in half}
+
+
+@pytest.mark.parametrize("shares", ["8,1", "a,b,c", "1,-1,1", "0,0,0"])
+def test_what_are_no_shares_is_one_line(place: Path, shares: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert "8,1,1" in error_of(capfd, "dataset", "fall.py", "-o", "out", "--count", "2", "--shares", shares)
 
 
 @parametrize_few("kills", [1, 20])

@@ -30,6 +30,7 @@ The same command again makes what is missing. Exit 1: some samples could not be 
     "--format", "formats", multiple=True, metavar="NAME",
     help="A layout for loaders, in DIR/NAME beside the samples: audiofolder, webdataset or zarr. Repeatable.",
 )  # fmt: skip
+@click.option("--shares", metavar="A,B,C", help="Of the objects in train, validation, test. [default: 8,1,1]")
 @json_option
 def dataset(
     recipe: str,
@@ -41,6 +42,7 @@ def dataset(
     sr: int,
     limit_s: float,
     formats: tuple[str, ...],
+    shares: str | None,
     json_to: str | None,
 ) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
@@ -55,10 +57,12 @@ def dataset(
     with clean_stdout(to) as say, status(recipe) as tell:
         with quiet_stderr():
             from sonic_bullet.dataset.making import make_dataset
+            from sonic_bullet.dataset.object_splits import as_shares
             from sonic_bullet.dataset.recipes import read_recipe
         made = make_dataset(
             read_recipe(recipe), root, count=count, seed=seed, sr=sr, workers=workers or cores or 1, limit_s=limit_s,
-            formats=formats, say=tell,
+            formats=formats,
+            shares=as_shares(shares), say=tell,
         )  # fmt: skip
         for line in made.lines():
             say(line)
