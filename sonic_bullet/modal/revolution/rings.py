@@ -1,32 +1,21 @@
-"""Recognition of bodies of revolution: balls, cylinders and capsules by name, closed meshes by their rings.
+"""Recognition of bodies of revolution: balls, cylinders and capsules by name, closed meshes by their meridian.
 
-    vertices of one radius and height that go round without a wide gap -> a ring; one on the axis -> a pole
-    vertices of no ring that lie on one curve (patches.py) -> that curve
-    rings joined by faces -> sides of the section; a ring filled by faces of its own -> a flat end, a pole in its middle
-    poles in pairs along the axis -> the body's inside
-
-The section is the polygon of rings and poles, so that the body is round where the mesh is faceted. What does not fit is
-no body of revolution: a handle, a spout, a dent, a prism of few sides.
+The section is the polygon of the meridian (meridian.py), so that the body is round where the mesh is faceted. What does
+not fit is no body of revolution: a handle, a spout, a dent, a prism of few sides.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.shape_meshes import rotation
-from sonic_bullet.modal.revolution.patches import Patch, patches
+from sonic_bullet.modal.revolution.meridian import ROUND, meridian
 from sonic_bullet.records import Array, Shape
 
-ROUND = 2e-5  # of the diagonal: what a ring's vertices may differ by
-GAP = (
-    0.45  # radians: the widest gap between neighbours on a ring; with fewer than 14 the area is 3 % less than a disc's
-)
-BETWEEN = 1.02  # a detour over a third ring of less than this times the direct length replaces the direct side
 ARC = 256  # sides of a half circle: its area to 5e-5
 
 
@@ -144,126 +133,10 @@ def recognised(vertex_m: Array, face: Array) -> Revolved | None:
     for k in range(3):
         axes = np.roll(direction, 2 - k, axis=1)
         axes = axes * [1, 1, np.sign(np.linalg.det(axes))]
-        outline = _outline((vertex_m - centre) @ axes, face)
-        if outline is not None:
-            return Revolved(outline, axes, centre)
+        found = meridian((vertex_m - centre) @ axes, face)
+        if found is not None:
+            outline, turn, shift = found
+            axes = axes @ turn.T
+            outline = outline if _swept(outline).sum() > 0 else outline[::-1]
+            return Revolved(outline, axes, centre - axes @ shift)
     return None
-
-
-def _outline(point: Array, face: Array) -> Array | None:
-    """Return the polygon (p, 2), counter-clockwise, of the rings of a surface about the z axis.
-
-    None where there are no rings, or they make no closed outline.
-    """
-    same = 0.02  # relative difference of volumes
-    diagonal = float(np.linalg.norm(np.ptp(point, axis=0)))
-    ring, middle, filled = _rings(point, diagonal)
-    between = patches(point, face, ring, middle) if len(middle) else None
-    if between is None:
-        return None
-    whole = ring[face]
-    sides = _sides(whole[(whole >= 0).all(axis=1)], middle, filled, between)
-    walk = None if sides is None else _walked(sides[0])
-    if sides is None or walk is None:
-        return None
-    outline, share = sides[1][walk], sides[2][walk]
-    if float((outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1]).sum()) < 0:
-        outline, share = outline[::-1], share[::-1]
-    expected = float((_swept(outline) * (share + np.roll(share, -1)) / 2).sum())
-    return outline if abs(geometry.volume_m3(point, face) / expected - 1) < same else None
-
-
-def _rings(point: Array, diagonal: float) -> tuple[Array, Array, Array]:
-    """Find the rings of a surface about the z axis.
-
-    Returns the ring (v,) of each vertex, -1 for none; radius and height (k, 2) of each ring, radius 0 on the axis; and
-    the fraction (k,) of its disc that the ring's polygon fills.
-    """
-    bore = 1e-3  # of the diagonal: the least radius of a ring
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
-    flat = np.stack([np.hypot(point[:, 0], point[:, 1]), point[:, 2]], axis=1)
-    pair = cKDTree(flat).query_pairs(ROUND * diagonal, output_type="ndarray")
-    n = len(point)
-    _, ring = connected_components(
-        coo_array((np.ones(len(pair)), (pair[:, 0], pair[:, 1])), shape=(n, n)), directed=False
-    )
-    count = np.bincount(ring)
-    middle = np.stack([np.bincount(ring, flat[:, k]) / count for k in range(2)], axis=1)
-    pole = (count == 1) & (middle[:, 0] < ROUND * diagonal)
-    angle = np.arctan2(point[:, 1], point[:, 0])
-    order = np.lexsort((angle, ring))
-    start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    step = np.diff(angle[order], append=0)
-    last = start + count - 1
-    step[last] = angle[order][start] + 2 * np.pi - angle[order][last]
-    widest = np.zeros(len(count))
-    np.maximum.at(widest, ring[order], step)
-    filled = np.bincount(ring[order], np.sin(step)) / (2 * np.pi)
-    filled[pole] = 1.0  # no area: any fraction does
-    middle[pole, 0] = 0
-    good = pole | ((widest < GAP) & (middle[:, 0] > bore * diagonal))
-    number = np.where(good, np.cumsum(good) - 1, -1)
-    return number[ring], middle[good], filled[good]
-
-
-def _sides(
-    triple: Array, middle: Array, filled: Array, between: list[Patch]
-) -> tuple[list[list[int]], Array, Array] | None:
-    """Join the rings along the outline, from the rings triple (f, 3) of the faces; None where poles do not pair.
-
-    Returns the neighbours of each ring, and the rings with what is added to them: the points of patches between, and a
-    pole for each flat end that has none.
-    """
-    edge = np.unique(np.sort(np.concatenate([triple[:, [0, 1]], triple[:, [1, 2]], triple[:, [2, 0]]]), axis=1), axis=0)
-    edge = edge[edge[:, 0] != edge[:, 1]]
-    ends = np.unique(triple[(triple == triple[:, :1]).all(axis=1), 0])
-    wide, narrow = np.where(middle[edge[:, :1], 0] > middle[edge[:, 1:], 0], edge, edge[:, ::-1]).T
-    level = np.abs(middle[wide, 1] - middle[narrow, 1]) < 1e-3 * np.abs(middle[wide, 0] - middle[narrow, 0])
-    ends = np.setdiff1d(ends, wide[level])  # a flat ring ends at the narrower radius
-    added = np.stack([ends, len(middle) + np.arange(len(ends))], axis=1)
-    middle = np.concatenate([middle, np.stack([np.zeros(len(ends)), middle[ends, 1]], axis=1)])
-    filled = np.concatenate([filled, filled[ends]])
-    joined = []
-    for (start, end), curve in between:
-        walk = [start, *range(len(middle), len(middle) + len(curve)), *([end] if end >= 0 else [])]
-        joined += list(pairwise(walk))
-        middle = np.concatenate([middle, curve])
-        filled = np.concatenate([filled, np.full(len(curve), filled[start])])
-    pole = np.flatnonzero(middle[:, 0] == 0)
-    pole = pole[np.argsort(middle[pole, 1], kind="stable")]
-    if len(pole) % 2:
-        return None
-    edge = np.concatenate([edge, added, np.array(joined, int).reshape(-1, 2), pole.reshape(-1, 2)])
-    neighbours: list[set[int]] = [set() for _ in middle]
-    for a, b in edge.tolist():
-        neighbours[a].add(b)
-        neighbours[b].add(a)
-    # A diagonal may join a ring to the next but one: where a third lies on the way, it is no side.
-    side: list[list[int]] = [[] for _ in middle]
-    for a, b in edge.tolist():
-        direct = float(np.linalg.norm(middle[a] - middle[b]))
-        over = any(
-            np.linalg.norm(middle[a] - middle[c]) + np.linalg.norm(middle[c] - middle[b]) < BETWEEN * direct
-            for c in neighbours[a] & neighbours[b]
-        )
-        if not over:
-            side[a].append(b)
-            side[b].append(a)
-    return side, middle, filled
-
-
-def _walked(side: list[list[int]]) -> list[int] | None:
-    """Return all rings in the order in which they are joined, None where that is no single closed walk."""
-    if len(side) < 3 or any(len(s) != 2 for s in side):
-        return None
-    walk, here = [0], side[0][0]
-    while here != 0:
-        following = [s for s in side[here] if s != walk[-1]]
-        walk.append(here)
-        if len(following) != 1 or len(walk) > len(side):
-            return None
-        here = following[0]
-    return walk if len(walk) == len(side) else None
