@@ -41,12 +41,13 @@ demo: .venv/run.stamp
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
 	@echo "made out/$(NAME).wav (sound), out/$(NAME).npz (contact log), out/$(NAME).png (picture)"
 
-# types are checked beside the tests: both take minutes
+# types are checked beside the tests: both take minutes. The scene compiles what all tests share, once and not a worker
 test: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
 	@echo "checking types beside the tests"
 	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
+	$(BIN)/sonic-bullet render scenes/bar.py -o .venv/bar.wav --seconds 0.1; \
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
