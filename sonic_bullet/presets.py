@@ -8,19 +8,11 @@ far they differ between objects of that material: `range`, `range_source`, `spre
 preset was fitted from, and how certain it is; it changes no sound. `residual` is the sound beside the modes
 (docs/explanation/residual.md), played with every contact. `effects` are what a diagnosis found to belong to material or
 object (sonic_bullet.effects.presets_of_effects): they sound in every scene.
-
-Damping is Rayleigh's, d = ½(α + βλ) [Ren, Yeh, Lin 2013, eq. 6]: alpha_per_s and beta_s, or a loss factor η of the
-handbooks. η = 2d/ω independent of frequency is no Rayleigh damping; α and β are the pair that meets it at the two
-frequencies of `equal_at_hz` [Chopra, Dynamics of Structures, 4th ed. 2012, eq. 11.4.9 and 11.4.10 with ζ = η/2]:
-
-    α = η ω₁ω₂/(ω₁+ω₂),  β = η/(ω₁+ω₂)
-
-Between them the loss is smaller (at √(ω₁ω₂) by 2√(ω₁ω₂)/(ω₁+ω₂)), outside larger.
+What `damping` may say is in effects/damping_law/damping_form.py.
 """
 
 from __future__ import annotations
 
-import math
 import os
 from contextlib import nullcontext
 from functools import cache
@@ -30,6 +22,14 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from sonic_bullet.effects.damping_law.damping_form import (
+    Damping,
+    NotNegative,
+    Positive,
+    PresetPart,
+    law_of,
+    rayleigh_pair,
+)
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
@@ -51,27 +51,11 @@ DAMPING_TAKEN = "damping (from '"
 identified none.
 """
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 Fraction = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Row = tuple[float, float, float, float, float, float]
 
 
-class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """A group of a preset's numbers.
-
-    range: by field, the values that materials of that name have; spread: standard deviation of their logarithm. Neither
-    changes a sound.
-    """
-
-    source: Annotated[str, msgspec.Meta(min_length=1)]
-    note: str = ""
-    range: dict[str, tuple[float, float]] = {}
-    range_source: str = ""
-    spread: dict[str, NotNegative] = {}
-
-
-class Elasticity(_Part, frozen=True):
+class Elasticity(PresetPart, frozen=True):
     """Isotropic (youngs_pa, poisson) or any (stiffness_pa, Voigt order xx yy zz yz xz xy, body axes)."""
 
     youngs_pa: Positive | None = None
@@ -79,28 +63,14 @@ class Elasticity(_Part, frozen=True):
     stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
 
 
-class Damping(_Part, frozen=True):
-    """Rayleigh's alpha_per_s and beta_s, or a loss_factor and the two frequencies at which it is met.
-
-    includes_radiation: these numbers, and laws among the effects, are total damping as recorded, and the run time adds
-    no radiation. Absent: false, but for presets that an older `fit` made of recordings.
-    """
-
-    alpha_per_s: NotNegative | None = None
-    beta_s: NotNegative | None = None
-    loss_factor: NotNegative | None = None
-    equal_at_hz: tuple[Positive, Positive] | None = None
-    includes_radiation: bool | None = None
-
-
-class Surface(_Part, frozen=True):
+class Surface(PresetPart, frozen=True):
     """Roughness: roughness_m, the rms height of the profile; hurst, the exponent of its spectrum."""
 
     roughness_m: NotNegative
     hurst: Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 
-class Restitution(_Part, frozen=True):
+class Restitution(PresetPart, frozen=True):
     """Restitution of an impact against a rigid wall: the file's group `impact`."""
 
     restitution: Fraction
@@ -252,7 +222,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
     Raises MaterialError naming preset and field where its numbers contradict each other.
     """
     label = where or preset.name
-    alpha, beta = _rayleigh(preset.damping, label)
+    alpha, beta = rayleigh_pair(preset.damping, label)
     elastic = preset.elasticity
     rest: dict[str, Any] = {
         "alpha_per_s": alpha,
@@ -260,7 +230,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "roughness_m": preset.surface.roughness_m,
         "hurst": preset.surface.hurst,
         "restitution": preset.impact.restitution,
-        "effects": _effects(preset, label),
+        "effects": (*law_of(preset.damping), *_effects(preset, label)),
         "includes_radiation": total_damping(preset),
         "residual": residual_of(preset.residual, f"preset {label}") if preset.residual is not None else None,
         "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} "
@@ -301,26 +271,3 @@ def _effects(preset: Preset, label: str) -> tuple[Effect, ...]:
         return tuple(effect_of(data) for data in preset.effects)
     except RecordError as error:
         raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error
-
-
-def rayleigh_of_loss_factor(eta: float, low_hz: float, high_hz: float) -> tuple[float, float]:
-    """Compute (alpha_per_s, beta_s) whose loss is ``eta`` at both frequencies; the module's head has the equations."""
-    w1, w2 = 2 * math.pi * low_hz, 2 * math.pi * high_hz
-    return eta * w1 * w2 / (w1 + w2), eta / (w1 + w2)
-
-
-def _rayleigh(damping: Damping, label: str) -> tuple[float, float]:
-    match damping:
-        case Damping(alpha_per_s=float() as alpha, beta_s=float() as beta, loss_factor=None, equal_at_hz=None):
-            return alpha, beta
-        case Damping(
-            alpha_per_s=None,
-            beta_s=None,
-            loss_factor=float() as eta,
-            equal_at_hz=(float() as low_hz, float() as high_hz),
-        ):
-            return rayleigh_of_loss_factor(eta, low_hz, high_hz)
-    raise MaterialError(
-        f"preset {label}: damping is neither Rayleigh's pair nor a loss factor",
-        "give alpha_per_s and beta_s, or loss_factor and equal_at_hz",
-    )

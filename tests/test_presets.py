@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet import presets
+from sonic_bullet.effects.damping_law.damping_form import rayleigh_of_loss_factor
 from sonic_bullet.records.errors import MaterialError
 
 TABLE_I = {
@@ -90,7 +91,7 @@ def test_range_and_spread_change_no_sound(tmp_path: Path) -> None:
 
 
 def test_a_loss_factor_is_met_at_its_two_frequencies_and_undercut_between() -> None:
-    alpha, beta = presets.rayleigh_of_loss_factor(1e-3, 500, 8000)
+    alpha, beta = rayleigh_of_loss_factor(1e-3, 500, 8000)
 
     def loss(f: float) -> float:  # η = 2d/ω
         w = 2 * np.pi * f
@@ -101,7 +102,7 @@ def test_a_loss_factor_is_met_at_its_two_frequencies_and_undercut_between() -> N
     assert loss(2000) == pytest.approx(1e-3 * 2 * math.sqrt(500 * 8000) / 8500)
     assert loss(100) > 1e-3 < loss(20_000)
     steel = presets.load_material("steel")
-    assert (steel.alpha_per_s, steel.beta_s) == pytest.approx(presets.rayleigh_of_loss_factor(7.7e-5, 500, 8000))
+    assert (steel.alpha_per_s, steel.beta_s) == pytest.approx(rayleigh_of_loss_factor(7.7e-5, 500, 8000))
 
 
 def test_spruce_is_the_tensor_of_its_engineering_constants() -> None:

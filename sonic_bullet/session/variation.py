@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.effects.damping_law import DampingLaw, own_decay_per_s
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.names import matched
 from sonic_bullet.records import Array, Body, Material, ModalModel
@@ -205,21 +206,31 @@ def vary_body(body: Body, factors: Mapping[str, float]) -> Body:
     if material.alpha_per_s is not None and material.beta_s is not None:
         changed["alpha_per_s"] = material.alpha_per_s * factors.get("alpha_per_s", loss)
         changed["beta_s"] = material.beta_s * factors.get("beta_s", loss)
+    changed["effects"] = tuple(_vary_law(e, factors) if isinstance(e, DampingLaw) else e for e in material.effects)
     rough = with_roughness_of(material, changed.pop("roughness_m"))
     made = replace(rough, **changed)
     model = None if body.model is None else _vary_model(body.model, material, made, stiff / dense, dense)
     return replace(body, material=made, model=model)
 
 
+def _vary_law(law: DampingLaw, factors: Mapping[str, float]) -> DampingLaw:
+    """Multiply the numbers of a law by the factors of the preset's that state them."""
+    return replace(
+        law,
+        eta=law.eta * factors.get("loss_factor", 1.0),
+        exponent=law.exponent * factors.get("exponent", 1.0),
+        floor_s=law.floor_s * factors.get("floor_s", 1.0),
+    )
+
+
 def _vary_model(model: ModalModel, old: Material, new: Material, ratio: float, dense: float) -> ModalModel:
-    """Scale modes to eigenvalues times ratio and density times dense; decays change as their Rayleigh damping does."""
+    """Scale modes to eigenvalues times ratio and density times dense; decays change as their material's own do."""
     if not model.mode_count:
         return replace(model, mass_kg=model.mass_kg * dense)
     eigenvalue = model.omega0_squared_per_s2
     decay = model.decay_per_s
-    if new.alpha_per_s is not None and new.beta_s is not None and old.alpha_per_s is not None:
-        law = 0.5 * (old.alpha_per_s + (0.0 if old.beta_s is None else old.beta_s) * eigenvalue)
-        wanted = 0.5 * (new.alpha_per_s + new.beta_s * eigenvalue * ratio)
+    if new.alpha_per_s is not None and old.alpha_per_s is not None:
+        law, wanted = own_decay_per_s(old, eigenvalue), own_decay_per_s(new, eigenvalue * ratio)
         decay = np.where(law > 0, decay * wanted / np.where(law > 0, law, 1.0), decay)
     omega_squared = eigenvalue * ratio - np.nan_to_num(decay) ** 2
     order = np.argsort(omega_squared, kind="stable")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.effects.damping_law.damping_form import Damping
 from sonic_bullet.effects.presets_of_effects import stored
 from sonic_bullet.effects.recorded_lines import MOST_LINES, RecordedLines
 from sonic_bullet.estimator.fit.case_fit import CaseFit
@@ -11,7 +12,6 @@ from sonic_bullet.estimator.fit.typical_strike import typical_strike
 from sonic_bullet.presets import (
     DAMPING_TAKEN,
     FORMAT,
-    Damping,
     Elasticity,
     Preset,
     Provenance,

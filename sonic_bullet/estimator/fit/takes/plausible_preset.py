@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.damping_law import own_decay_per_s
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
 from sonic_bullet.estimator.fit.recorded import RecordedObject, observed
@@ -42,9 +42,7 @@ def plausible_sound(found: CaseFit, e: RecordedObject, recording: CaseRecording,
         return None
     guess, shipped = e.guess, with_shipped_damping(e.guess)
     value, vector = e.family.modes(guess.youngs_pa / guess.density_kg_m3, guess.poisson)
-    decay = 0.5 * ((shipped.alpha_per_s or 0) + (shipped.beta_s or 0) * value)
-    for law in (effect for effect in guess.effects if isinstance(effect, DampingLaw)):
-        decay = law.decay_per_s(np.sqrt(np.maximum(value, 0)))
+    decay = own_decay_per_s(shipped, value)
     band = found.case.band_hz[0], min(found.case.band_hz[1], sr / 2)
     freq = np.sqrt(np.maximum(value - decay**2, 0)) / (2 * np.pi)
     seen = observed(found.case, e.thing, guess, (recording,), e.family)

@@ -3,6 +3,8 @@
     constant-loss  d = ηω/2                                                   [Cremer, Heckl, Petersson 2005, ch. 3.2]
     power          d = ½ η ω₁ (ω/ω₁)^p,  ω₁ = 2π·1000/s
         (a loss factor that goes as a power of frequency)
+    with a floor   T60 = (ln 1000)/d + T₀
+        (real bodies of ceramic and iron level off: docs/measured/damping.md; a constant loss or a power)
     relaxation     d = ½ ω [η + Δ ωτ/(1 + (ωτ)²)]
         [Zener 1948, ch. 5; Nowick & Berry 1972, eq. 3.5-2]
 
@@ -19,7 +21,7 @@ import numpy as np
 
 from sonic_bullet.effects.common.proofs import finite, one_of
 from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits, ascending
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array, Material, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
 OMEGA_1 = 2000 * np.pi
@@ -44,6 +46,8 @@ class DampingLaw:
         Δ of the relaxation.
     tau_s : float
         τ of the relaxation.
+    floor_s : float
+        T₀, below which T60 does not fall; 0 without a floor, and none of a relaxation.
     """
 
     id: ClassVar[str] = "damping-law"
@@ -57,20 +61,24 @@ class DampingLaw:
     exponent: float = 1.0
     strength: float = 0.0
     tau_s: float = 0.0
+    floor_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the numbers."""
         one_of("law", self.law, LAWS)
         finite("exponent", self.exponent)
-        for name, value in (("eta", self.eta), ("strength", self.strength), ("tau_s", self.tau_s)):
+        numbers = {"eta": self.eta, "strength": self.strength, "tau_s": self.tau_s, "floor_s": self.floor_s}
+        for name, value in numbers.items():
             finite(name, value, least=0.0)
 
     def decay_per_s(self, omega_per_s: Array) -> Array:
         """Compute the decays (k,) at undamped ω (k,) in rad/s."""
         w = np.asarray(omega_per_s, float)
         if self.law == "power":
-            return np.asarray(0.5 * self.eta * OMEGA_1 * (w / OMEGA_1) ** self.exponent)
-        return np.asarray(0.5 * w * (self.eta + self.strength * w * self.tau_s / (1 + (w * self.tau_s) ** 2)))
+            decay = np.asarray(0.5 * self.eta * OMEGA_1 * (w / OMEGA_1) ** self.exponent)
+        else:
+            decay = np.asarray(0.5 * w * (self.eta + self.strength * w * self.tau_s / (1 + (w * self.tau_s) ** 2)))
+        return decay / (1 + decay * self.floor_s / np.log(1000)) if self.floor_s else decay
 
     def apply(self, x: ModalModel) -> ModalModel:
         """Set the decays of a body's modes by the law."""
@@ -85,11 +93,12 @@ class DampingLaw:
         """Return its parameters by name, in SI units, for reports and JSON."""
         if self.law == "relaxation":
             return {"law": self.law, "eta": self.eta, "strength": self.strength, "tau_s": self.tau_s}
-        return {"law": self.law, "eta": self.eta} | ({"exponent": self.exponent} if self.law == "power" else {})
+        bent = {"exponent": self.exponent} if self.law == "power" else {}
+        return {"law": self.law, "eta": self.eta} | bent | ({"floor_s": self.floor_s} if self.floor_s else {})
 
     def freedom(self) -> int:
         """Count the numbers that were free when it was proposed."""
-        return LAWS[self.law]
+        return LAWS[self.law] + bool(self.floor_s)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
@@ -124,6 +133,18 @@ class DampingLaw:
             if evidence.known is not None or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER
             else None
         )
+
+
+def own_decay_per_s(material: Material, lambda_per_s2: Array) -> Array:
+    """Compute a material's own decays (k,) at eigenvalues λ (k,): its law's, or Rayleigh's without one, 0 of neither.
+
+    Without what a body radiates, and without what depends on its shape.
+    """
+    square = np.asarray(lambda_per_s2, float)
+    found = np.asarray(0.5 * ((material.alpha_per_s or 0.0) + (material.beta_s or 0.0) * square))
+    for law in (effect for effect in material.effects if isinstance(effect, DampingLaw)):
+        found = law.decay_per_s(np.sqrt(np.maximum(square, 0.0)))
+    return found
 
 
 def _rayleigh(p: Array, w: Array) -> Array:
