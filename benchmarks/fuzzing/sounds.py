@@ -14,7 +14,7 @@ import numpy as np
 import soundfile
 
 from benchmarks.fuzzing.mutations import changed, cut, flipped, overwritten
-from sonic_bullet.files.audio import FORMATS
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 SR = 8000
 FRAMES = 700
@@ -25,7 +25,7 @@ def seed(suffix: str) -> bytes:
     time = np.arange(FRAMES) / SR
     sound = 0.5 * np.exp(-60 * time) * np.sin(2 * np.pi * 1000 * time)
     stream = io.BytesIO()
-    container, subtype = FORMATS[suffix]
+    container, subtype, *_ = AUDIO_FORMATS[suffix]
     soundfile.write(stream, sound, SR, subtype, format=container)
     return stream.getvalue()
 

@@ -20,7 +20,6 @@ from sonic_bullet.cli.output import places, table, warn
 from sonic_bullet.cli.responses import RESPONSE_COLUMNS, UFF, ResponseTakes, with_responses, write_takes
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_channel, replacing
-from sonic_bullet.files.audio import FORMATS
 from sonic_bullet.files.case_fields import LARGEST
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
@@ -28,6 +27,7 @@ from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 RESPONSES = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
 Point = tuple[float, float, float]
@@ -178,7 +178,7 @@ def _check_options(
 def _inside(place: Path) -> list[Path]:
     """List the recordings in a folder: audio, or UFF files where there is none."""
     files = sorted(place.glob("*"))
-    for suffixes in (FORMATS, UFF):
+    for suffixes in (AUDIO_FORMATS, UFF):
         if found := [file for file in files if file.suffix.lower() in suffixes]:
             return found
     return []

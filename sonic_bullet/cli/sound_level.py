@@ -17,6 +17,7 @@ import click
 
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 if TYPE_CHECKING:
     from sonic_bullet.files import AudioReport, ContactLog
@@ -125,8 +126,10 @@ class LevelWish:
         from sonic_bullet.render.silence import is_silent
 
         peak_dbfs = self.peak_dbfs
+        own = AUDIO_FORMATS.get(Path(path).suffix.lower())
+        unstated = own is not None and own.text == "nowhere"
         as_it_is = self.pascals or self.lufs is not None or self.peak_dbfs is not None
-        if not as_it_is and Path(path).suffix.lower() != ".w64" and not is_silent(sound, log):
+        if not as_it_is and not unstated and not is_silent(sound, log):
             peak_dbfs = DEFAULT_PEAK_DBFS
         return find_level(self.faded(sound, sr), sr, peak_dbfs, self.lufs, 1.0)
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.files.audio import FORMATS
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records.errors import CompareError, SonicBulletError
-from sonic_bullet.records.file_endings import GLTF_ENDINGS
+from sonic_bullet.records.file_endings import AUDIO_FORMATS, GLTF_ENDINGS
 from sonic_bullet.session.scene_file import defines_build
 
 AT_ONCE = 4
@@ -54,7 +53,7 @@ def _taken(path: Path) -> bool:
             return defines_build(path) or "stepSimulation" in path.read_text(encoding="utf-8", errors="replace")
         except SonicBulletError:
             return True
-    return path.suffix.lower() in (".npz", *GLTF_ENDINGS, *FORMATS)
+    return path.suffix.lower() in (".npz", *GLTF_ENDINGS, *AUDIO_FORMATS)
 
 
 def compare_folders(

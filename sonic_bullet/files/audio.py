@@ -36,18 +36,7 @@ from sonic_bullet.machine.worker import note_closing, stop_word
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
-
-FORMATS = {
-    ".wav": ("WAV", "FLOAT"),
-    ".rf64": ("RF64", "FLOAT"),
-    ".w64": ("W64", "FLOAT"),
-    ".flac": ("FLAC", "PCM_24"),
-    ".ogg": ("OGG", "VORBIS"),
-    ".aif": ("AIFF", "FLOAT"),
-    ".aiff": ("AIFF", "FLOAT"),
-    ".caf": ("CAF", "FLOAT"),
-}
-"""Extension -> container and default sample format, in libsndfile's names."""
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 SAMPLE_BYTES = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, "PCM_S8": 1, "PCM_U8": 1}
 CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
@@ -62,13 +51,13 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
     """
     path = as_path(path, "path", "name a sound file, such as out.wav")
     extension = Path(path).suffix.lower()
-    if extension not in FORMATS:
+    if extension not in AUDIO_FORMATS:
         raise FileError(
             f"cannot write {brief(path)}: {shown(extension)} is no audio format known here",
-            f"end the name with one of {' '.join(FORMATS)}",
+            f"end the name with one of {' '.join(AUDIO_FORMATS)}",
         )
     target = check_output(path)
-    container, default = FORMATS[extension]
+    container, default = AUDIO_FORMATS[extension][:2]
     wanted = (
         default
         if subtype is None
@@ -112,15 +101,17 @@ class AudioWriter:
 
         self.path = os.fspath(path)
         self.target, self.format, self.subtype = check_audio_output(path, subtype)
+        own = AUDIO_FORMATS[Path(path).suffix.lower()]
         self.sr, self.channels, self.gain_per_pa = check_sr(sr), channels, float(gain_per_pa)
         if not (math.isfinite(self.gain_per_pa) and self.gain_per_pa > 0):
             raise AudioError(f"a gain of {gain_per_pa} per Pa", "give a full scale above zero")
         self.scale_pa = 1 / self.gain_per_pa if scale else None
-        if self.format in ("WAV", "RF64") and self.scale_pa is not None:
+        if own.text == "chunks" and self.scale_pa is not None:
             chunks = ixml_chunk(self.scale_pa) + (chunks or wave_chunks([], description=scale_text(self.scale_pa)))
+        self.over_4_gib = own.over_4_gib
         self.frame_bytes, self.chunks = channels * SAMPLE_BYTES.get(self.subtype, 0), chunks
         if self.format == "WAV" and expected_frames * self.frame_bytes + len(chunks) > CHUNK_LIMIT_BYTES:
-            self.format = "RF64"
+            self.format, self.over_4_gib = "RF64", True
         self.frames = self.clipped = self.over = 0
         self.peak_pa = self.energy_pa2 = 0.0
         try:
@@ -141,7 +132,7 @@ class AudioWriter:
                 "write .wav, or fewer channels",
             ) from error
 
-        if self.scale_pa is not None and self.format not in ("WAV", "RF64", "W64"):
+        if self.scale_pa is not None and own.text == "comment":
             self.file.comment = scale_text(self.scale_pa)
 
     @property
@@ -159,7 +150,7 @@ class AudioWriter:
         block = np.asarray(samples, float)
         if block.ndim != 2 or block.shape[0] != self.channels:
             raise AudioError(f"samples of shape {block.shape} for {self.channels} channels", "pass (channels, n)")
-        if self.format in ("WAV", "AIFF") and (self.frames + block.shape[1]) * self.frame_bytes > CHUNK_LIMIT_BYTES:
+        if not self.over_4_gib and (self.frames + block.shape[1]) * self.frame_bytes > CHUNK_LIMIT_BYTES:
             raise AudioError(
                 f"{self.path} would pass 4 GiB, which {self.format} cannot hold", "write .w64, .rf64 or .flac"
             )
@@ -286,8 +277,8 @@ def write_audio(
 ) -> AudioReport:
     """Write ``samples`` (channels, n) or (n,), float64 pascals, whole or not at all, by blocks.
 
-    The extension chooses the format (`FORMATS`). Over 4 GiB a .wav is written as RF64. The file states its full scale,
-    and `read_audio` undoes it.
+    The extension chooses the format (`AUDIO_FORMATS`). Over 4 GiB a .wav is written as RF64. The file states its full
+    scale, and `read_audio` undoes it.
 
     Parameters
     ----------
@@ -312,7 +303,7 @@ def write_audio(
     """
     rate = check_sr(sr)
     _, container, _ = check_audio_output(path, subtype)
-    if cues is not None and container not in ("WAV", "RF64"):
+    if cues is not None and AUDIO_FORMATS[Path(path).suffix.lower()].text != "chunks":
         raise FileError(f"cannot write cue points to {brief(path)}: {container} has none", "end the name with .wav")
     check_levels(peak_dbfs, lufs)
     begins = as_whole(time_reference, "time_reference", "count samples from the timeline's start", least=0)

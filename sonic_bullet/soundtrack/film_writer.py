@@ -25,7 +25,7 @@ from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -38,28 +38,9 @@ from sonic_bullet.machine.worker import note_closing
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
+from sonic_bullet.soundtrack.film_codecs import CODECS, CONTAINERS
 from sonic_bullet.soundtrack.frame_rates import fraction_of
 
-
-class _Codec(NamedTuple):
-    """Audio codec of ffmpeg: bits a second a channel, 0: any; block, 0: the last may be short, and delay in samples."""
-
-    name: str
-    sample: str
-    bits_per_s: int = 0
-    block: int = 0
-    delay: int = 0
-
-
-CODECS = {
-    "aac": _Codec("aac", "fltp", 128_000, 1024, 1024),
-    "pcm": _Codec("pcm_s24le", "s32"),
-    "flac": _Codec("flac", "s32"),
-    "opus": _Codec("libopus", "flt", 96_000),
-    "mp3": _Codec("libmp3lame", "fltp", 128_000, 1152, 1105),
-}
-CONTAINERS = {".mp4": ("aac", "mp3"), ".mov": ("pcm", "aac"), ".mkv": ("flac", "opus", "pcm", "aac", "mp3")}
-"""Extension -> codecs that players know there, the usual one first."""
 SIDE_MOST = 8192
 SOUND_BLOCK_S = 0.5
 """How far sound is ahead of the pictures in the file, at most: players read both without jumping."""

@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 import soundfile
 
-from sonic_bullet.files import audio, cache, read_audio, replacing, write_audio
+from sonic_bullet.files import cache, read_audio, replacing, write_audio
 from sonic_bullet.machine.partial_file import NAME, PartialFile
 from sonic_bullet.presets import named_preset, write_preset
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 REPO = Path(__file__).resolve().parents[2]
 SR = 48_000
@@ -102,7 +103,7 @@ for name in sys.argv[1:]:
 
 def test_a_file_that_may_not_grow_is_refused_at_every_size_in_every_format(tmp_path: Path) -> None:
     """RLIMIT_FSIZE stands for a full disk where none can be mounted."""
-    wanted = [f"a{extension}" for extension in audio.FORMATS]
+    wanted = [f"a{extension}" for extension in AUDIO_FORMATS]
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, *wanted], cwd=tmp_path, check=False, capture_output=True, text=True, timeout=250
     )

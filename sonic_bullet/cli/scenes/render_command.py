@@ -14,6 +14,7 @@ from sonic_bullet.cli.scenes.take_options import take_options
 from sonic_bullet.cli.sound_level import level_options
 from sonic_bullet.cli.soundtrack.session_output import session_options
 from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 
 @click.command(epilog=RENDER_EPILOG)
@@ -22,8 +23,7 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
     "-o",
     "--output",
     metavar="NAME.wav",
-    help="Sound file: .wav .flac .ogg .aiff .caf .w64 .rf64; it says what its full scale is in Pa. Not needed with "
-    "--session.",
+    help=f"Sound file: {' '.join(AUDIO_FORMATS)}; it says what its full scale is in Pa. Not needed with --session.",
 )
 @click.option(
     "--seconds",

@@ -17,6 +17,7 @@ from sonic_bullet.cli.scenes.space_options import SpaceWish, space_options
 from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
+from sonic_bullet.soundtrack.film_codecs import CODECS, USUAL_CODECS
 
 if TYPE_CHECKING:
     from sonic_bullet.listener.pictures import Standing
@@ -56,8 +57,9 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
 @click.option("--follow", metavar="BODY", help="Name of a body that the camera goes with.")
 @click.option("--overlay", is_flag=True, help="Draw contacts as they are heard, and why others are silent.")
 @click.option("--shadows", is_flag=True, help="Draw shadows; takes twice as long.")
-@click.option("--audio", "codec", type=click.Choice(["aac", "pcm", "flac", "opus", "mp3"]),
-              help="Codec of the sound. [default: mp4 aac, mov pcm, mkv flac]")  # fmt: skip
+@click.option(
+    "--audio", "codec", type=click.Choice(list(CODECS)), help=f"Codec of the sound. [default: {USUAL_CODECS}]"
+)
 @click.option("--sr", type=float, metavar="HZ", help="Sample rate. [default: 48000; a log's own]")
 @level_options
 @scene_options

@@ -17,6 +17,7 @@ import click
 from sonic_bullet.cli.output import folder_place
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 if TYPE_CHECKING:
     from sonic_bullet.cli.scenes.scene_runs import Replay
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from sonic_bullet.soundtrack.sound_events import SoundEvent
     from sonic_bullet.soundtrack.stems import Stem
 
-WITH_CUES = (".wav", ".rf64")
 LATEST_S = 1e9
 
 
@@ -77,7 +77,8 @@ class SoundtrackWish:
         """Return the same with the stems' folder absolute and tried; raises FileError."""
         if self.events is not None and Path(self.events).suffix.lower() not in (".json", ".csv"):
             raise FileError(f"cannot write {self.events}: events are JSON or CSV", "end the name with .json or .csv")
-        if self.cues and Path(output).suffix.lower() not in WITH_CUES:
+        form = AUDIO_FORMATS.get(Path(output).suffix.lower())
+        if self.cues and (form is None or form.text != "chunks"):
             raise FileError(f"cannot write cue points to {output}", "end its name with .wav")
         from sonic_bullet.files import check_levels
 

@@ -1,0 +1,49 @@
+"""One more format of sound files is one more entry of `AUDIO_FORMATS`."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import sonic_bullet
+from sonic_bullet.cli import cli
+from sonic_bullet.comparing import folders
+from sonic_bullet.files import read_audio, read_audio_scale, write_audio
+from sonic_bullet.records.file_endings import AUDIO_FORMATS, AudioFormat
+
+PACKAGE = Path(sonic_bullet.__file__).parent
+SHARED = {".wav"}  # which names files of this package's own, too
+
+
+def test_a_format_more_is_written_read_compared_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(AUDIO_FORMATS, ".au", AudioFormat("AU", "FLOAT", "nowhere"))
+    sound = np.sin(np.arange(4800) / 7)[None]
+    write_audio(tmp_path / "a.au", sound, 48_000)
+    back, sr = read_audio(tmp_path / "a.au")
+    assert sr == 48_000 and np.abs(back - sound).max() < 1e-7
+    assert read_audio_scale(tmp_path / "a.au") is None
+    folder = tmp_path / "case"
+    folder.mkdir()
+    (tmp_path / "a.au").rename(folder / "a.au")
+    assert CliRunner().invoke(cli, ["case", "new", str(folder)]).exit_code == 0
+    assert "a.au" in (folder / "case.json").read_text()
+    assert folders._taken(folder / "a.au")
+    command = importlib.reload(importlib.import_module("sonic_bullet.cli.scenes.render_command"))
+    assert ".caf .au;" in " ".join(option.help or "" for option in command.render.params if option.name == "output")
+
+
+def test_endings_are_spelled_in_one_file() -> None:
+    looked_at, found = 0, []
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                looked_at += 1
+                if node.value in AUDIO_FORMATS.keys() - SHARED:
+                    found.append(path.relative_to(PACKAGE).as_posix())
+    assert looked_at > 5000
+    assert set(found) == {"records/file_endings.py"}
