@@ -98,4 +98,4 @@ def _early_radius_m(
     dense_m = (3 * IMAGES * float(np.prod(room.size_m)) / (4 * np.pi)) ** (1 / 3)
     places = [one.position_m[None] if one.path is None else one.path.position_m for one, _ in own]
     away_m = max((float(np.linalg.norm(at - place.centre_m, axis=1).max()) for at in places), default=0.0)
-    return max(min(dense_m, max(fallen_m, away_m + place.reach_m)), 2 * place.reach_m)
+    return float(max(min(dense_m, max(fallen_m, away_m + place.reach_m)), 2 * place.reach_m))
