@@ -38,7 +38,7 @@ def make_anchor(heading: str, separator: str) -> str:
 
 def read_navigation(index: str) -> list[Any]:
     """Return the navigation: a section for each heading of the index, a page for each link, in order."""
-    navigation: list[Any] = [{"Home": "README.md"}]
+    navigation: list[Any] = [{"Home": ["README.md"]}]
     section = part = navigation
     for line in index.splitlines():
         if line.startswith("## "):
@@ -50,7 +50,7 @@ def read_navigation(index: str) -> list[Any]:
         elif section is not navigation:
             part += [page for page in LINK.findall(line) if page.endswith(".md") and page not in part]
     return [
-        {title: pages[0] if isinstance(pages, list) and len(pages) == 1 else pages}
+        {title: pages[0] if len(pages) == 1 and isinstance(pages[0], str) else pages}
         for entry in navigation
         for title, pages in entry.items()
     ]
