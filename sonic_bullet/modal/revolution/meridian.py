@@ -162,9 +162,9 @@ def _joined(chains: list[Array]) -> Array | None:
     if not chains or any(chain[0, 0] > 0 for chain in chains):
         return None
     poles = sorted((float(chain[end, 1]), c, end) for c, chain in enumerate(chains) for end in (0, -1))
-    partner = {}
-    for (_, *low), (_, *high) in zip(poles[::2], poles[1::2], strict=True):
-        partner[tuple(low)], partner[tuple(high)] = tuple(high), tuple(low)
+    partner: dict[tuple[int, int], tuple[int, int]] = {}
+    for (_, c, end), (_, other, its_end) in zip(poles[::2], poles[1::2], strict=True):
+        partner[c, end], partner[other, its_end] = (other, its_end), (c, end)
     walk, here = [], (0, 0)
     for _ in chains:
         c, end = here
@@ -244,7 +244,7 @@ def _outline(walk: Array, flat: Array, place: Array, fine: Array, diagonal: floa
     whole[pole] = True
     first = int(np.argmax(whole))  # 0 where there is neither
     whole[first] = True
-    middle, size, whole = (np.roll(x, -first, axis=0) for x in (middle, size, whole))
+    middle, size, whole = np.roll(middle, -first, axis=0), np.roll(size, -first), np.roll(whole, -first)
     coming = np.append(np.flatnonzero(whole), len(middle))
     kept = [0]
     for k in range(1, len(middle)):
