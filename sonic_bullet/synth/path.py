@@ -5,7 +5,7 @@
 
 s_b: pressure at 1 m (Pa·m) of the body's modes, j_b: that of the rigid body along each axis (Pa·m; K times its jerk),
 n̂ and r from the body to the microphone when the sound left (t_e), so a moving body's Doppler shift is exact: 1/(1 +
-v/c). r is never below the body's radius, and the travel time never below 8 samples (5.7 cm at 48 kHz), half the
+v/c). r is never below the body's radius, and the travel time never below 12 samples (8.6 cm at 48 kHz), half the
 interpolation's length. Flat to 0.02 dB up to 18 kHz at 48 kHz. Every sample depends on absolute time alone: any split
 into calls gives the same bits. A teleported body emits from its old place and its new one, crossfaded over the step: no
 click and no chirp.
@@ -190,13 +190,14 @@ def _resize(path: Path, state: PathState, size: Array) -> None:
     each = channels * _stride(size)
     begins = np.cumsum(each) - each
     state.memory = np.zeros(int(each.sum()))
-    for p, place in enumerate(places):
-        old, new = int(place["size"]), int(size[p])
+    for begin, new, place in zip(begins.tolist(), size.tolist(), places, strict=True):
+        old, at = int(place["size"]), int(place["memory_at"])
+        here = former[at : at + 2 * channels * (old + MIRRORED)].reshape(2 * channels, -1)
+        there = state.memory[begin : begin + 2 * channels * (new + MIRRORED)].reshape(2 * channels, -1)
+        if old == new:
+            there[:] = here
+            continue
         sample = np.arange(state.at - old, state.at)
-        for c in range(channels):
-            for half in range(2):
-                here = former[int(place["memory_at"]) + (2 * c + half) * (old + MIRRORED) :][:old]
-                there = state.memory[int(begins[p]) + (2 * c + half) * (new + MIRRORED) :][: new + MIRRORED]
-                there[sample % new] = here[sample % old]
-                there[new:] = there[:MIRRORED]
+        there[:, sample % new] = here[:, sample % old]
+        there[:, new:] = there[:, :MIRRORED]
     places["size"], places["memory_at"] = size, begins

@@ -101,12 +101,12 @@ def passing(moves: str) -> tuple[Array, Array, Array]:
 
 @pytest.mark.parametrize("moves", ["body", "microphone"])
 def test_passing_by_shifts_pitch_and_clicks_nowhere(moves: str) -> None:
-    """Pitch within 0.1 % of Doppler's law; level to the path's 0.02 dB; above 6 kHz, where clicks are, below −90 dB."""
+    """Pitch within 0.1 % of Doppler's law; nothing else above −90 dB, −78 for what moves by 240 places a second."""
     sound, want, t = passing(moves)
     inner = (t > 0.06) & (t < 0.78)
     error = (sound - want)[inner]
     peak = float(np.abs(want).max())
-    assert np.abs(error).max() < (10 ** (0.02 / 20) - 1) * peak
+    assert 20 * np.log10(np.abs(error).max() / peak) < (-90 if moves == "body" else -78)
     high = sosfiltfilt(butter(8, 6000, "high", fs=SR, output="sos"), sound)[inner]
     assert 20 * np.log10(np.abs(high).max() / peak) < -90
     phase = np.unwrap(np.angle(_analytic(sound)))
