@@ -45,6 +45,7 @@ from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_a
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
 
 Progress = Callable[[float], None]
+Receive = Callable[[tuple[Sensor, ...]], tuple[Sensor, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,19 +130,21 @@ def run_scene(
     material: str | Path | Material | None = None,
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
+    receive: Receive | None = None,
     progress: Progress | None = None,
     say: Say | None = None,
 ) -> tuple[str, ...]:
     """Run a scene whose listener is passed to ``begin`` before its first step; return notes for the user.
 
-    Arguments as of `render_scene`. Raises SonicBulletError, SceneError also for microphones where a script's own
-    listener has its own.
+    receive: makes of its sensors those that it has instead. Other arguments as of `render_scene`. Raises
+    SonicBulletError, SceneError also for microphones where a script's own listener has its own.
     """
     asked: dict[str, Any] = {
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
         "choice": as_choice(material, materials, silent),
+        "receive": as_call(receive, "receive"),
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():
         notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"), progress, say)
@@ -174,6 +177,7 @@ class _Stage:
     supports: bool = True
     begin: Callable[[Listener], object] | None = None
     at_start: Callable[[Listener], object] | None = None
+    receive: Receive | None = None
     listener: Listener | None = None
     adds: bool = False
     client: Any = None
@@ -205,6 +209,8 @@ class _Stage:
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """Attach a listener that keeps log and sound, unless it is played at once."""
         how: dict[str, Any] = dict.fromkeys(("keep_log", "keep_sound"), self.begin is None)
+        if self.receive is not None:
+            microphones, self.receive = self.receive(as_sensors(microphones, "microphones")), None
         return attach(client, sr=self.sr, seed=self.seed, microphone=microphones, **how, supports=self.supports)
 
     def ready(self) -> None:

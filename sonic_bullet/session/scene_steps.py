@@ -38,6 +38,7 @@ class SceneStage(Protocol):
 
     path: Path
     microphones: tuple[Sensor, ...] | None
+    receive: Any
     choice: MaterialChoice
     begin: Callable[[Listener], object] | None
     at_start: Callable[[Listener], object] | None
@@ -108,7 +109,7 @@ def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | Non
         def look(_: int) -> None:
             stage.listener = stage.listener or _listener_in(names)
             if (stage.begin or stage.at_start) is not None and stage.listener is not None:
-                if stage.begin is not None and stage.microphones is not None:
+                if stage.begin is not None and (stage.microphones, stage.receive) != (None, None):
                     raise SceneError(f"scene '{stage.path.name}' has microphones of its own", "leave yours out")
                 stage.ready()
 

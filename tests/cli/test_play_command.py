@@ -17,10 +17,13 @@ import pytest
 
 from sonic_bullet.files import read_log, write_log
 from sonic_bullet.live import playback
+from sonic_bullet.records import Ambisonics, Array
 from sonic_bullet.render import log_frames, render_log
-from sonic_bullet.scene import render_scene
+from sonic_bullet.scene import render_scene, run_scene
+from sonic_bullet.session import Listener
 from tests.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
+from tests.made import heads
 from tests.made.sound_cards import StandInLibrary
 
 SCRIPT = """
@@ -95,6 +98,26 @@ def test_what_was_played_is_said(
     ), line
 
 
+def test_scene_and_log_are_played_to_other_microphones(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Heads, ambisonics, paths, live and from a log; what a scene's listener has instead is what is played."""
+    pytest.importorskip("sofar")
+    heads.write_sofa(place / "head.sofa", heads.head(44_100, heads.directions(30), taps=100))
+    Path("walk.csv").write_text("0,0.3,-0.5,0.3\n0.3,-0.3,-0.5,0.3\n")
+    for source, seconds in (("log.npz", ()), ("script.py", ("--seconds", "0.1", "--sr", "16000"))):
+        words = ("--head", "head.sofa", "--facing", "0,0,0", "--device", "null")
+        assert run("play", source, *seconds, *words, "--microphone", "0,-0.5,0.3") == 0
+        assert "head.sofa is resampled from 44100 Hz to 16000 Hz" in capfd.readouterr().err
+        assert run("play", source, *seconds, "--microphone-path", "walk.csv", "--ambisonics", "1", *words[4:]) == 0
+    frames: list[Array] = []
+
+    def begin(listener: Listener) -> None:
+        frames.append(listener.frame)
+
+    field = lambda sensors: tuple(Ambisonics(one.position_m, order=1) for one in sensors)  # noqa: E731
+    run_scene("script.py", begin, seconds=0.02, sr=16_000, receive=field)
+    assert frames[0].shape[0] == 4
+
+
 def test_json_holds_the_report(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run("play", "log.npz", "--device", "null", "--full-scale", "1e-6", "--json") == 0
     told = json.loads(capfd.readouterr().out)
@@ -114,6 +137,11 @@ def test_json_holds_the_report(place: Path, capfd: pytest.CaptureFixture[str]) -
         (("script.py", "--full-scale", "-2"), "full_scale_pa is -2"),
         (("log.npz", "--ahead", "9"), "ahead_s is 9"),
         (("own.py", "--microphone", "0,0,1"), "scene 'own.py' has microphones of its own; leave yours out"),
+        (("own.py", "--ambisonics", "1"), "scene 'own.py' has microphones of its own; leave yours out"),
+        (("script.py", "--microphone-on", "ball"), "--microphone-on names a body"),
+        (("script.py", "--vibrometer", "ball"), "--vibrometer names a body"),
+        (("log.npz", "--microphone-on", "cup"), "nothing that sounds in log.npz is called that"),
+        (("log.npz", "--head", "none.sofa"), "no such file"),
     ],
 )
 def test_what_cannot_be_played_is_one_line(

@@ -75,6 +75,23 @@ def test_a_glb_is_scored_and_its_log_is_one_as_any_other(place: Path, capfd: pyt
     assert np.abs(quiet).max() < 1e-3 * np.abs(sound).max()
 
 
+def test_an_animation_is_scored_in_space_and_in_a_room(place: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """As its log is rendered: the same bytes; and what cannot be is one line."""
+    pytest.importorskip("pyroomacoustics")
+    write_glb(place / "a.glb", dropped())
+    score, flat = ("score", "a.glb", "--sr", "16000"), ("--pascals", "--tail", "0")
+    wanted = ("--ambisonics", "1", "--room", "3x2.5x2.4")
+    assert run(*score, "-o", "a.wav", "--contacts", "a.npz", *flat, *wanted) == 0
+    assert "room of 3 x 2.5 x 2.4 m" in capfd.readouterr().err
+    assert run("render", "a.npz", "-o", "b.wav", *flat, *wanted[2:]) == 0
+    assert Path("a.wav").read_bytes() == Path("b.wav").read_bytes()
+    assert read_audio("a.wav")[0].shape[0] == 4
+    capfd.readouterr()
+    assert "is called that" in error_of(capfd, *score, "-o", "c.wav", "--microphone-on", "cup")
+    assert "outside the room" in error_of(capfd, *score, "-o", "c.wav", "--room", "0.3x0.3x0.3")
+    assert not Path("c.wav").exists()
+
+
 def test_who_is_driven_sounds_and_who_is_set_elsewhere_is_silent(
     place: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,17 +14,21 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import json_option, scene_options
-from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, check_scene_file, is_log
+from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, check_scene_file, is_log
+from sonic_bullet.cli.scenes.space_options import OPTIONS as SPACE_OPTIONS
+from sonic_bullet.cli.scenes.space_options import SpaceWish, space_options
 from sonic_bullet.records.errors import AudioError, SceneError
 
 if TYPE_CHECKING:
     from sonic_bullet.live import Playback, PlaybackReport
+    from sonic_bullet.records import Sensor
 
 EPILOG = """\b
 Examples:
   sonic-bullet play scenes/tabletop.py
   sonic-bullet play my_sim.py --material wood --full-scale 2
   sonic-bullet play drop.npz --device "USB Audio"
+  sonic-bullet play drop.npz --head kemar.sofa --facing 0,0,0
   sonic-bullet play scenes/bar.py --device null      (no sound card: the same, unheard)
 The physics runs as fast as the card takes its sound. The last line says what was played, how late each step sounds,
 and how often there was nothing to play: then the scene is too much for this machine in real time; render it."""
@@ -50,12 +54,16 @@ CARD_OPTIONS = ("device", "full_scale_pa", "ahead_s")
     "--ahead", "ahead_s", type=float, metavar="S", help="How much sound waits: how late a step may be. [default: 0.018]"
 )
 @scene_options
+@space_options
 @json_option
 def play(scene: str, json_to: str | None, **options: Any) -> None:
     """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
     path = Path(scene)
     check_scene_file(scene, "play")
     materials = WantedMaterials.read(options.pop("material"), options.pop("silent"))
+    space = SpaceWish.read(**{name: options.pop(name) for name in SPACE_OPTIONS})
+    if not is_log(scene):
+        space.check_live()
     (json_to,) = places(json_to)
     given = {name: value for name, value in options.items() if value not in (None, ())}
     if given.get("device", "").isdecimal():
@@ -64,7 +72,7 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
         with progress_bar(path.name) as (progress, tell):
             show = _Show({name: given.pop(name) for name in CARD_OPTIONS if name in given}, progress, tell)
             try:
-                notes = (_play_log if is_log(scene) else _play_scene)(scene, given, materials, show)
+                notes = (_play_log if is_log(scene) else _play_scene)(scene, given, materials, space, show)
             except KeyboardInterrupt as error:
                 said = [str(error) or "stopped", *([str(show.report)] if show.playback is not None else [])]
                 raise KeyboardInterrupt("; ".join(said)) from error
@@ -101,18 +109,32 @@ class _Show:
             self._drawn_s = time.perf_counter()
 
 
-def _play_scene(scene: str, given: dict[str, Any], materials: WantedMaterials, show: _Show) -> tuple[str, ...]:
+def _play_scene(
+    scene: str, given: dict[str, Any], materials: WantedMaterials, space: SpaceWish, show: _Show
+) -> tuple[str, ...]:
     with quiet_stderr():
+        from sonic_bullet.files import check_sr
         from sonic_bullet.scene import run_scene
         from sonic_bullet.session import Listener
 
     def begin(listener: Listener) -> None:
         show.playback = listener.play(**show.card)
 
-    return run_scene(scene, begin, **given, **materials.options, progress=show, say=show.tell)
+    notes: list[str] = []
+
+    def receive(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
+        made, said = space.received(space.paths or sensors, check_sr(given.get("sr", DEFAULT_SR)))
+        notes.extend(said)
+        return made
+
+    if space:
+        given["receive"] = receive
+    return (*run_scene(scene, begin, **given, **materials.options, progress=show, say=show.tell), *notes)
 
 
-def _play_log(path: str, given: dict[str, Any], materials: WantedMaterials, show: _Show) -> tuple[str, ...]:
+def _play_log(
+    path: str, given: dict[str, Any], materials: WantedMaterials, space: SpaceWish, show: _Show
+) -> tuple[str, ...]:
     import numpy as np
 
     from sonic_bullet.files import check_sr, read_log
@@ -129,6 +151,9 @@ def _play_log(path: str, given: dict[str, Any], materials: WantedMaterials, show
         seed=given.get("seed", log.seed),
         sensors=tuple(Microphone(np.array(place)) for place in given.get("microphones", ())) or log.sensors,
     )
+    if space:
+        log, more = space.applied(log, path)
+        said = (*said, *more)
     seconds = as_number(given.get("seconds", log.duration_s), "seconds", "give --seconds above 0", above=0)
     log = log.first(int((log.start_s < seconds - 1e-9).sum()))
     frames = log_frames(log, say=show.tell)

@@ -137,6 +137,16 @@ def rendered_in_space(scene: str, wish: Wish, space: SpaceWish) -> RenderResult 
     return replayed(scene, wish) if is_log(scene) else simulated(scene, wish)
 
 
+def rendered_again(result: RenderResult, wish: Wish, space: SpaceWish, where: str) -> Replay:
+    """Render what was rendered once more, from its log, with other microphones or in a room."""
+    from sonic_bullet.render import render_notes
+
+    of_other_sensors = render_notes(result.sound, result.log)
+    said = tuple(note for note in result.notes if note not in of_other_sensors)
+    log, more = space.applied(result.log, where)
+    return rendered(log, wish, (*said, *more))
+
+
 def _check_takes_alone(outputs_given: dict[str, Any], others: dict[str, Any], session: SessionWish) -> None:
     """Raise FileError where an output of one sound is asked for of several takes."""
     given = outputs_given | {"--session": session.folder, "--cues": others["cues"] or None}

@@ -5,6 +5,7 @@ SpaceWish (options) -> checked -> sensors of a log, in the place of its own
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from sonic_bullet.records.errors import FileError, SceneError
 
 if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog
-    from sonic_bullet.records import Array, Body, Head, Microphone, SensorResponse, Vibrometer
+    from sonic_bullet.records import Array, Body, Head, Microphone, Sensor, SensorResponse, Vibrometer
 
 OPTIONS = (
     "ambisonics", "head", "facing", "microphone_path", "microphone_on", "contact_microphone", "vibrometer",
@@ -185,13 +186,29 @@ class SpaceWish:
 
     def applied(self, log: ContactLog, where: str) -> tuple[ContactLog, tuple[str, ...]]:
         """Give the log such sensors, and what a user should read of them. Raises SceneError."""
-        from sonic_bullet.records import Ambisonics, Binaural, Microphone
-
         moving: list[Any] = [*self.paths, *(_on_body(log, name, place, where) for name, place in self.on)]
         moving += [one.sensor(log, where) for one in self.touching]
-        sensors: list[Any] = list(moving or log.sensors)
-        notes = []
-        for i, one in enumerate(sensors):
+        sensors, notes = self.received(moving or log.sensors, log.sr)
+        return replace(log, sensors=sensors), notes
+
+    def check_live(self) -> None:
+        """Raise FileError where a microphone is on a body of a scene, which has no names before it runs."""
+        for option, given in (("--microphone-on", self.on), *((f"--{one.option}", one) for one in self.touching)):
+            if given:
+                raise FileError(
+                    f"{option} names a body, and bodies have names once a scene has run",
+                    "play its log: render SCENE.py -o NAME.wav --contacts NAME.npz",
+                )
+
+    def received(self, sensors: Sequence[Sensor], sr: int) -> tuple[tuple[Sensor, ...], tuple[str, ...]]:
+        """Let the microphones among sensors listen as is asked for; also return what a user should read.
+
+        Raises SceneError.
+        """
+        from sonic_bullet.records import Ambisonics, Binaural, Microphone
+
+        made, notes = list(sensors), []
+        for i, one in enumerate(made):
             if not isinstance(one, Microphone):
                 continue
             how: dict[str, Any] = {name: getattr(one, name) for name in ("quaternion_xyzw", "body_id", "link", "path")}
@@ -199,14 +216,14 @@ class SpaceWish:
             if self.facing is not None:
                 how["quaternion_xyzw"] = turn_to(one.position_m, self.facing)
             if self.ambisonics is not None:
-                sensors[i] = Ambisonics(**how, order=self.ambisonics)
+                made[i] = Ambisonics(**how, order=self.ambisonics)
             elif self.head is not None:
-                sensors[i] = Binaural(**how, head=self.head)
-                if self.head.sr != log.sr:
-                    notes.append(f"{self.head.name} is resampled from {self.head.sr} Hz to {log.sr} Hz")
+                made[i] = Binaural(**how, head=self.head)
+                if self.head.sr != sr:
+                    notes.append(f"{self.head.name} is resampled from {self.head.sr} Hz to {sr} Hz")
             elif self.facing is not None:
-                sensors[i] = replace(one, quaternion_xyzw=how["quaternion_xyzw"])
-        return replace(log, sensors=tuple(sensors)), tuple(dict.fromkeys(notes))
+                made[i] = replace(one, quaternion_xyzw=how["quaternion_xyzw"])
+        return tuple(made), tuple(dict.fromkeys(notes))
 
 
 def _on_body(log: ContactLog, name: str, place: tuple[float, ...], where: str) -> Microphone:

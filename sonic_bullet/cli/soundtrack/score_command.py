@@ -11,10 +11,15 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option
+from sonic_bullet.cli.scenes.room_options import OPTIONS as ROOM_OPTIONS
+from sonic_bullet.cli.scenes.room_options import read_room, room_options
+from sonic_bullet.cli.scenes.space_options import OPTIONS as SPACE_OPTIONS
+from sonic_bullet.cli.scenes.space_options import SpaceWish, space_options
 from sonic_bullet.cli.sound_level import OPTIONS, LevelWish, level_options, level_warnings
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 if TYPE_CHECKING:
+    from sonic_bullet.cli.scenes.scene_runs import Replay
     from sonic_bullet.scene import RenderResult
 
 EPILOG = """\b
@@ -23,6 +28,7 @@ Examples:
   sonic-bullet score keys.npz -o keys.wav --contacts heard.npz
   sonic-bullet render heard.npz -o again.wav --stems stems --events what.csv
   sonic-bullet score shot.glb -o shot.wav --scale 0.01 --fps 24
+  sonic-bullet score shot.glb -o shot.wav --ambisonics 1 --room 6x4x3
 A contact log that it writes goes to render and film as any other. docs/how-to/score-an-animation.md has a table of
 materials and an export script for Blender."""
 
@@ -45,41 +51,46 @@ materials and an export script for Blender."""
     help="A microphone in the world, in m, z up; repeat for more channels. [default: 0,-1,0.5]",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, help="Seed of the surfaces' roughness. [default: 0]")
+@space_options
+@room_options
 @json_option
 def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
     """Render a baked animation's sound (.glb .gltf .json .npz), or that of a scene's bodies that are moved by hand."""
     from sonic_bullet.cli.output import described_render
     from sonic_bullet.cli.scenes.render_outputs import summary, with_partial
+    from sonic_bullet.cli.scenes.scene_commands import rendered_again
+    from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, Wish
     from sonic_bullet.files import check_audio_output, check_sr, write_at_level, write_log
 
     sr, level = check_sr(options["sr"]), LevelWish(**{name: options[name] for name in OPTIONS})
     level.check()
     check_audio_output(output)
-    if contacts is not None and not contacts.endswith(".npz"):
-        raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
-    of_scene = Path(animation).suffix.lower() == ".py"
-    if of_scene and (options["table"] is not None or options["fps"] is not None or options["scale"] != 1):
-        raise FileError(
-            f"{animation} is a scene, which says its materials, step and lengths itself",
-            "leave out --materials, --fps and --scale",
-        )
+    of_scene = _check_options(animation, contacts, options)
+    space = SpaceWish.read(**{name: options[name] for name in SPACE_OPTIONS})
+    room = read_room(**{name: options[name] for name in ROOM_OPTIONS})
     to, contacts_to, json_to, _ = places(output, contacts, json_to, level.json_path(output))
     with clean_stdout(json_to) as say:
         with quiet_stderr():
             from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
         rules = rules_of(options["table"])
-        result: RenderResult | None = None
+        result: RenderResult | Replay | None = None
         try:
             with progress_bar(Path(animation).name) as (progress, tell):
                 how: dict[str, Any] = {"sr": sr, "seed": options["seed"], "progress": progress, "say": tell}
-                how["tail_db"] = level.tail_db
+                spatial = bool(space) or room is not None
+                how["tail_db"] = None if spatial else level.tail_db
                 if of_scene:
                     places_m = options["microphones"] or None
-                    result = score_scene(animation, microphones=places_m, material=options["material"], **how)
+                    scored = score_scene(animation, microphones=places_m, material=options["material"], **how)
                 else:
                     how |= {name: options[name] for name in ("fps", "scale")}
                     how |= {"rules": rules, "material": options["material"] or "plastic"}
-                    result = score_animation(animation, microphones=options["microphones"] or MICROPHONE, **how)
+                    scored = score_animation(animation, microphones=options["microphones"] or MICROPHONE, **how)
+                result = scored
+                if spatial:
+                    wish = Wish(None, None, (), None, WantedMaterials(), None, None, progress, tell)
+                    wish = replace(wish, tail_db=level.tail_db, room=room)
+                    result = rendered_again(scored, wish, space, animation)
             if contacts_to is not None:
                 write_log(contacts_to, result.log)
         except (SonicBulletError, KeyboardInterrupt) as error:
@@ -94,3 +105,16 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     write_json(json_to, described_render(result.log, report, notes) | {"scale": scale})
+
+
+def _check_options(animation: str, contacts: str | None, options: dict[str, Any]) -> bool:
+    """Return whether it is a scene that is scored; raises FileError where options contradict it, or each other."""
+    if contacts is not None and not contacts.endswith(".npz"):
+        raise FileError(f"cannot write {contacts}: contact logs are npz files", "end the name with .npz")
+    of_scene = Path(animation).suffix.lower() == ".py"
+    if of_scene and (options["table"] is not None or options["fps"] is not None or options["scale"] != 1):
+        raise FileError(
+            f"{animation} is a scene, which says its materials, step and lengths itself",
+            "leave out --materials, --fps and --scale",
+        )
+    return of_scene
