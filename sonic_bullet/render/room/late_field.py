@@ -79,21 +79,23 @@ def late_filters(
     level = np.sqrt(4 * np.pi * air.sound_speed_m_s / (x * y * z) / sr / len(TETRAHEDRON)) * np.sqrt(size / 2 / WAVES)
     middle = np.mean([one.position_m for one, _ in receivers], axis=0)
     half = spread_directions(WAVES // 2)[0]
-    from_all_around = np.concatenate([half, -half])
-    for far in range(len(TETRAHEDRON)):
-        spectrum = np.zeros((channels, len(frequency_hz)), complex)
-        for direction in from_all_around:
+    spectrum = np.zeros((len(TETRAHEDRON), channels, len(frequency_hz)), complex)
+    for direction in np.concatenate([half, -half]):
+        hears = []
+        for microphone, first in receivers:
+            early_s = direction @ (microphone.position_m - middle) / air.sound_speed_m_s
+            response = _response_of(microphone, direction, frequency_hz, sr)
+            if early_s != 0:
+                response = response * np.exp(2j * np.pi * early_s * frequency_hz)
+            hears.append((slice(first, first + microphone.channels), response))
+        for far in range(len(TETRAHEDRON)):
             wave = rng.standard_normal(2 * len(frequency_hz)).view(complex)
-            for microphone, first in receivers:
-                early_s = direction @ (microphone.position_m - middle) / air.sound_speed_m_s
-                here = wave if early_s == 0 else wave * np.exp(2j * np.pi * early_s * frequency_hz)
-                spectrum[first : first + microphone.channels] += here * _response_of(
-                    microphone, direction, frequency_hz, sr
-                )
-        for band, rate in enumerate(decay):
-            if np.isfinite(rate):
-                noise = np.fft.irfft(spectrum * weights[band], size)[:, :taps]
-                made[:, far] += level * np.exp(-rate * time_s) * noise
+            for channel, response in hears:
+                spectrum[far, channel] += wave * response
+    for band, rate in enumerate(decay):
+        if np.isfinite(rate):
+            noise = np.fft.irfft(spectrum * weights[band], size)[:, :, :taps]
+            made += level * np.exp(-rate * time_s) * noise.transpose(1, 0, 2)
     return made
 
 

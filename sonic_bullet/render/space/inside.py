@@ -21,19 +21,19 @@ def check_outside(
     microphones: Sequence[Microphone], bodies: Sequence[Body], position_m: Array, quaternion_xyzw: Array
 ) -> None:
     """Raise AudioError where a microphone begins within one of the bodies at poses (k, 3), (k, 4)."""
+    solid = [k for k, body in enumerate(bodies) if body.model is not None and len(body.model.face)]
+    vertices = [bodies[k].model.vertex_m for k in solid]  # type: ignore[union-attr]
+    least = np.array([vertex.min(axis=0) for vertex in vertices]).reshape(-1, 3)
+    most = np.array([vertex.max(axis=0) for vertex in vertices]).reshape(-1, 3)
     for c, one in enumerate(microphones):
-        for body, place, turned in zip(bodies, position_m, quaternion_xyzw, strict=True):
-            if body.model is None or not len(body.model.face):
-                continue
-            if one.body_id is None:
-                here = turn_back(turned, one.position_m - place)
-            elif (one.body_id, one.link) == (body.body_id, body.link):
-                here = one.position_m
-            else:
-                continue
-            vertex = body.model.vertex_m
-            if (here < vertex.min(axis=0)).any() or (here > vertex.max(axis=0)).any():
-                continue
+        if one.body_id is None:
+            place = turn_back(quaternion_xyzw[solid], one.position_m - position_m[solid])
+        else:
+            own = [(one.body_id, one.link) == (bodies[k].body_id, bodies[k].link) for k in solid]
+            place = np.where(np.array(own, bool)[:, None], one.position_m, np.nan)
+        for n in np.flatnonzero(((place >= least) & (place <= most)).all(axis=1)):
+            body, vertex, here = bodies[solid[n]], vertices[n], place[n]
+            assert body.model is not None
             if abs(winding_number(here, vertex[body.model.face])) > 0.5:
                 raise AudioError(
                     f"microphone {c} lies within {with_body_id(body.name, body.body_id)}",
