@@ -142,6 +142,7 @@ def test_roughness_and_gain_set_what_they_name() -> None:
     ("words", "said"),
     [
         (("--gain", "bar=-6", "--gain", "bar=3"), "--gain names bar twice"),
+        (("--silent", "bar", "--silent", "bar"), "--silent names bar twice"),
         (("--gain", "cup=-6"), "is called 'cup'"),
         (("--gain", "-6"), "NAME=NUMBER"),
         (("--gain", "bar=loud"), "NAME=NUMBER"),

@@ -54,6 +54,9 @@ class WantedMaterials:
                 named[name] = of
             else:
                 everyone = of
+        twice = next((name for name in silent if silent.count(name) > 1), None)
+        if twice is not None:
+            raise FileError(f"--silent names {twice} twice", "give it once")
         return cls(everyone, named, silent)
 
     @property
