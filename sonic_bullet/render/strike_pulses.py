@@ -17,6 +17,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.render.contact_place import add_push, effective_mass, flat_area_m2, touch
 from sonic_bullet.render.contact_rows import opening
+from sonic_bullet.render.struck.strike_causes import accept, date_strikes
 from sonic_bullet.synth.pulse import compliance, pulse_length
 from sonic_bullet.synth.strikes import NOW, SPAN
 
@@ -29,8 +30,6 @@ STRUCK_FLAT = 0.02
 LEAST_JUMP_M_S = 1e-6
 """An impact that changes the speed of its effective mass by less is ignored: a body of 10 cm sends 0 dB SPL to 1 m
 then."""
-ROUNDS = 8
-"""Bodies that an impact travels through in one physics step at most."""
 STEPS = SPAN - 1
 """Steps that one strike takes at most."""
 RECREATED = 3.0
@@ -51,8 +50,12 @@ STRIKE = np.dtype(
         ("centre_m", "f8", (3,)),  # of its points, in the lower body's frame
         ("approach_m_s", "f8"),
         ("meets_s", "f8"),  # after the start of its first step; negative where the surfaces overlap already
+        ("dated", "i8"),  # 1 where meets_s is known
+        ("overlaps", "i8"),  # 1 where the surfaces overlap as its first step starts
         ("budget_n_s", "f8"),  # what the approach can cause
         ("accepted_n_s", "f8"),
+        ("pulse", "i8"),  # its row among the pulses, -1 where it is not audible
+        ("length_s", "f8"),  # of it
     ],
     align=True,
 )
@@ -65,8 +68,8 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
 
     They are written to scratch.pulse and push (pulses, 2, columns) from ``found`` on; returns the new number. Loads
     that they use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving volume)
-    are skipped, and those of which neither moves. A strike is dated back, where the bodies overlap as the step starts,
-    to the start of the step being rendered at most.
+    are skipped, and those of which neither moves. A strike is dated by gap and approach (`_gather`), else
+    by `date_strikes`; where the bodies overlap as the step starts, back into the step being rendered.
 
     Parameters
     ----------
@@ -75,7 +78,7 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
     """
     bodies, here, turned = table.bodies, window.step[number % SPAN], window.quaternion_xyzw[number % SPAN]
     dt_s, g = here.dt_s, here.gravity_m_s2
-    earliest_s = -window.step[(number - 1) % SPAN].dt_s if ahead else 0.0
+    back_s = window.step[(number - 1) % SPAN].dt_s
     for i in range(pairs.count[0]):
         pair = pairs.pair[pairs.active[i]]
         if pair.force_n[NOW + ahead - 1] > 0:
@@ -90,7 +93,7 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
     caused = False
     for q in range(struck):
         strike = strikes[q]
-        _gather(strike, window.row)
+        _gather(strike, window.row, back_s, dt_s)
         n, low, high = strike.normal, strike.body[0], strike.body[1]
         # a tenth for a solver's remainder, a hundredth in every direction for wedged bodies
         fall = 1.1 * abs(n[0] * g[0] + n[1] * g[1] + n[2] * g[2]) * dt_s + 0.01 * gravity
@@ -102,11 +105,17 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
     if caused:
         accept(strikes, struck, bodies, held)
         for q in range(struck):
-            if strikes[q].accepted_n_s > 0:
-                pulse = scratch.pulse[found]
-                if _make(strikes[q], turned, window.row, table, pulse, scratch.push[found]):
-                    pulse.start_s, pulse.ahead = min(max(strikes[q].meets_s, earliest_s), dt_s), ahead
-                    found += 1
+            strike, pulse = strikes[q], scratch.pulse[found]
+            strike.pulse, strike.length_s = -1, 0.0
+            if strike.accepted_n_s > 0 and _make(strike, turned, window.row, table, pulse, scratch.push[found]):
+                strike.pulse, strike.length_s = found, pulse.length_s
+                found += 1
+        date_strikes(strikes, struck, bodies, held, back_s, dt_s)
+        for q in range(struck):
+            if strikes[q].pulse >= 0:
+                pulse, meets_s = scratch.pulse[strikes[q].pulse], strikes[q].meets_s
+                late_s = 0.0 if ahead or meets_s >= 0.0 else back_s  # found a step late: it keeps its phase
+                pulse.start_s, pulse.ahead = min(meets_s + late_s, dt_s), ahead
     return found
 
 
@@ -206,10 +215,15 @@ def set_unheld_steps(ahead, number, pairs, bodies, held):
 
 
 @njit(nogil=True, error_model="numpy")
-def _gather(strike, rows):
-    """Sum over a strike's rows, each weighted by the fraction of its step that is strike; no budget as yet."""
+def _gather(strike, rows, back_s, dt_s):
+    """Sum over a strike's rows, each weighted by the fraction of its step that is strike; no budget as yet.
+
+    It is dated to gap/approach of the row with the largest product of load and approach, of those that met within the
+    step or the one before, dt_s and back_s long. A gap of exactly 0 is one that nobody knows.
+    """
     j, n, arm, centre = strike.impulse_n_s, strike.normal, strike.arm_m, strike.centre_m
-    raw, approach, meets = 0.0, 0.0, np.inf
+    raw, approach, most = 0.0, 0.0, 0.0
+    strike.dated = strike.overlaps = 0
     for x in range(3):
         j[x] = n[x] = arm[0, x] = arm[1, x] = centre[x] = 0.0
     for delay in range(STEPS):
@@ -220,8 +234,12 @@ def _gather(strike, rows):
                 load, speed = row.load_n_s * share, row.approach_m_s
                 raw += load
                 approach = max(approach, speed)
-                if delay == 0 and speed > 0:
-                    meets = min(meets, row.gap_m / speed)
+                if delay == 0 and row.gap_m < 0.0:
+                    strike.overlaps = 1
+                if delay == 0 and load * speed > most and row.gap_m != 0.0:
+                    meets_s = row.gap_m / speed
+                    if -back_s <= meets_s <= dt_s:
+                        most, strike.meets_s, strike.dated = load * speed, meets_s, 1
                 for x in range(3):
                     j[x] += share * row.impulse_n_s[x]
                     n[x] += load * row.normal[x]
@@ -229,7 +247,6 @@ def _gather(strike, rows):
                     for side in range(2):
                         arm[side, x] += load * row.arm_m[side, x]
     strike.raw_n_s, strike.approach_m_s, strike.budget_n_s = raw, approach, 0.0
-    strike.meets_s = meets if np.isfinite(meets) else 0.0
     length = 0.0
     for x in range(3):
         n[x] /= max(raw, 1e-300)
@@ -239,35 +256,6 @@ def _gather(strike, rows):
             arm[side, x] /= max(raw, 1e-300)
     for x in range(3):
         n[x] /= max(np.sqrt(length), 1e-300)
-
-
-@njit(nogil=True, error_model="numpy")
-def accept(strikes, count, bodies, through):
-    """Bound strike impulses by their cause: the own budget, or that of a neighbour struck in the same step.
-
-    A body that never moves transmits nothing: the floor. through (b,): scratch. The largest neighbour counts, not the
-    sum: solver noise of a pile must not add up to an impact.
-    """
-    for q in range(count):
-        strikes[q].accepted_n_s = min(strikes[q].raw_n_s, strikes[q].budget_n_s)
-    grown, rounds = True, 0
-    while grown and rounds < ROUNDS:
-        for q in range(count):
-            for side in range(2):
-                through[strikes[q].body[side]] = 0.0
-        for q in range(count):
-            for side in range(2):
-                body = strikes[q].body[side]
-                if bodies[body].mass_kg > 0:
-                    through[body] = max(through[body], strikes[q].accepted_n_s)
-        grown = False
-        for q in range(count):
-            strike = strikes[q]
-            handed = max(through[strike.body[0]], through[strike.body[1]])
-            more = min(strike.raw_n_s, max(strike.budget_n_s, handed))
-            grown = grown or more != strike.accepted_n_s
-            strike.accepted_n_s = more
-        rounds += 1
 
 
 @njit(nogil=True, error_model="numpy")

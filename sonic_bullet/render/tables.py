@@ -56,6 +56,7 @@ BODY = np.dtype(
         ("cause_step", "i8"),
         ("since_m_s", "f8"),  # approach of the fastest such strike after that one, and its step
         ("since_step", "i8"),
+        ("spread", "i8"),  # strikes dated by its phase so far (synth.strikes.phase_in_step)
     ],
     align=True,
 )

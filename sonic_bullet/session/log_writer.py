@@ -126,10 +126,10 @@ class LogWriter:
         contacts
             The rest, by keyword, k contacts. ``pair`` (k, 2): numbers of the bodies a and b. ``point_m`` (k, 3): where
             they touched at the start, world. ``normal`` (k, 3): unit, from b to a. ``impulse_n_s`` (k, 3): what the
-            step gave to a, friction included. ``gap_m`` (k,): distance at the start, negative where they overlapped; 0
-            if left out. ``velocity_m_s``, ``spin_rad_s`` (b, 3): at the start, of the centres of mass; differences of
-            the poses if left out. ``gravity_m_s2`` (3,): 9.81 downwards if left out. ``moved``: numbers of bodies set
-            elsewhere by hand since the last step.
+            step gave to a, friction included. ``gap_m`` (k,): distance at the start, negative where they overlapped,
+            which tells when they met; 0 or left out: not known. ``velocity_m_s``, ``spin_rad_s`` (b, 3): at the start,
+            of the centres of mass; differences of the poses if left out. ``gravity_m_s2`` (3,): 9.81 downwards if left
+            out. ``moved``: numbers of bodies set elsewhere by hand since the last step.
 
         Raises
         ------

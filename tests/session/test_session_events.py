@@ -179,7 +179,8 @@ def test_a_log_of_an_earlier_version_replays_as_before() -> None:
     """A box and a ball fall, the ball is removed: tests/data/falling.npz, with the sound that it had when it was made.
 
     The same bits on the machine that made them; elsewhere compilers round otherwise. The microphone's row was made anew
-    when the phase at which a mode radiates ceased to hang on one direction; the second row, a vibrometer's, never was.
+    when the phase at which a mode radiates ceased to hang on one direction, and both when the fourth of its five
+    strikes, found a step late, was no longer set on the step's edge.
     """
     folder = Path(__file__).parents[1] / "data"
     log = sb.read_log(str(folder / "falling.npz"))

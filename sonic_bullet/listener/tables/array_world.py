@@ -193,7 +193,8 @@ class ArrayWorld(MotionWorld):
         point_m, normal, impulse_n_s : Array, shape (k, 3)
             Where they touched at its start, unit from b to a, and what the step gave to a, friction included; world.
         gap_m : Array, shape (k,)
-            Distance at its start, negative where they overlapped; None: 0.
+            Distance at its start, negative where they overlapped, which tells when they met; 0 or None:
+            not known.
         velocity_m_s, spin_rad_s : Array, shape (b, 3)
             At its start, of the centre of mass; both None: by differences of the poses.
         gravity_m_s2 : Array, shape (3,)

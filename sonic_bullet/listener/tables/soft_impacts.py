@@ -34,6 +34,7 @@ SOFT_IMPACT = np.dtype(
         ("key", "i8"),  # lower body << 32 | higher body
         ("approach_m_s", "f8"),  # largest closing speed so far
         ("latest_m_s", "f8"),
+        ("meets_s", "f8"),  # gap over approach as it began: after the start of its first step; 0: not known
         ("support_n", "f8"),  # load before it began, or the weight
         ("peak_n", "f8"),  # largest load so far
         ("steps", "i8"),
@@ -53,7 +54,8 @@ HELD_POINT = np.dtype(
     align=True,
 )
 LOAD = np.dtype(
-    [("key", "i8"), ("force_n", "f8"), ("weight_n", "f8"), ("approach_m_s", "f8"), ("impact", "i8")], align=True
+    [("key", "i8"), ("force_n", "f8"), ("weight_n", "f8"), ("approach_m_s", "f8"), ("gap_m", "f8"), ("impact", "i8")],
+    align=True,
 )
 """A pair in one step. impact: its place among the impacts, or -1."""
 
@@ -173,10 +175,10 @@ def hold(row, key, fraction, held, counts):
 
 
 @njit(nogil=True, error_model="numpy")
-def give_out(one, approach, to):
-    """Write a held point as a row of a strike that begins with the step."""
+def give_out(one, impact, to):
+    """Write a held point as a row of a strike, as far into the step as the surfaces met in the impact's first."""
     copy_row(one.row, to, 1.0)
-    to.approach_m_s, to.gap_m = approach, 0.0
+    to.approach_m_s, to.gap_m = impact.approach_m_s, impact.meets_s * impact.approach_m_s
     length = 0.0
     for x in range(3):
         length += to.normal[x] ** 2
@@ -218,10 +220,10 @@ def sum_loads(row, weight, dt, now, counts):
             at = counts[PAIRS]
             counts[PAIRS] += 1
             now[at].key, now[at].force_n, now[at].approach_m_s, now[at].impact = key, 0.0, -np.inf, -1
-            now[at].weight_n = weight[i]
+            now[at].weight_n, now[at].gap_m = weight[i], 0.0
         now[at].force_n += load / dt
-        if load > 0:
-            now[at].approach_m_s = max(now[at].approach_m_s, row[i].approach_m_s)
+        if load > 0 and row[i].approach_m_s > now[at].approach_m_s:
+            now[at].approach_m_s, now[at].gap_m = row[i].approach_m_s, row[i].gap_m
 
 
 @njit(nogil=True, error_model="numpy")
@@ -253,6 +255,7 @@ def follow(one, dt, fall, tables):
         new.key, new.support_n, new.steps, new.elapsed_s = one.key, max(support, one.weight_n), 0, 0.0
         new.peak_n = 0.0
         new.approach_m_s = new.latest_m_s = one.approach_m_s
+        new.meets_s = one.gap_m / one.approach_m_s
     it = impact[at]
     change = abs(it.latest_m_s - one.approach_m_s)
     it.approach_m_s, it.latest_m_s = max(it.approach_m_s, one.approach_m_s), one.approach_m_s
@@ -272,7 +275,7 @@ def finish(impact, held, out, counts):
     for i in range(counts[HELD_COUNT]):
         one = impact[place_of(impact, counts[IMPACTS], held[i].key)]
         if one.over != 0:
-            give_out(held[i], one.approach_m_s, out[counts[ROWS]])
+            give_out(held[i], one, out[counts[ROWS]])
             counts[ROWS] += 1
         else:
             held[kept] = held[i]

@@ -1,0 +1,1 @@
+"""What strikes of one physics step have to do with each other."""
