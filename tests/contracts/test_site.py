@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -67,3 +68,33 @@ def test_the_build_is_strict() -> None:
     settings = (REPO / "mkdocs.yml").read_text(encoding="utf-8")
     for check in ("omitted_files", "absolute_links", "unrecognized_links", "anchors"):
         assert f"  {check}: warn\n" in settings
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("more", "passes"), [("", True), ("\n[nowhere](start/nowhere.md)\n", False)])
+def test_the_site_is_built_unless_a_link_is_dead(tmp_path: Path, more: str, passes: bool) -> None:
+    pytest.importorskip("mkdocs")
+    from mkdocs.commands.build import build
+    from mkdocs.config import load_config
+    from mkdocs.exceptions import Abort
+
+    docs, media = tmp_path / "docs", tmp_path / "media"
+    shutil.copytree(DOCS, docs)
+    (docs / "glossary.md").write_text((DOCS / "glossary.md").read_text(encoding="utf-8") + more, encoding="utf-8")
+    config = load_config(str(REPO / "mkdocs.yml"), strict=True, docs_dir=str(docs), site_dir=str(tmp_path / "site"))
+    own = config.hooks["docs/site_hooks.py"]
+    own.MEDIA = media
+    for name in own.SHOWN.findall((DOCS / "gallery.md").read_text(encoding="utf-8")):
+        for end in ("png", "flac"):
+            place = media / f"{name}.{end}"
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(b"made by docs/make_media.py")
+    config.plugins.on_startup(command="build", dirty=False)
+    if passes:
+        build(config)
+        page = (tmp_path / "site" / "gallery.html").read_text(encoding="utf-8")
+        assert page.count("<audio ") == page.count("<figure>") == 13
+        assert 'id="attach"' in (tmp_path / "site" / "reference" / "api.html").read_text(encoding="utf-8")
+    else:
+        with pytest.raises(Abort, match="1 warnings in strict mode"):
+            build(config)
