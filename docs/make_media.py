@@ -20,15 +20,17 @@ from pathlib import Path
 REPO = Path(__file__).resolve().parents[1]
 MEDIA = REPO / "build" / "media"
 FIRST = REPO / "docs" / "start" / "pictures" / "first-sound.png"
-SHOWN = re.compile(r"^\[`?((?:examples|scenes)/\w+\.py)`?\]\(", re.M)
+SHOWN = re.compile(r"^\[(Picture and sound of )?((?:examples|scenes)/\w+)\.py\]\([./]*\2\.py\)$", re.M)
+"""A line of a page that shows a script: a link to it and nothing else, with or without its code."""
+
 RENDER = "from sonic_bullet.cli import main; main()"
 
 
 def shown_scripts() -> list[Path]:
     """Return the scripts that pages show."""
     pages = sorted((REPO / "docs").rglob("*.md"))
-    names = (name for page in pages for name in SHOWN.findall(page.read_text(encoding="utf-8")))
-    return [REPO / name for name in dict.fromkeys(names)]
+    names = (found[2] for page in pages for found in SHOWN.finditer(page.read_text(encoding="utf-8")))
+    return [REPO / f"{name}.py" for name in dict.fromkeys(names)]
 
 
 def content_key(script: Path) -> str:

@@ -2,7 +2,8 @@
 
 navigation      the headings and links of docs/README.md
 API             docs/reference/api.md as mkdocstrings makes it of the same names
-examples        a line that is a link to a script of examples/ or scenes/ -> code, picture, sound (docs/make_media.py)
+examples        a line that is a link to a script of examples/ or scenes/ -> code, picture, sound (docs/make_media.py);
+                [Picture and sound of …] leaves the code out
 links           to files of the project outside docs/ -> a page of the site that shows the file
 anchors         as a forge makes them, so that one link serves both
 """
@@ -18,9 +19,12 @@ from pathlib import Path
 from typing import Any
 
 REPO = Path(__file__).resolve().parents[1]
-MEDIA = REPO / "build" / "media"
+if str(REPO / "docs") not in sys.path:  # as here, all imports: MkDocs resets the path once hooks are loaded
+    sys.path.insert(0, str(REPO / "docs"))
+from make_media import MEDIA, SHOWN  # noqa: E402
+from make_reference import api_names  # noqa: E402
+
 LINK = re.compile(r"(?<=\]\()([^)\s#:]+)(?=[#)])")
-SHOWN = re.compile(r"^\[`?((?:examples|scenes)/\w+)\.py`?\]\([./]*\1\.py\)$", re.M)
 FENCED = re.compile(r"^```.*?^```", re.S | re.M)
 
 
@@ -109,7 +113,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
         return posixpath.relpath(site_name(target), posixpath.dirname(uri) or ".")
 
     def example(found: re.Match[str]) -> str:
-        return show_script(found[1], posixpath.dirname(uri), files)
+        return show_script(found[2], posixpath.dirname(uri), files, code=not found[1])
 
     return outside_fences(markdown, lambda text: LINK.sub(site_link, SHOWN.sub(example, text)))
 
@@ -123,29 +127,25 @@ def outside_fences(markdown: str, change: Callable[[str], str]) -> str:
     return "".join([*parts, change(markdown[end:])])
 
 
-def show_script(name: str, folder: str, files: Any) -> str:
-    """Show a script: its code, and the picture and the sound that it makes. What is missing is a warning."""
+def show_script(name: str, folder: str, files: Any, *, code: bool) -> str:
+    """Show a script: its code, if asked for, its picture and its sound. What is missing is a warning."""
     from mkdocs.plugins import get_plugin_logger
 
-    code = (REPO / f"{name}.py").read_text(encoding="utf-8")
+    source = (REPO / f"{name}.py").read_text(encoding="utf-8")
     place = {}
     for end in ("png", "flac"):
         place[end] = posixpath.relpath(f"media/{name}.{end}", folder or ".")
         if files.get_file_from_path(f"media/{name}.{end}") is None:
             get_plugin_logger("site_hooks").warning(f"{name}.py has no .{end}: python docs/make_media.py {name}.py")
     return (
-        f'```python title="{name}.py"\n{code}```\n\n'
-        f'<figure><img src="{place["png"]}" alt="what {name}.py draws" loading="lazy"></figure>\n\n'
+        (f'```python title="{name}.py"\n{source}```\n\n' if code else "")
+        + f'<figure><img src="{place["png"]}" alt="what {name}.py draws" loading="lazy"></figure>\n\n'
         f'<audio controls preload="none" style="width: 100%" src="{place["flac"]}"></audio>\n'
     )
 
 
 def api_page() -> str:
     """Return the names of docs/reference/api.md as mkdocstrings' blocks, below the same headings."""
-    if str(REPO / "docs") not in sys.path:
-        sys.path.insert(0, str(REPO / "docs"))
-    from make_reference import api_names
-
     parts = ["# API", "SI units throughout; `(k, 3)` is an array's shape."]
     for module, what, names in api_names():
         parts += [f"## {module}", what]

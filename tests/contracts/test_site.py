@@ -84,7 +84,7 @@ def test_the_site_is_built_unless_a_link_is_dead(tmp_path: Path, more: str, pass
     config = load_config(str(REPO / "mkdocs.yml"), strict=True, docs_dir=str(docs), site_dir=str(tmp_path / "site"))
     own = config.hooks["docs/site_hooks.py"]
     own.MEDIA = media
-    for name in own.SHOWN.findall((DOCS / "gallery.md").read_text(encoding="utf-8")):
+    for _, name in own.SHOWN.findall((DOCS / "gallery.md").read_text(encoding="utf-8")):
         for end in ("png", "flac"):
             place = media / f"{name}.{end}"
             place.parent.mkdir(parents=True, exist_ok=True)
