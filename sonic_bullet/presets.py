@@ -27,8 +27,10 @@ from sonic_bullet.effects.damping_law.damping_form import (
     NotNegative,
     Positive,
     PresetPart,
+    Thermal,
     law_of,
     rayleigh_pair,
+    thermoelastic_of,
 )
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
@@ -124,6 +126,7 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     damping: Damping
     surface: Surface
     impact: Restitution
+    thermal: Thermal | None = None
     note: str = ""
     effects: tuple[dict[str, Any], ...] = ()
     residual: ResidualForm | None = None
@@ -230,7 +233,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "roughness_m": preset.surface.roughness_m,
         "hurst": preset.surface.hurst,
         "restitution": preset.impact.restitution,
-        "effects": (*law_of(preset.damping), *_effects(preset, label)),
+        "effects": _effects(preset, label),
         "includes_radiation": total_damping(preset),
         "residual": residual_of(preset.residual, f"preset {label}") if preset.residual is not None else None,
         "source": f"elasticity: {elastic.source} | damping: {preset.damping.source} | surface: {preset.surface.source} "
@@ -267,7 +270,10 @@ def total_damping(preset: Preset) -> bool:
 
 
 def _effects(preset: Preset, label: str) -> tuple[Effect, ...]:
+    """Return the law of a preset's damping, its loss by heat where no recording holds that, and its own effects."""
+    elastic = (preset.elasticity.youngs_pa, preset.elasticity.poisson, preset.density_kg_m3)
     try:
-        return tuple(effect_of(data) for data in preset.effects)
+        heat = () if total_damping(preset) else thermoelastic_of(preset.thermal, elastic)
+        return (*law_of(preset.damping), *(effect_of(data) for data in preset.effects), *heat)
     except RecordError as error:
         raise MaterialError(f"preset {label}: {error.what}", error.remedy) from error

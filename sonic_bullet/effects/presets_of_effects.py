@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.damping_law.thermoelastic import ThermoelasticLoss
 from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
 from sonic_bullet.effects.recorded_lines import RecordedLines
@@ -22,8 +23,15 @@ from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import MaterialError, RecordError
 
-KEPT: tuple[type[Effect], ...] = (DampingLaw, ModeSplitting, AmplitudePitch, AmplitudeDamping, RecordedLines)
-"""Effects that a preset may hold.
+KEPT: tuple[type[Effect], ...] = (
+    DampingLaw,
+    ThermoelasticLoss,
+    ModeSplitting,
+    AmplitudePitch,
+    AmplitudeDamping,
+    RecordedLines,
+)
+"""Effects that a preset may hold, and a log.
 
 A stiffness that depends on direction is the preset's own elasticity; radiation is the run time's own.
 """
@@ -121,6 +129,11 @@ def with_modes(model: ModalModel, material: Material) -> ModalModel:
         damping_growth_s_m=ring.damping_growth,
         damping_growth_power=ring.damping_growth_power,
     )
+
+
+def needs_exact_shapes(material: Material) -> bool:
+    """Tell whether a material's effects on modes derive something from their shapes, before these are rounded."""
+    return any(isinstance(effect, ThermoelasticLoss) for effect in material.effects)
 
 
 def of_stage(material: Material, stage: Stage) -> Sequence[Effect]:

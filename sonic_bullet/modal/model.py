@@ -59,6 +59,7 @@ def analyse(
     thickness_m: float | None = None,
     accuracy: float = 0.01,
     edge_m: float | None = None,
+    exact_shapes: bool = False,
     cache: Path | Literal["default"] | None = "default",
     progress: Callable[[str], None] | None = None,
 ) -> ModalModel:
@@ -79,6 +80,8 @@ def analyse(
         Relative, of the highest frequency; the note says what is reached.
     edge_m
         Element size, by default from a budget of unknowns.
+    exact_shapes
+        Shapes as solved, for whoever derives strains from them and rounds them then; else rounded.
     cache
         Folder, "default" or None.
     progress
@@ -127,10 +130,11 @@ def analyse(
     large = oversize(unit.vertex_m, mass)
     if large:
         note += f"; it {large}"
+    shape = unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3))
     return ModalModel(
         freq_hz=freq,
         decay_per_s=decay,
-        shape=rounded(unit.vector[:, :, alive] / np.float32(np.sqrt(material.density_kg_m3 * of.length_m**3))),
+        shape=shape if exact_shapes else rounded(shape),
         vertex_m=unit.vertex_m,
         face=unit.face,
         curvature_per_m=unit.curvature_per_m,

@@ -31,8 +31,12 @@ def check_isotropic(material: Material) -> None:
         )
 
 
-def model_of_size(family: Family, material: Material, size: float, to_hz: float) -> tuple[ModalModel, Array]:
+def model_of_size(
+    family: Family, material: Material, size: float, to_hz: float, *, exact_shapes: bool = False
+) -> tuple[ModalModel, Array]:
     """Make the model of a family's body times ``size`` of an isotropic material.
+
+    exact_shapes: as of `modal.analyse`.
 
     Returns
     -------
@@ -48,12 +52,13 @@ def model_of_size(family: Family, material: Material, size: float, to_hz: float)
     freq_hz, decay_per_s, alive = damped(value, material)
     skin = family.skin.reshape(-1, family.skin.shape[2])
     shape = skin @ (vector[:, alive] / np.sqrt(density * length_m**3)).astype(np.float32)
+    shape = shape.reshape(*family.skin.shape[:2], -1)
     dropped = len(value) - len(alive)
     left_out = f"; {format_count(dropped, 'overdamped mode')} dropped" if dropped else ""
     model = ModalModel(
         freq_hz=freq_hz,
         decay_per_s=decay_per_s,
-        shape=rounded(shape.reshape(*family.skin.shape[:2], -1)),
+        shape=shape if exact_shapes else rounded(shape),
         vertex_m=family.vertex_m * size,
         face=family.face,
         curvature_per_m=family.curvature_per_m / size,

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.effects.presets_of_effects import with_material, with_modes
+from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_material, with_modes
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
@@ -71,11 +71,11 @@ class KnownShape:
             raise ModalError(
                 f"{made.name} has a lower E/density than the shape is known for", "add it to its materials"
             )
-        plain, mine = model_of_size(self.family, made, size, self.to_hz)
+        plain, mine = model_of_size(self.family, made, size, self.to_hz, exact_shapes=needs_exact_shapes(made))
         model = with_modes(plain, made)
         if model is not plain:
             model = replace(model, shape=rounded(model.shape))
-        if model.mode_count == plain.mode_count and np.array_equal(model.shape, plain.shape):
+        if model.mode_count == plain.mode_count and np.array_equal(model.shape, rounded(plain.shape)):
             self._put_radiation(model, mine, made, size, air or Air())
         return model
 

@@ -51,6 +51,7 @@ def build(client):
     return {{bar: "d.json"}}
 """
 BAR_M, SQUARE_M, PLATE_M = (0.18, 0.025, 0.006), (0.2, 0.012, 0.012), (0.2, 0.14, 0.002)
+STRIP_M = (0.18, 0.012, 0.001)
 WITHIN = 0.02
 
 
@@ -222,6 +223,17 @@ def test_a_stiffness_that_depends_on_direction_is_heard(folder: Path) -> None:
     assert two / one == pytest.approx(ratio, rel=WITHIN)
     freq, decay, _ = played.line(played.freq_hz[0])
     assert decay == pytest.approx(0.5 * (4.0 + 5e-9 * (2 * np.pi * freq) ** 2), rel=WITHIN)
+
+
+def test_loss_by_heat_is_in_the_sound(folder: Path) -> None:
+    """A strip bends about one axis: its lowest mode loses what a beam loses, beside the material's own."""
+    heat = next(one for one in load_material("aluminium").effects if one.id == "thermoelastic")
+    played = Played(folder, STRIP_M, "aluminium")
+    mode = played.freq_hz[0]
+    own = 0.5 * np.array(load_material("aluminium").alpha_per_s)  # β is nothing at 160 Hz
+    beam = np.pi * mode * heat.loss_of_beam(np.array(STRIP_M[2]), np.array(2 * np.pi * mode))
+    assert played.line(mode, 0.05, 0.45)[1] == pytest.approx(own + beam, rel=WITHIN)
+    assert beam > 2 * own
 
 
 def test_every_effect_that_a_preset_can_hold_is_played_here() -> None:

@@ -20,7 +20,9 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.records.errors import MaterialError
+from sonic_bullet.effects.damping_law.thermoelastic import ThermoelasticLoss
+from sonic_bullet.effects.protocol import Effect
+from sonic_bullet.records.errors import MaterialError, RecordError
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -63,6 +65,14 @@ class Damping(PresetPart, frozen=True):
     includes_radiation: bool | None = None
 
 
+class Thermal(PresetPart, frozen=True):
+    """What a metal loses by heat depends on: linear expansion, conductivity, specific heat."""
+
+    expansion_per_k: Positive
+    conductivity_w_m_k: Positive
+    heat_capacity_j_kg_k: Positive
+
+
 def rayleigh_of_loss_factor(eta: float, low_hz: float, high_hz: float) -> tuple[float, float]:
     """Compute (alpha_per_s, beta_s) whose loss is ``eta`` at both frequencies; the module's head has the equations."""
     w1, w2 = 2 * math.pi * low_hz, 2 * math.pi * high_hz
@@ -97,4 +107,23 @@ def rayleigh_pair(damping: Damping, label: str) -> tuple[float, float]:
     raise MaterialError(
         f"preset {label}: damping is neither Rayleigh's pair nor a loss factor",
         "give alpha_per_s and beta_s, or loss_factor, alone or with equal_at_hz, or with exponent and floor_s",
+    )
+
+
+def thermoelastic_of(thermal: Thermal | None, elastic: tuple[float | None, float | None, float]) -> tuple[Effect, ...]:
+    """Return the thermoelastic loss of a material with (E, ν, ρ), none where no heat is stated."""
+    youngs_pa, poisson, density_kg_m3 = elastic
+    if thermal is None:
+        return ()
+    if youngs_pa is None or poisson is None:
+        raise RecordError("thermal numbers of a material that is not isotropic", "leave `thermal` out")
+    return (
+        ThermoelasticLoss(
+            youngs_pa,
+            poisson,
+            density_kg_m3,
+            thermal.expansion_per_k,
+            thermal.conductivity_w_m_k,
+            thermal.heat_capacity_j_kg_k,
+        ),
     )
