@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from sonic_bullet.dataset.cluster_jobs import open_cluster, run_on_cluster
 from sonic_bullet.dataset.job_processes import Failed, run_jobs
 from sonic_bullet.dataset.loaders.layouts import check_formats, write_layout
 from sonic_bullet.dataset.object_splits import SHARES, object_names, splits_of
@@ -62,6 +63,7 @@ def make_dataset(
     limit_s: float = 300.0,
     formats: Sequence[str] = (),
     shares: Mapping[str, float] = SHARES,
+    scheduler: str | None = None,
     say: Say = lambda text: None,
 ) -> DatasetSummary:
     """Make the samples below ``count`` that the folder has not.
@@ -76,6 +78,8 @@ def make_dataset(
         Of `FORMATS`: layouts in which the folder's samples are written once more.
     shares
         Of the objects, by split.
+    scheduler
+        Address of a Dask scheduler whose workers make the samples, in place of processes of this machine.
     say
         Called with how far it is.
 
@@ -94,18 +98,23 @@ def make_dataset(
     }
     check_formats(formats)
     job = partial(_make, recipe, seed, sr)
-    with open_folder(folder, made_by) as kept:
+    with open_cluster(scheduler) if scheduler else nullcontext() as cluster, open_folder(folder, made_by) as kept:
         missing = [number for number in range(count) if not kept.is_done(number)]
         made, failures, splits = 0, dict[int, str](), dict[str, str]()
         try:
             if missing:
-                say("machine code")
-                warm_up()
+                if cluster is None:
+                    say("machine code")
+                    warm_up()
                 say("objects")
                 names = object_names(recipe, seed, kept, missing, count, workers, limit_s)
                 splits = splits_of(names, shares)
                 say(f"0 of {len(missing)}")
-            for number, found in run_jobs(job, missing, workers, limit_s):
+            if cluster is None:
+                jobs = run_jobs(job, missing, workers, limit_s)
+            else:
+                jobs = run_on_cluster(cluster, job, missing, limit_s, say)
+            for number, found in jobs:
                 if isinstance(found, Failed):
                     failures[number] = found.reason
                 elif found.labels["object"] not in splits:

@@ -30,6 +30,7 @@ The same command again makes what is missing. Exit 1: some samples could not be 
     "--format", "formats", multiple=True, metavar="NAME",
     help="A layout for loaders, in DIR/NAME beside the samples: audiofolder, webdataset or zarr. Repeatable.",
 )  # fmt: skip
+@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster whose workers make the samples.")
 @click.option("--shares", metavar="A,B,C", help="Of the objects in train, validation, test. [default: 8,1,1]")
 @json_option
 def dataset(
@@ -43,6 +44,7 @@ def dataset(
     limit_s: float,
     formats: tuple[str, ...],
     shares: str | None,
+    scheduler: str | None,
     json_to: str | None,
 ) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
@@ -62,7 +64,7 @@ def dataset(
         made = make_dataset(
             read_recipe(recipe), root, count=count, seed=seed, sr=sr, workers=workers or cores or 1, limit_s=limit_s,
             formats=formats,
-            shares=as_shares(shares), say=tell,
+            shares=as_shares(shares), scheduler=scheduler, say=tell,
         )  # fmt: skip
         for line in made.lines():
             say(line)
