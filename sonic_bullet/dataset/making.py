@@ -57,6 +57,7 @@ def make_dataset(
     folder: str | os.PathLike[str],
     *,
     count: int,
+    first: int = 0,
     seed: int = 0,
     sr: int = 48_000,
     workers: int = 1,
@@ -66,7 +67,7 @@ def make_dataset(
     scheduler: str | None = None,
     say: Say = lambda text: None,
 ) -> DatasetSummary:
-    """Make the samples below ``count`` that the folder has not.
+    """Make those of the ``count`` samples from number ``first`` on that the folder has not.
 
     Parameters
     ----------
@@ -97,9 +98,10 @@ def make_dataset(
         "versions": package_versions(),
     }
     check_formats(formats)
+    numbers = range(first, first + count)
     job = partial(_make, recipe, seed, sr)
     with open_cluster(scheduler) if scheduler else nullcontext() as cluster, open_folder(folder, made_by) as kept:
-        missing = [number for number in range(count) if not kept.is_done(number)]
+        missing = [number for number in numbers if not kept.is_done(number)]
         made, failures, splits = 0, dict[int, str](), dict[str, str]()
         try:
             if missing:
@@ -107,7 +109,7 @@ def make_dataset(
                     say("machine code")
                     warm_up()
                 say("objects")
-                names = object_names(recipe, seed, kept, missing, count, workers, limit_s)
+                names = object_names(recipe, seed, kept, numbers.stop, workers, limit_s)
                 splits = splits_of(names, shares)
                 say(f"0 of {len(missing)}")
             if cluster is None:
@@ -126,11 +128,11 @@ def make_dataset(
                 say(f"{made} of {len(missing)}{failed}")
         except BaseException:
             with suppress(SonicBulletError):
-                kept.write_lists(count, failures)
+                kept.write_lists(numbers, failures)
             raise
-        kept.write_lists(count, failures)
-        layouts = {name: str(write_layout(name, kept, count, say)) for name in dict.fromkeys(formats)}
-        return _summary(kept, count, made, failures, layouts)
+        kept.write_lists(numbers, failures)
+        layouts = {name: str(write_layout(name, kept, numbers, say)) for name in dict.fromkeys(formats)}
+        return _summary(kept, numbers, made, failures, layouts)
 
 
 def _make(recipe: Recipe, seed: int, sr: int, number: int) -> Sample:
@@ -138,11 +140,11 @@ def _make(recipe: Recipe, seed: int, sr: int, number: int) -> Sample:
 
 
 def _summary(
-    kept: SampleFolder, count: int, made: int, failures: Mapping[int, str], layouts: Mapping[str, str]
+    kept: SampleFolder, numbers: range, made: int, failures: Mapping[int, str], layouts: Mapping[str, str]
 ) -> DatasetSummary:
     samples, objects = Counter[str](), dict[str, set[str]]()
     one: dict[str, Any]
-    for one in kept.labels(count):
+    for one in kept.labels(numbers):
         samples[one["split"]] += 1
         objects.setdefault(one["split"], set()).add(one["object"])
     return DatasetSummary(

@@ -49,18 +49,17 @@ def splits_of(names: Iterable[str | None], shares: Mapping[str, float]) -> dict[
 
 
 def object_names(
-    recipe: Recipe, seed: int, kept: SampleFolder, missing: Iterable[int], count: int, workers: int, limit_s: float
+    recipe: Recipe, seed: int, kept: SampleFolder, count: int, workers: int, limit_s: float
 ) -> list[str | None]:
-    """Return whose sound each sample below ``count`` is: of those kept by their labels, of the missing ones drawn anew.
+    """Return whose sound each sample below ``count`` is: by its labels where it is kept, else drawn anew.
 
     None where the recipe fails to draw, which fails its sample, too.
     """
     names: list[str | None] = [None] * count
     draw = partial(_drawn, recipe, seed)
-    missing = set(missing)
-    if len(missing) < count:
-        for one in kept.labels(count):
-            names[one["number"]] = one["object"]
+    for one in kept.labels(range(count)):
+        names[one["number"]] = one["object"]
+    missing = {number for number, name in enumerate(names) if name is None}
     blocks = sorted({number // A_BLOCK for number in missing})
     for block, found in run_jobs(partial(_block, draw, count), blocks, workers, limit_s, tries=1):
         numbers = range(block * A_BLOCK, min(count, (block + 1) * A_BLOCK))

@@ -59,17 +59,17 @@ class SampleFolder:
         with replacing(self.place(sample.number, ".json")) as file:
             file.write(json_bytes({"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}))
 
-    def labels(self, count: int) -> Iterator[dict[str, Any]]:
-        """Yield the labels of the samples below ``count``, by number."""
-        for number in range(count):
+    def labels(self, numbers: range) -> Iterator[dict[str, Any]]:
+        """Yield the labels of those of the samples that are kept, by number."""
+        for number in numbers:
             place = self.place(number, ".json")
             if place.is_file():
                 yield msgspec.json.decode(place.read_bytes())
 
-    def write_lists(self, count: int, failures: Mapping[int, str]) -> None:
+    def write_lists(self, numbers: range, failures: Mapping[int, str]) -> None:
         """Write manifest and failures."""
         with replacing(self.root / "manifest.jsonl") as file:
-            file.writelines(json_bytes(one) + b"\n" for one in self.labels(count))
+            file.writelines(json_bytes(one) + b"\n" for one in self.labels(numbers))
         with replacing(self.root / "failures.jsonl") as file:
             file.writelines(json_bytes({"number": n, "reason": why}) + b"\n" for n, why in sorted(failures.items()))
 

@@ -105,6 +105,8 @@ def test_few_objects_fill_their_splits_and_more_samples_move_none(place: Path) -
     assert sorted(of.values()) == ["test", "train", "validation"]
     assert all(one["split"] == of[one["object"]] for one in samples)
     assert {number: samples[number]["split"] for number in before} == before
+    assert dataset("fall.py", "-o", "rest", "--first", 4, "--count", 2, "--shares", "2,1,1") == 0
+    assert manifest("rest") == samples[4:]
 
 
 @settings(deadline=None, max_examples=60)

@@ -17,6 +17,10 @@ The same command again makes what is missing. Exit 1: some samples could not be 
 @click.argument("recipe", metavar="RECIPE.py|impacts")
 @click.option("-o", "--output", "folder", required=True, metavar="DIR", help="Folder of the data set.")
 @click.option("--count", type=click.IntRange(1), required=True, metavar="N", help="How many samples.")
+@click.option(
+    "--first", type=click.IntRange(0, 10**12), default=0, metavar="K",
+    help="Number of the first one: runs into folders of their own make one data set. [default: 0]",
+)  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True, metavar="S")
 @click.option(
     "--workers", type=click.IntRange(1, 1024), metavar="N", help="Processes at once. [default: one a core]"
@@ -38,6 +42,7 @@ def dataset(
     folder: str,
     *,
     count: int,
+    first: int,
     seed: int,
     workers: int | None,
     sr: int,
@@ -62,8 +67,8 @@ def dataset(
             from sonic_bullet.dataset.object_splits import as_shares
             from sonic_bullet.dataset.recipes import read_recipe
         made = make_dataset(
-            read_recipe(recipe), root, count=count, seed=seed, sr=sr, workers=workers or cores or 1, limit_s=limit_s,
-            formats=formats,
+            read_recipe(recipe), root, count=count, first=first, seed=seed, sr=sr,
+            workers=workers or cores or 1, limit_s=limit_s, formats=formats,
             shares=as_shares(shares), scheduler=scheduler, say=tell,
         )  # fmt: skip
         for line in made.lines():

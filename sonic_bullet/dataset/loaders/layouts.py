@@ -53,8 +53,8 @@ def check_formats(names: Iterable[str]) -> None:
         FORMATS[name].check_library()
 
 
-def write_layout(name: str, kept: SampleFolder, count: int, say: Say) -> Path:
-    """Write the samples below ``count`` in a format, in place of older ones, and return its folder.
+def write_layout(name: str, kept: SampleFolder, numbers: range, say: Say) -> Path:
+    """Write the samples of these numbers in a format, in place of older ones, and return its folder.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def write_layout(name: str, kept: SampleFolder, count: int, say: Say) -> Path:
     partial = to.with_name(f".{name}.partial")
 
     def samples() -> Iterator[tuple[dict[str, Any], Path]]:
-        for labels in kept.labels(count):
+        for labels in kept.labels(numbers):
             yield labels, kept.root / labels["audio"]
 
     say(name)
