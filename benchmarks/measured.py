@@ -272,8 +272,8 @@ def summary(found: Sequence[tuple[Object, Said]], not_run: Sequence[str]) -> str
     )
     if louder:
         lines.append(
-            f"What `diagnose` begins from is {np.median(louder):.1f} dB farther from these takes than what `fit` "
-            "predicts (median)."
+            f"What `diagnose` begins from is {np.round(np.median(louder), 1) + 0.0:.1f} dB farther from these takes "
+            "than what `fit` predicts (median)."
         )
     return "\n\n".join(map(_wrapped, lines))
 
