@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -194,6 +195,13 @@ def test_no_page_is_empty_or_lost() -> None:
     for page in (REPO / "docs").rglob("*.md"):
         assert len(page.read_text(encoding="utf-8").split()) > 60, name_of(page)
         assert page.name in index or page.name == "README.md", name_of(page)
+
+
+def test_the_install_page_names_every_extra() -> None:
+    extras = tomllib.loads((REPO / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    table = re.findall(r"(?m)^\| (`[^|]+) \|", (REPO / "docs" / "start" / "install.md").read_text(encoding="utf-8"))
+    named = {name for cell in table for name in re.findall(r"`([a-z]+)`", cell)}
+    assert named == set(extras)
 
 
 def test_every_effect_has_a_page_and_a_picture() -> None:
