@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,14 @@ class _Place:
     node_at: int
     wall_m: float
     tie_m: float
+
+
+class _Turned(NamedTuple):
+    """Where the shapes of a body's free modes lie in the flat ones, where its turned ones begin, and the turn."""
+
+    free: slice
+    own_at: int
+    turn: Array | None
 
 
 _NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
@@ -90,6 +98,7 @@ class BodyTable:
         self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
         self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
         self._places: dict[tuple[ModalModel, bytes, int], _Place] = {}
+        self._turned: dict[int, _Turned] = {}
 
     @property
     def bodies(self) -> Array:
@@ -154,12 +163,40 @@ class BodyTable:
         return self._bodies.append(row)
 
     def copy(self) -> BodyTable:
-        """Return a copy with its own bodies; what belongs to models is shared."""
+        """Return a copy with its own bodies and turned shapes; what belongs to models is shared."""
         other = BodyTable()
         other._bodies.append(self.bodies)
         other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
         other._frequencies, other._places = self._frequencies, dict(self._places)
+        if self._turned:
+            other._shapes, other._turned = _Growing(np.float32), dict(self._turned)
+            other._shapes.append(self.shapes)
         return other
+
+    def turn_of(self, b: int) -> Array | None:
+        """Return the turn (m, m) of a body's modes from its free ones; None where it has none."""
+        return self._turned[b].turn if b in self._turned else None
+
+    def turn(self, b: int, turn: Array | None) -> None:
+        """Turn the modes of a body: its shapes become Φ turn, in their own place; None: they are its model's again."""
+        row, one = self.bodies[b], self._turned.get(b)
+        columns = int(row["columns"])
+        if one is None:
+            vertices = int(self.faces["vertex"][row["face_at"] : row["face_at"] + row["faces"]].max(initial=-1)) + 1
+            free = slice(int(row["shape_at"]), int(row["shape_at"]) + 3 * vertices * columns)
+            one = _Turned(free, self._shapes.append(self.shapes[free].copy()), None)
+        self._turned[b] = one._replace(turn=turn)
+        row["shape_at"] = one.free.start if turn is None else one.own_at
+        if turn is not None:
+            m, size = len(turn), one.free.stop - one.free.start
+            modes = self.shapes[one.free].reshape(-1, columns)
+            own = self.shapes[one.own_at : one.own_at + size].reshape(-1, columns)
+            band = np.abs(np.diag(turn, 1))
+            pairs = np.flatnonzero(band)
+            for k in pairs.tolist():
+                own[:, k : k + 2] = modes[:, k : k + 2] @ turn[k : k + 2, k : k + 2]
+            rest = np.setdiff1d(np.arange(m), np.concatenate([pairs, pairs + 1]))
+            own[:, rest] = modes[:, rest]
 
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
         """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
@@ -168,14 +205,19 @@ class BodyTable:
         """
         other = BodyTable()
         other._bodies.append(self.bodies[keep])
+        other._turned = {new: self._turned[old] for new, old in enumerate(keep.tolist()) if old in self._turned}
         keys = {(one.body.model, follows.tobytes(), one.rigid_columns) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}
         if 2 * sum(place.faces for place in places.values()) >= len(self.faces):
             other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
             other._frequencies, other._places = self._frequencies, places
         else:
+            turns, other._turned = {b: one.turn for b, one in other._turned.items()}, {}
             for row, (one, follows) in zip(other.bodies, kept, strict=True):
                 _stand(row, other._place(one, follows))
+            for b, turn in turns.items():
+                if turn is not None:
+                    other.turn(b, turn)
         return other
 
     def _place(self, resonator: Resonator, follows: Array) -> _Place:

@@ -24,13 +24,24 @@ from sonic_bullet.support.coupled_poles import likest
 from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, in_place, touched_rows
 from sonic_bullet.support.moving import Moving
 
+PAIR_SPLIT = 0.01
+"""Relative difference of two frequencies below which modes are a pair that turns: meshes and made things split those of
+a round body by less."""
 
-def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
-    """Approximate `in_place`; `turn` is the identity.
 
-    A mode takes the pole of the motion that most resembles its free one. Transmission, at most ½ of each such motion,
-    and contact forces are those of the mode's own motion, Q of all: two modes of one frequency keep their identity,
-    however the touches couple them.
+def first_order(
+    body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], before: Array | None = None
+) -> InPlace:
+    """Approximate `in_place`; `turn` turns the pairs of one frequency, and they alone, to the contact's axes.
+
+    A mode takes the pole of the motion that most resembles its free one. Of a pair, the two motions that most resemble
+    both: which two of all orthogonal ones the free modes are does not count. Transmission, at most ½ of each such
+    motion, and contact forces are those of the mode's own motion, Q of all.
+
+    Parameters
+    ----------
+    before : Array, shape (m, m)
+        An earlier turn: of the two of a pair, each is the one that it resembles. None: the identity.
     """
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
@@ -44,7 +55,8 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     stiff = both.T @ (spring[:, None] * both)
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
-    chosen = likest(vector[:m] ** 2)
+    chosen, turn = _choose(vector, alike_pairs(body.omega_rad_s), np.eye(m) if before is None else before)
+    vector[:m], both[:, :m] = turn.T @ vector[:m], both[:, :m] @ turn
     q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
     every = spring[:, None] * (both @ vector)
     force = every[:, chosen]
@@ -82,12 +94,43 @@ def first_order(body: Moving, partners: Sequence[Moving], touches: Sequence[Touc
     return InPlace(
         new.imag,
         decay,
-        np.eye(m),
+        turn,
         tuple(passed[a:b] for a, b in pairwise(ends)),
         lifts[::3],
         decay[:, None] * power / whole,
         ~held,
     )
+
+
+def alike_pairs(omega_rad_s: Array) -> Array:
+    """Find pairs (p,) of neighbouring modes (m,) within PAIR_SPLIT, by the first of each; the nearest pair up first."""
+    apart = np.abs(np.diff(omega_rad_s)) / omega_rad_s[1:]
+    found: set[int] = set()
+    for k in np.argsort(apart, kind="stable").tolist():
+        if apart[k] < PAIR_SPLIT and not found & {k - 1, k + 1}:
+            found.add(k)
+    return np.array(sorted(found), np.int64)
+
+
+def _choose(vector: Array, pairs: Array, before: Array) -> tuple[Array, Array]:
+    """Choose a motion, a column of vector (≥ m, n), for each mode (m,), and turn (m, m) the pairs to theirs.
+
+    Of each pair the turn is the orthogonal matrix nearest to its part of the two motions [Schönemann 1966], columns in
+    the order, and with the sign, in which they resemble those before.
+    """
+    m = len(before)
+    share, turn = vector[:m] ** 2, np.eye(m)
+    share[pairs] = share[pairs + 1] = 0.5 * (share[pairs] + share[pairs + 1])
+    chosen = likest(share)
+    for k in pairs.tolist():
+        two = slice(k, k + 2)
+        left, _, right = np.linalg.svd(vector[two, chosen[two]])
+        made, old = left @ right, before[two, two]
+        along = old.T @ made
+        if abs(along[0, 1]) + abs(along[1, 0]) > abs(along[0, 0]) + abs(along[1, 1]):
+            made, along, chosen[two] = made[:, ::-1], along[:, ::-1], chosen[two][::-1].copy()
+        turn[two, two] = made * np.where(np.diag(along) < 0, -1.0, 1.0)
+    return chosen, turn
 
 
 def _held_against(spring: Array, every: Array, value: Array, chosen: Array, gives: Array) -> Array:

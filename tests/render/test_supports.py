@@ -170,7 +170,8 @@ def test_a_partner_is_heard_for_one_mode_alone() -> None:
     state: Any = SimpleNamespace(resonators=[fork, on], bank=SimpleNamespace(observed=np.ones((1, 2))))
 
     def heard(share: float) -> list[tuple[int, Array]]:
-        placed: Any = SimpleNamespace(passes=(np.array([[share, 1e-4]]),), omega_rad_s=fork.omega_rad_s)
+        passes = (np.array([[share, 1e-4]]),)
+        placed: Any = SimpleNamespace(passes=passes, omega_rad_s=fork.omega_rad_s, turn=np.eye(2))
         return list(supports._passed(state, 0, [1], placed, 2))
 
     assert not heard(1e-4)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -152,4 +154,27 @@ def test_what_twins_pass_on_does_not_hang_on_the_choice_of_their_basis() -> None
         first_order(one, [on], [Touch(0, Place(a.shape @ by, a.arm_m, a.axes), b, spring) for a, b in places])
         for by in (np.eye(3), turn)
     )
-    assert np.abs(turned.passes[0] - told.passes[0] @ turn).max() < 0.02 * np.abs(told.passes[0]).max()
+    told_free, turned_free = (found.passes[0] @ found.turn.T for found in (told, turned))
+    assert np.abs(turned_free - told_free @ turn).max() < 0.02 * np.abs(told_free).max()
+
+
+@pytest.mark.parametrize("angle", [0.3, np.pi / 4, 1.2, 2.0])
+def test_which_two_modes_a_pair_is_of_does_not_count(angle: float) -> None:
+    """Poles and turned shapes are the same whatever the angle of the free pair, but for order and sign."""
+    rng = np.random.default_rng(8)
+    one = Moving(np.array([3e3, 3e3, 7e3, 9e3]), np.full(4, 2.0), 0.4, np.diag([2e-4, 3e-4, 4e-4]))
+    other = body(rng, 12, 0.0, 120.0)
+    touches = [Touch(0, place(rng, one), place(rng, other), ContactSpring(4e5 + 2e4j, 0j))]
+    mix = np.eye(4)
+    mix[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    found = []
+    for turn in (np.eye(4), mix):
+        mine = [replace(t, own=replace(t.own, shape=t.own.shape @ turn)) for t in touches]
+        placed = first_order(one, [other], mine)
+        order = np.argsort(placed.decay_per_s[:2])
+        shape = np.concatenate([t.own.shape @ placed.turn for t in mine])[:, :2][:, order]
+        found.append((placed.decay_per_s, placed.omega_rad_s, np.einsum("rk,sk->krs", shape, shape)))
+        found[-1][0][:2], found[-1][1][:2] = placed.decay_per_s[:2][order], placed.omega_rad_s[:2][order]
+    assert found[0][0][0] < 0.5 * found[0][0][1], "one is held more than the other"
+    for was, now in zip(*found, strict=True):
+        assert now == pytest.approx(was, rel=1e-6, abs=1e-9 * np.abs(was).max())

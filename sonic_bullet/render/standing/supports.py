@@ -4,7 +4,8 @@
         -> first_order -> poles, transmission to each partner, contact separation -> the bank, from its next block on
 
 The driver chooses the bodies (`held_contacts.choose_bodies`): active ones whose contacts differ from those of their
-poles. The modes of each body stay its own, with its poles; the small coupling of its modes by the contacts is left out.
+poles. The modes of each body stay its own, with its poles, but pairs of one frequency turn to the contact's axes
+(turned_modes); the small coupling of its other modes by the contacts is left out.
 Lines of a residual take the change of the mode that they follow. Chains of bodies are not claimed: a body's poles use
 its partners as they are free.
 """
@@ -21,6 +22,7 @@ from sonic_bullet.geometry.nearest_point import nearest
 from sonic_bullet.records import Array
 from sonic_bullet.render.contact_place import CREASE_COS, FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.render.resonator import Resonator
+from sonic_bullet.render.standing.turned_modes import turn_modes
 from sonic_bullet.render.strike_pulses import STRUCK_FLAT
 from sonic_bullet.render.synthesis_state import State
 from sonic_bullet.support import (
@@ -73,13 +75,14 @@ def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
     """
     partners, touches, load_n = _touches(state, b, quaternion)
     moving = [state.resonators[p].moving for p in partners]
-    return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches)
+    return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches, state.table.turn_of(b))
 
 
 def _stand(state: State, b: int, quaternion: Array) -> None:
     partners, touches, load_n, placed = standing(state, b, quaternion)
     free = _lanes(state, b)
     m = state.resonators[b].mode_count
+    turn_modes(state, b, placed.turn if touches else None)
     if not touches:
         bank.set_poles(state.bank, state.ringing, b, free)
         bank.set_passes(state.bank, state.ringing, b, {})
@@ -116,7 +119,7 @@ def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns:
     Audible: more than LEAST_PASSED of the body's own sound in some mode, of those within FAINTEST of its loudest, both
     without gains.
     """
-    own = np.abs(state.resonators[b].weight[0]) / state.resonators[b].body.gain
+    own = np.abs(state.resonators[b].weight[0] @ placed.turn) / state.resonators[b].body.gain
     least = np.maximum(LEAST_PASSED * own, FAINTEST * own.max(initial=0.0))
     for p, rate in zip(partners, placed.passes, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
