@@ -21,10 +21,11 @@ from benchmarks.decay_objects import STANDS_FOR
 from benchmarks.measured_decays import OCTAVES_HZ, TABLE, MeasuredDecay, by_octave, read_table
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.recorded_lines import RecordedLines
-from sonic_bullet.presets import load_material, recorded_names, table_names
+from sonic_bullet.presets import load_material, made_names, recorded_names, table_names
 from sonic_bullet.records import Array, Material
 
 PAGE = Path("docs/measured/damping.md")
+MADE = "made-"
 ENOUGH, FACTOR = 3, 2.0
 HEAD = """# How long things ring
 
@@ -36,8 +37,9 @@ benchmarks.measured_decays --data ../shared/measured` measured. T60 in s, by oct
   before lie the striker and the room. The koi bowl, the skillet, the stand, the scoop and the spruce plates are numbers
   of others' recordings (`tables-derived`). Decays are total, as recorded.
 - **Median**: over the bodies; each counts once. Iron and bronze count as `metal`, steel as `steel` and as `metal`.
-- **Presets**: the law of each at the octave's centre. To a material's own loss the run time adds what a body radiates,
-  so such a body rings no longer than this.
+- **Presets**: the law of each at the octave's centre. `NAME` is the material alone: to its own loss the run time adds
+  what a body radiates, and metals lose by heat, so such a body rings no longer than this. `made-NAME` is the material
+  as things are made of it: a law of few numbers through the medians, total (`python -m benchmarks.made_presets`).
 - **Judged** are octaves with three bodies or more: *ratio* is the preset over the median. More than a factor of two is
   bold.
 - **Classes** are TDW's, of material and size. Nobody says which body stands behind one, so they are not counted.
@@ -98,6 +100,11 @@ def _preset_rows(name: str, rows: Sequence[MeasuredDecay]) -> Iterator[list[str]
         yield _cells("… ratio", shown)
 
 
+def presets_of(name: str) -> tuple[str, ...]:
+    """List a material's presets: as things are made of it, if there is one, and alone."""
+    return (*({MADE + name} & set(made_names())), name)
+
+
 def section(name: str, presets: Sequence[str], rows: Sequence[MeasuredDecay]) -> str:
     """Write the table of a material: its presets, the median, each body, and the classes."""
     mine = rows_of(name, rows)
@@ -121,8 +128,8 @@ def _table(cells: Sequence[Sequence[str]]) -> str:
 def summary(rows: Sequence[MeasuredDecay]) -> str:
     """Say which presets keep within FACTOR of the medians, and where the others do not."""
     lines = []
-    for name in table_names():
-        found = ratios(load_material(name), rows_of(name, rows))
+    for name in (*made_names(), *table_names()):
+        found = ratios(load_material(name), rows_of(name.removeprefix(MADE), rows))
         if found:
             out = [f"{octave} Hz ({r:.2g})" for octave, r in found.items() if not 1 / FACTOR <= r <= FACTOR]
             inside = f"{len(found) - len(out)} of {len(found)} octaves within a factor of two"
@@ -136,7 +143,7 @@ def page(rows: Sequence[MeasuredDecay]) -> str:
                 for name in recorded_names()]  # fmt: skip
     parts = [
         HEAD.strip(), "## Presets beside medians", summary(rows),
-        *(section(name, (name,), rows) for name in table_names()), "## Presets of recordings",
+        *(section(name, presets_of(name), rows) for name in table_names()), "## Presets of recordings",
         "Of single bodies; those with lines of their own by these, as of a measured body.", _table(recorded),
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"

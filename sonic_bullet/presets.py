@@ -46,6 +46,7 @@ from sonic_bullet.residual.code import ResidualForm, residual_of
 FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
 RECORDED_FOLDER = FOLDER / "recorded"
+MADE_FOLDER = FOLDER / "made"
 BYTES_MAX = 1 << 20
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
@@ -162,21 +163,20 @@ def named_preset(name: str | os.PathLike[str]) -> Preset:
         return read_preset(text)
     known = material_names()
     if text.lower() in known:
-        folder = RECORDED_FOLDER if text.lower() in recorded_names() else FOLDER
-        return read_preset(folder / f"{text.lower()}.json")
+        return read_preset(_folder_of(text.lower()) / f"{text.lower()}.json")
     remedy = nearest(text, known, ", or the path of a preset file")
     raise MaterialError(f"there is no material {shown(text)}", f"{remedy}; 'sonic-bullet materials' lists all")
 
 
 def list_materials() -> tuple[Material, ...]:
-    """List all materials that come with the package, by name: those of tables, and those of recordings."""
+    """List all materials that come with the package, by name: of tables, as things are made of them, and recorded."""
     return tuple(load_material(name) for name in material_names())
 
 
 @cache
 def material_names() -> tuple[str, ...]:
     """List the names that `load_material` knows, sorted."""
-    return tuple(sorted((*table_names(), *recorded_names())))
+    return tuple(sorted((*table_names(), *made_names(), *recorded_names())))
 
 
 @cache
@@ -186,9 +186,19 @@ def table_names() -> tuple[str, ...]:
 
 
 @cache
+def made_names() -> tuple[str, ...]:
+    """List the names of materials as things are made of them: loss of measured bodies, all else from tables, sorted."""
+    return tuple(sorted(path.stem for path in MADE_FOLDER.glob("*.json")))
+
+
+@cache
 def recorded_names() -> tuple[str, ...]:
     """List the names of objects that were struck and recorded, whose presets come with the package, sorted."""
     return tuple(sorted(path.stem for path in RECORDED_FOLDER.glob("*.json")))
+
+
+def _folder_of(name: str) -> Path:
+    return RECORDED_FOLDER if name in recorded_names() else MADE_FOLDER if name in made_names() else FOLDER
 
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:

@@ -6,6 +6,7 @@ import json
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -200,3 +201,28 @@ def test_missing_preset_files_and_folders(tmp_path: Path) -> None:
     for path in (tmp_path / "none.json", tmp_path, "a\0.json"):
         with pytest.raises(MaterialError, match="cannot read"):
             presets.load_material(path)
+
+
+@pytest.mark.parametrize("name", presets.made_names())
+def test_a_material_as_things_are_made_of_it_differs_by_its_loss_alone(name: str) -> None:
+    made = presets.named_preset(name)
+    alone = presets.named_preset(name.removeprefix("made-"))
+    assert (made.name, made.density_kg_m3, made.elasticity) == (name, alone.density_kg_m3, alone.elasticity)
+    assert (made.surface, made.impact, made.effects, made.residual) == (alone.surface, alone.impact, (), None)
+    assert presets.load_material(name).includes_radiation
+    numbers = {"loss_factor", "exponent", "floor_s"} & {
+        key for key, value in msgspec.structs.asdict(made.damping).items() if value is not None
+    }
+    assert set(made.damping.range) == set(made.damping.spread) == numbers
+    for key in numbers:
+        low, high = made.damping.range[key]
+        assert low <= msgspec.structs.asdict(made.damping)[key] <= high
+        assert 0 < made.damping.spread[key] < 3
+    assert "decays.csv" in made.damping.source and "bodies" in made.damping.source
+
+
+def test_as_things_are_made_of_it_names_are_material_names() -> None:
+    assert {"made-steel", "made-wood", "made-porcelain", "made-glass", "made-plastic"} <= set(presets.made_names())
+    assert set(presets.made_names()) <= set(presets.material_names())
+    with pytest.raises(MaterialError, match="made-steel"):
+        presets.load_material("made-steal")

@@ -38,7 +38,7 @@ def test_there_are_some_and_each_can_be_made_again() -> None:
     assert len(NAMES) >= 6
     assert set(NAMES) == set(OBJECTS)
     assert not set(NAMES) & set(presets.table_names())
-    assert set(presets.material_names()) == {*NAMES, *presets.table_names()}
+    assert set(presets.material_names()) == {*NAMES, *presets.table_names(), *presets.made_names()}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -167,13 +167,14 @@ def test_material_of_the_command_line(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_the_command_lists_them_apart(capfd: pytest.CaptureFixture[str]) -> None:
     assert run("materials") == 0
     tables = capfd.readouterr().out.split("\n\n")
-    rows = [line.split()[0] for line in tables[1].splitlines()[2:]]
-    assert rows == list(NAMES)
+    made, rows = ([line.split()[0] for line in one.splitlines()[2:]] for one in tables[1:3])
+    assert (made, rows) == (list(presets.made_names()), list(NAMES))
     assert not set(NAMES) & {line.split()[0] for line in tables[0].splitlines()}
     assert run("materials", "--json") == 0
     found = json.loads(capfd.readouterr().out)
     assert [m["name"] for m in found["materials"]] == list(presets.table_names())
     assert [m["name"] for m in found["recorded"]] == list(NAMES)
+    assert [m["name"] for m in found["made"]] == list(presets.made_names())
     assert all(m["origin"]["licence"] and m["origin"]["predicted_db"] > 0 for m in found["recorded"])
 
 

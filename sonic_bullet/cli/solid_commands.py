@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
 from sonic_bullet.files import write_model
 from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from sonic_bullet.presets import Preset
 
 DEFAULT_MATERIAL = "steel"
+MADE_HZ = (250, 1000, 4000)
+MADE_COLUMNS = ("name", "η", "exponent", "spread of ln η", *(f"T60 at {freq_hz} Hz in s" for freq_hz in MADE_HZ))
 RECORDED_COLUMNS = (
     "name",
     "lines",
@@ -129,9 +133,10 @@ def chosen_material(
 
 def run_materials(json_to: str | None) -> None:
     """Run `materials`; raises FileError."""
-    from sonic_bullet.presets import load_material, named_preset, recorded_names, table_names
+    from sonic_bullet.presets import load_material, made_names, named_preset, recorded_names, table_names
 
     found = [load_material(name) for name in table_names()]
+    made = [(load_material(name), named_preset(name)) for name in made_names()]
     recorded = [(load_material(name), named_preset(name)) for name in recorded_names()]
     if json_to is None:
         head = ("name", "kg/m³", "E in GPa", "ν", "α in 1/s", "β in s", "roughness in µm", "restitution")
@@ -149,6 +154,8 @@ def run_materials(json_to: str | None) -> None:
             for m in found
         ]
         print(table(head, rows))
+        print("\nas things are made of them: the total loss of measured bodies, all else as above")
+        print(table(MADE_COLUMNS, [_made_row(material, preset) for material, preset in made]))
         print("\nof recordings by others: how near the file comes to takes of its object, in dB")
         print(table(RECORDED_COLUMNS, [_recorded_row(preset) for _, preset in recorded]))
         print("\nsources: 'sonic-bullet materials --json' and docs/explanation/materials.md")
@@ -156,9 +163,36 @@ def run_materials(json_to: str | None) -> None:
         json_to,
         {
             "materials": [_material(m) for m in found],
+            "made": [_material(m) | _described_law(preset) for m, preset in made],
             "recorded": [_material(m) | _described_origin(preset) for m, preset in recorded],
         },
     )
+
+
+def _made_row(material: Material, preset: Preset) -> tuple[str, ...]:
+    """Return the table row of a preset of measured bodies."""
+    from sonic_bullet.effects.damping_law import own_decay_per_s
+
+    square = (2 * np.pi * np.array(MADE_HZ)) ** 2
+    damping = preset.damping
+    return (
+        preset.name,
+        f"{damping.loss_factor:.2g}",
+        f"{1.0 if damping.exponent is None else damping.exponent:.2g}",
+        f"{damping.spread['loss_factor']:.2g}",
+        *(f"{math.log(1000) / d:.2g}" for d in own_decay_per_s(material, square)),
+    )
+
+
+def _described_law(preset: Preset) -> dict[str, Any]:
+    """Convert the law of a preset of measured bodies to JSON values."""
+    damping = preset.damping
+    return {
+        "loss_factor": damping.loss_factor,
+        "exponent": damping.exponent,
+        "floor_s": damping.floor_s,
+        "spread": damping.spread,
+    }
 
 
 def _recorded_row(preset: Preset) -> tuple[str, ...]:

@@ -172,11 +172,11 @@ def _other_materials(log: ContactLog, number: int) -> tuple[ContactLog, dict[str
 
 def draw_factors(material: Material, draw: np.random.Generator) -> dict[str, float]:
     """Draw a factor of each number of a preset, e^(s z), z normal, within its range; none of an unknown material."""
-    from sonic_bullet.presets import FOLDER, read_preset, table_names
+    from sonic_bullet.presets import made_names, named_preset, table_names
 
-    if material.name not in table_names():
+    if material.name not in (*table_names(), *made_names()):
         return {}
-    preset = read_preset(FOLDER / f"{material.name}.json")
+    preset = named_preset(material.name)
     factors: dict[str, float] = {}
     for part in (preset.elasticity, preset.damping, preset.surface, preset.impact):
         for name, spread in part.spread.items():

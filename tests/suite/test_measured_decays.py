@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.made_presets import MEASURED, chosen, fitted, made_preset
 from benchmarks.measured_decays import MeasuredDecay, by_octave, octave_of, read_table, write_table
-from benchmarks.preset_decays import PAGE, medians, page, ratios, rows_of, t60_s
-from sonic_bullet.presets import load_material
+from benchmarks.preset_decays import FACTOR, PAGE, medians, page, ratios, rows_of, t60_s
+from sonic_bullet.presets import load_material, named_preset
 
 REPO = Path(__file__).resolve().parents[2]
 
@@ -63,6 +64,30 @@ def test_the_page_is_that_of_the_table(tmp_path: Path) -> None:
     assert len({r.body for r in rows if r.kind == "body"}) >= 30
     assert len({(r.body, r.octave_hz) for r in rows}) == len(rows)
     assert page(rows) == (REPO / PAGE).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_things_as_made_ring_within_a_factor_of_two_of_the_median(name: str) -> None:
+    rows = read_table(REPO / "docs" / "measured" / "decays.csv")
+    found = ratios(load_material(f"made-{name}"), rows_of(MEASURED[name], rows))
+    assert all(1 / FACTOR <= ratio <= FACTOR for ratio in found.values()), found
+    judged = {"porcelain": 3, "wood": 4, "steel": 3, "metal": 4, "spruce": 2}
+    assert len(found) >= judged.get(name, 0)
+
+
+@pytest.mark.parametrize("name", ["porcelain", "metal"])
+def test_the_presets_are_what_the_table_gives(name: str) -> None:
+    rows = read_table(REPO / "docs" / "measured" / "decays.csv")
+    assert made_preset(name, rows) == named_preset(f"made-{name}")
+
+
+def test_a_law_has_no_more_numbers_than_the_medians_ask_for() -> None:
+    loss = [_row(body, 2.2 / (2e-3 * f / 1000) / 1000, f) for f in (500, 1000, 4000) for body in "abc"]
+    assert len(chosen(loss)) == 1
+    steep = [_row(body, 2.0 * (f / 1000) ** -1.8, f) for f in (500, 1000, 4000, 8000) for body in "abc"]
+    assert chosen(steep)[1] == pytest.approx(1.8, abs=1e-3)
+    level = [_row(r.body, r.t60_s + 0.2, r.octave_hz) for r in steep]
+    assert np.exp(fitted(level, 3)[2]) == pytest.approx(0.2, rel=0.05)
 
 
 @pytest.mark.shared
