@@ -40,6 +40,7 @@ def build(client):
 """
 TOTAL = {"loss_factor": None, "equal_at_hz": None, "alpha_per_s": 2.0, "beta_s": 1e-9, "includes_radiation": True}
 ETA = 4e-3
+METAL = {"youngs_pa": 2e11, "poisson": 0.29, "density_kg_m3": 7860.0}
 
 
 EFFECTS = [*(kind.id for kind in KEPT), "orthotropy"]
@@ -56,6 +57,7 @@ def groups(effect: str) -> dict[str, Any]:
     lines = {"freq_hz": [700.0, 1900.0], "decay_per_s": [6.0, 9.0], "amplitude": [1.0, 0.5], "spread_db": [0.0, 0.0]}
     each: dict[str, dict[str, Any]] = {
         "damping-law": {"law": "constant-loss", "eta": ETA},
+        "thermoelastic": {**METAL, "expansion_per_k": 6e-4, "conductivity_w_m_k": 50.0, "heat_capacity_j_kg_k": 490.0},
         "mode-splitting": {"freq_hz": [pair], "split": [0.04], "turn_rad": [0.8]},
         "amplitude-pitch": {"bend": 6.0, "measure": "velocity"},
         "amplitude-damping": {"choke": 25.0, "measure": "velocity", "power": 1},

@@ -38,6 +38,10 @@ def one_strike(
     return [step(positions, contacts if i == at else None) for i in range(steps)]
 
 
+DATED_M = 1e-12
+"""A gap that dates a strike: to where its step starts."""
+
+
 def struck_box(
     sensors: tuple[Any, ...],
     *,
@@ -48,7 +52,9 @@ def struck_box(
 ) -> np.ndarray:
     """A floating box struck from above by a silent wall."""
     bodies = box_body(EDGES_M, freq), wall_body()
-    contacts = row(0, 1, (0, 0, -impulse), normal=(0, 0, -1), point_a=where, approach=how.pop("approach", 1.0))
+    contacts = row(
+        0, 1, (0, 0, -impulse), normal=(0, 0, -1), point_a=where, approach=how.pop("approach", 1.0), gap=DATED_M
+    )
     return rendered(bodies, one_strike(bodies, contacts, [(0, 0, 0), (0, 0, 0.01)], **how), sensors)
 
 
@@ -84,7 +90,7 @@ def test_the_level_is_the_radiation_law() -> None:
     (signal,) = struck_box((Microphone([0, 0, 2.0]),), steps=60)
     weight, extra = radiation(body.model, Air())
     resonator = build_resonator(body, (Microphone([0, 0, 2.0]),), SR, Air())
-    pulse = only_pulse(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005)))
+    pulse = only_pulse(body, row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0, 0, 0.005), gap=DATED_M))
     spectrum = pulse_spectrum(np.array([1500.0 * pulse.length_s]), flat=pulse.flat)[0]
     start = 3000
     decay = float(resonator.decay_per_s[0])
@@ -132,7 +138,7 @@ def only_pulse(body: Any, contacts: Contacts) -> Pulse:
 def test_the_plain_sum_is_the_seeds_sum() -> None:
     """Σ a e^{-dt} sin(2πft), a = scale · Uᵀj: from the strike's centre on, filtered by the pulse."""
     body = box_body(EDGES_M, (900.0, 2100.0))
-    contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.03, 0.01, 0.005))
+    contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.03, 0.01, 0.005), gap=DATED_M)
     (signal,) = struck_box((ModalSum(2.0),), freq=(900.0, 2100.0), where=(0.03, 0.01, 0.005))
     pulse = only_pulse(body, contacts)
     resonator = build_resonator(body, (), SR, Air())
@@ -156,7 +162,7 @@ def test_a_vibrometer_reads_the_surfaces_velocity() -> None:
     moves the way it is pushed).
     """
     body = box_body(EDGES_M, (300.0,))
-    contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.1, 0.05, 0.005))
+    contacts = row(0, 1, (0, 0, -0.01), normal=(0, 0, -1), point_a=(0.1, 0.05, 0.005), gap=DATED_M)
     (signal,) = struck_box((Vibrometer(0, [0.1, 0.05, 0.005], [0, 0, -1]),), freq=(300.0,), where=(0.1, 0.05, 0.005))
     phi = float(body.model.shape[np.argmax(body.model.vertex_m.sum(axis=1)), 2, 0])
     pulse = only_pulse(body, contacts)
@@ -189,14 +195,15 @@ def clicked(
 ) -> np.ndarray:
     """A ball struck along +z, heard at angles from that direction, (channels, n)."""
     ball = ball_body(radius, material, mass_kg=mass)
-    contacts = row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0)
+    contacts = row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0, gap=DATED_M)
     ears = tuple(Microphone([r * np.sin(np.radians(a)), 0, r * np.cos(np.radians(a))]) for a in direction_deg)
     return rendered((ball, wall_body()), one_strike((ball, wall_body()), contacts, [(0, 0, 0), (0, 0, -radius)]), ears)
 
 
 def click_blow(radius: float, material: Any, impulse: float) -> Any:
     return only_pulse(
-        ball_body(radius, material), row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0)
+        ball_body(radius, material),
+        row(0, 1, (0, 0, impulse), normal=(0, 0, 1), point_a=(0, 0, -radius), approach=1.0, gap=DATED_M),
     )
 
 

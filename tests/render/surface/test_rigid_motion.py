@@ -22,7 +22,7 @@ from sonic_bullet.soundtrack.stems import render_stems
 from sonic_bullet.synth.pulse import pulse_spectrum
 from tests.made.jointed import FAR_HZ, LENGTH_M, TAPPED_M, tapped_arm, transfer_per_kg
 from tests.made.models import STEEL, box_body, row, wall_body
-from tests.render.test_render_sensors import SR, Pulse, one_strike, only_pulse, rendered
+from tests.render.test_render_sensors import DATED_M, SR, Pulse, one_strike, only_pulse, rendered
 
 EDGES_M = (0.2, 0.1, 0.02)
 IMPULSE_N_S = 0.01
@@ -30,13 +30,15 @@ IMPULSE_N_S = 0.01
 
 def struck(body: Body, sensors: tuple[Any, ...], where: tuple[float, float, float], steps: int = 24) -> Array:
     """A body struck along -z at a place by a wall."""
-    contacts = row(0, 1, (0, 0, -IMPULSE_N_S), normal=(0, 0, -1), point_a=where, approach=1.0)
+    contacts = row(0, 1, (0, 0, -IMPULSE_N_S), normal=(0, 0, -1), point_a=where, approach=1.0, gap=DATED_M)
     bodies = body, wall_body()
     return rendered(bodies, one_strike(bodies, contacts, [(0, 0, 0), where], steps=steps), sensors)
 
 
 def pulse_on(body: Body, where: tuple[float, float, float]) -> Pulse:
-    return only_pulse(body, row(0, 1, (0, 0, -IMPULSE_N_S), normal=(0, 0, -1), point_a=where, approach=1.0))
+    return only_pulse(
+        body, row(0, 1, (0, 0, -IMPULSE_N_S), normal=(0, 0, -1), point_a=where, approach=1.0, gap=DATED_M)
+    )
 
 
 @pytest.mark.parametrize(
