@@ -5,7 +5,8 @@
 
 A step starts with what the step before ended with (loads, speeds, gains, direction are carried in PAIR and in the
 gains), so nothing jumps at the step rate. A manifold's points flicker from step to step; the gains follow them with a
-time constant of `FOLLOW_S`. A pair has a contact oscillator, its voice (PAIR.rubs), while its support lasts. One that
+time constant of `FOLLOW_S`. A pair has a contact oscillator, its voice (PAIR.rubs), while its support lasts. Its sweep
+grows from 0 within its first step, as its load does: at full speed a contact without load would only bounce. One that
 neither sweeps nor oscillates costs nothing: no force, no gains, no search of triangles. Sides 0 = lower body and 1 =
 higher.
 """
@@ -137,7 +138,7 @@ def _voices(pairs, bodies, rows, follow, voices):
             pair.direction[axis] = direction[1, axis] = start + (follow * (aim - start) if touching else 0.0)
         moves = pair.depth != 0.0 or pair.lift != 0.0
         for side in range(2):
-            sweep[0, side] = sweep[1, side] if voice.fresh else pair.sweep_m_s[side]
+            sweep[0, side] = 0.0 if voice.fresh else pair.sweep_m_s[side]
             pair.sweep_m_s[side] = sweep[1, side]
             moves = moves or sweep[0, side] > 0.0 or sweep[1, side] > 0.0
         voice.slot, voice.load_n[0], voice.load_n[1] = slot, pair.load_n, target
