@@ -29,11 +29,13 @@ class Moved:
 
     Attributes
     ----------
-    area_m2 : (f,) of its triangles
+    corner_m : (f, 3, 3) of its triangles
+    area_m2 : (f,) of these
     length_m : (f,) > 0, eigenvalues, ascending
     vector : (f, f) columns are eigenvectors, of √area·v
     """
 
+    corner_m: Array
     area_m2: Array
     length_m: Array
     vector: Array
@@ -69,7 +71,53 @@ def moved_air(corner_m: Array) -> Moved | None:
     uneven = np.linalg.norm(found - found.T) > MOST_UNEVEN * np.linalg.norm(found)
     if uneven or value[0] < -MOST_NEGATIVE * value[-1]:
         return None
-    return Moved(area, np.maximum(value, 1e-2 * root.min()), vector)
+    return Moved(corner_m, area, np.maximum(value, 1e-2 * root.min()), vector)
+
+
+@njit(nogil=True)
+def panel(corner, normal, across, edge_m, x):
+    """Integrate 1/r over a triangle, seen from x: potential, solid angle, gradient along x, loop of its edges.
+
+    The gradient is the tangential one: the whole has -normal · solid angle, too. across (3, 3), edge_m (3,): of
+    `panel_edges`.
+    """
+    p = np.empty((3, 3))
+    r = np.empty(3)
+    for e in range(3):
+        p[e, 0], p[e, 1], p[e, 2] = x[0] - corner[e, 0], x[1] - corner[e, 1], x[2] - corner[e, 2]
+        r[e] = np.sqrt(p[e, 0] * p[e, 0] + p[e, 1] * p[e, 1] + p[e, 2] * p[e, 2])
+    height = normal[0] * p[0, 0] + normal[1] * p[0, 1] + normal[2] * p[0, 2]
+    potential, whole, triple = 0.0, r[0] * r[1] * r[2], 0.0
+    g0, g1, g2, l0, l1, l2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for e in range(3):
+        a, b = p[e], p[(e + 1) % 3]
+        ra, rb, m = r[e], r[(e + 1) % 3], across[e]
+        ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+        c0, c1, c2 = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+        near = np.log((ra + rb + edge_m[e]) / (ra + rb - edge_m[e]))
+        potential -= (m[0] * a[0] + m[1] * a[1] + m[2] * a[2]) * near
+        g0, g1, g2 = g0 - m[0] * near, g1 - m[1] * near, g2 - m[2] * near
+        turn = (ra + rb) / (ra * rb * (ra * rb + ab))
+        l0, l1, l2 = l0 + c0 * turn, l1 + c1 * turn, l2 + c2 * turn
+        whole += ab * r[(e + 2) % 3]
+        if e == 1:
+            triple = p[0, 0] * c0 + p[0, 1] * c1 + p[0, 2] * c2
+    angle = 2 * np.arctan2(triple, whole)
+    return potential - height * angle, angle, height, g0, g1, g2, l0, l1, l2
+
+
+@njit(nogil=True)
+def panel_edges(corner, normal):
+    """Compute of a triangle's edges the outward normals in its plane (3, 3) and the lengths (3,)."""
+    across, edge_m = np.empty((3, 3)), np.empty(3)
+    for e in range(3):
+        t0, t1, t2 = corner[(e + 1) % 3] - corner[e]
+        n0, n1, n2 = normal
+        edge_m[e] = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        across[e, 0] = (t1 * n2 - t2 * n1) / edge_m[e]
+        across[e, 1] = (t2 * n0 - t0 * n2) / edge_m[e]
+        across[e, 2] = (t0 * n1 - t1 * n0) / edge_m[e]
+    return across, edge_m
 
 
 @njit(nogil=True)
@@ -78,50 +126,19 @@ def _matrices(corner, normal, beta):
     count = len(corner)
     left = np.empty((count, count))
     right = np.empty((count, count))
-    across = np.empty((3, 3))
+    x = np.empty(3)
     for j in range(count):
-        n0, n1, n2 = normal[j]
-        edge_m = np.empty(3)
-        for e in range(3):
-            t0, t1, t2 = corner[j, (e + 1) % 3] - corner[j, e]
-            edge_m[e] = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
-            across[e, 0] = (t1 * n2 - t2 * n1) / edge_m[e]
-            across[e, 1] = (t2 * n0 - t0 * n2) / edge_m[e]
-            across[e, 2] = (t0 * n1 - t1 * n0) / edge_m[e]
+        n = normal[j]
+        across, edge_m = panel_edges(corner[j], n)
         for i in range(count):
-            x0 = (corner[i, 0, 0] + corner[i, 1, 0] + corner[i, 2, 0]) / 3
-            x1 = (corner[i, 0, 1] + corner[i, 1, 1] + corner[i, 2, 1]) / 3
-            x2 = (corner[i, 0, 2] + corner[i, 1, 2] + corner[i, 2, 2]) / 3
-            a0, a1, a2 = x0 - corner[j, 0, 0], x1 - corner[j, 0, 1], x2 - corner[j, 0, 2]
-            b0, b1, b2 = x0 - corner[j, 1, 0], x1 - corner[j, 1, 1], x2 - corner[j, 1, 2]
-            c0, c1, c2 = x0 - corner[j, 2, 0], x1 - corner[j, 2, 1], x2 - corner[j, 2, 2]
-            ra = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
-            rb = np.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
-            rc = np.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
-            ab, bc, ca = a0 * b0 + a1 * b1 + a2 * b2, b0 * c0 + b1 * c1 + b2 * c2, c0 * a0 + c1 * a1 + c2 * a2
-            angle = 0.0
-            if i != j:
-                triple = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
-                angle = 2 * np.arctan2(triple, ra * rb * rc + ab * rc + bc * ra + ca * rb)
-            height = n0 * a0 + n1 * a1 + n2 * a2
-            potential = -height * angle
+            for c in range(3):
+                x[c] = (corner[i, 0, c] + corner[i, 1, c] + corner[i, 2, c]) / 3
+            potential, angle, _, g0, g1, g2, l0, l1, l2 = panel(corner[j], n, across, edge_m, x)
             i0, i1, i2 = normal[i]
-            slope = -(n0 * i0 + n1 * i1 + n2 * i2) * angle
-            loop = 0.0
-            for e in range(3):
-                if e == 0:
-                    p0, p1, p2, q0, q1, q2, rp, rq, pq = a0, a1, a2, b0, b1, b2, ra, rb, ab
-                elif e == 1:
-                    p0, p1, p2, q0, q1, q2, rp, rq, pq = b0, b1, b2, c0, c1, c2, rb, rc, bc
-                else:
-                    p0, p1, p2, q0, q1, q2, rp, rq, pq = c0, c1, c2, a0, a1, a2, rc, ra, ca
-                m0, m1, m2 = across[e]
-                near = np.log((rp + rq + edge_m[e]) / (rp + rq - edge_m[e]))
-                potential -= (m0 * p0 + m1 * p1 + m2 * p2) * near
-                slope -= (m0 * i0 + m1 * i1 + m2 * i2) * near
-                turn = i0 * (p1 * q2 - p2 * q1) + i1 * (p2 * q0 - p0 * q2) + i2 * (p0 * q1 - p1 * q0)
-                loop += turn * (rp + rq) / (rp * rq * (rp * rq + pq))
-            left[i, j] = (-angle + beta * loop) / (4 * np.pi)
+            if i == j:  # seen from its own plane: no solid angle, whatever the rounding
+                angle = 0.0
+            slope = i0 * g0 + i1 * g1 + i2 * g2 - (n[0] * i0 + n[1] * i1 + n[2] * i2) * angle
+            left[i, j] = (-angle + beta * (i0 * l0 + i1 * l1 + i2 * l2)) / (4 * np.pi)
             right[i, j] = (potential + beta * slope) / (4 * np.pi)
         left[j, j] += 0.5
         right[j, j] += 0.5 * beta

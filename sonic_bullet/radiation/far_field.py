@@ -2,7 +2,8 @@
 
     p(r̂) = (iωρ₀/4π) ∮ [v + ik (r̂·n) ψ] e^{ik r̂·x} dS             at 1 m, v = φ·n for unit modal velocity
         [Pierce 1989, eq. 4-6.4, e^{iωt}]
-    near field p_s = iωρ₀ ψ:  ψ = Σ_j e_j (e_j·v)/q_j
+    near field p_s = iωρ₀ψ: `surface_waves`, at the mode's own k, where the mesh has three edges a wavelength; above
+        ψ = Σ_j e_j (e_j·v)/q_j
         e_j, t_j: eigenvectors and -values of the air moved at k = 0, `entrained_mass`
     q_j(k) = 1/L + √(κ_j² + (1/L + ik)²),  q_j(0) = 1/t_j
         its change with k; L the body's middle principal extent
@@ -11,7 +12,8 @@
 
 On a sphere (a = L/2) the e_j are the harmonics and q_j interpolates -k h_l'(ka)/h_l(ka): exact for l = 0, for every l
 at k → 0, where it is (l+1)/a, and to second order for k → ∞ (1/a + ik). On a wide flat face they are waves, and q =
-√(κ² - k²) [Cremer et al. 2005, eq. 6.26].
+√(κ² - k²) [Cremer et al. 2005, eq. 6.26]. Edges and corners couple the e_j: below coincidence that is most
+of the sound [Maidanik 1962], and no q_j has it.
 
 The mean is a product Gauss rule in the body's principal frame, exact for bodies small by the wavelength; for large ones
 512 directions spread evenly. The weight is complex. Its size is the mean over directions. Its phase is that of the loud
@@ -30,13 +32,12 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
-from sonic_bullet.radiation.entrained_mass import Moved, moved_air
+from sonic_bullet.radiation.entrained_mass import Moved
+from sonic_bullet.radiation.near_mesh import cells, surface_air
+from sonic_bullet.radiation.surface_waves import RESOLVED, SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
 
-NearField = Callable[[Array, Array, Array], tuple[Moved, Array] | None]
-MOST_TRIANGLES = (700, 850, 1000, 1200, 1400)
-"""Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
-its triangles' chords would cross. The last takes 2 s of processor."""
+NearField = Callable[[Array, Array, Array, int], tuple[Moved, Array] | None]
 LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
 EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
 LOUDER = 16  # power of |p| by which directions count: half of a plate's modes are within 2° of the loudest one's phase
@@ -56,7 +57,7 @@ def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
 def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None = None) -> tuple[Array, Array, str]:
     """Compute `radiation`, and a note: `COMPACT` where the compact law replaces the near field, else "".
 
-    near_field: takes the place of `surface_air`, of corners (f, 3, 3), areas (f,) and normals (f, 3).
+    near_field: takes the place of `surface_air`.
     """
     most_patches = 1800
     m = model.mode_count
@@ -70,17 +71,22 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
     normal = twice / (2 * area[:, None])
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
     patch, place = _patches(corner, area, normal, most_patches)
-    near = (near_field or surface_air)(corner, area, normal)
+    near = (near_field or surface_air)(corner, area, normal, m)
     if near is None:
         weight = compact_weight(model, face, area, normal @ turn, k, air)
         return weight, _damping(weight, air), COMPACT
     moved, nearest = near
+    low = k * np.sqrt(4 / np.sqrt(3) * moved.area_m2.mean()) < RESOLVED
+    waves = SurfaceWaves(moved.corner_m) if low.any() else None
     moment = np.zeros((m, 7, len(place)))
     for lo in range(0, m, MODES_AT_ONCE):
         some = slice(lo, min(lo + MODES_AT_ONCE, m))
         speed = np.einsum("fi,fcim->fcm", normal @ turn, model.shape[:, :, some].astype(float)[face])
-        level = _near_field(k[some], 1 / extent[1], moved, area[:, None] * speed.mean(axis=1), nearest)
-        _moments(speed, level, corner, area, normal, patch, place, moment[some])
+        mean = _mean_speed(speed.mean(axis=1), area, corner, moved, nearest)
+        level = _near_field(k[some], 1 / extent[1], moved, mean)
+        if waves is not None and low[some].any():
+            level[:, low[some]] = waves.potential(k[some][low[some]], mean[:, low[some]])
+        _moments(speed, level[nearest], corner, area, normal, patch, place, moment[some])
     point = corner.reshape(-1, 3)
     rings = np.clip(np.ceil(k * np.linalg.norm(point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS + 1).astype(int)
     weight = np.zeros(m, complex)
@@ -161,15 +167,6 @@ def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
     return (corner - middle) @ turn.T, turn
 
 
-def _cells(point: Array, normal: Array, edge_m: float) -> Array:
-    """Assign each point (p,) the number of its cell of edge edge_m and of the side it faces (of six)."""
-    cell = np.floor((point - (point.min(axis=0) + point.max(axis=0)) / 2) / edge_m + 0.5).astype(np.int64)
-    bias = normal * [1.0, 0.93, 0.87]  # no ties between sides
-    axis = np.argmax(np.abs(bias), axis=1)
-    side = 2 * axis + (bias[np.arange(len(axis)), axis] > 0)
-    return np.unique(np.column_stack([cell, side]), axis=0, return_inverse=True)[1].ravel()
-
-
 def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
     """Return the patch (f,) of each face and the place (s, 3) of each patch: its centroid.
 
@@ -179,80 +176,36 @@ def _patches(corner: Array, area: Array, normal: Array, most: int) -> tuple[Arra
     patch = np.arange(len(area))
     edge_m = np.sqrt(area.sum() / most)
     while patch.max() >= most:
-        patch = _cells(centre, normal, edge_m)
+        patch = cells(centre, normal, edge_m)
         edge_m *= 1.15
     total = np.bincount(patch, area)
     return patch, np.stack([np.bincount(patch, area * centre[:, i]) / total for i in range(3)], axis=1)
 
 
-def surface_air(corner: Array, area: Array, normal: Array) -> tuple[Moved, Array] | None:
-    """Compute the air moved by the body, and the triangle (f,) of it that represents each face; else None."""
-    tried = 0
-    for most in MOST_TRIANGLES:
-        coarse, nearest = _near_mesh(corner, area, normal, most)
-        moved = moved_air(coarse) if len(coarse) > tried else None
-        tried = max(tried, len(coarse))
-        if moved is not None:
-            return moved, nearest
-    return None
+def _mean_speed(speed: Array, area: Array, corner: Array, moved: Moved, nearest: Array) -> Array:
+    """Compute the mean speed (c, m) of each triangle of `moved` from that of the faces (f, m) that it represents.
 
-
-def _near_mesh(corner: Array, area: Array, normal: Array, most: int) -> tuple[Array, Array]:
-    """Build triangles (c, 3, 3) for the near field, at most ``most``, and the one (f,) that represents each face."""
-    if len(corner) <= most:
-        return corner, np.arange(len(corner))
-    from scipy.spatial import cKDTree
-
-    point, name = np.unique(np.round(corner.reshape(-1, 3) / (1e-7 * np.ptp(corner))), axis=0, return_inverse=True)
-    name = name.reshape(-1, 3)
-    point = point * (1e-7 * np.ptp(corner))
-    outward = np.stack(
-        [np.bincount(name.ravel(), np.repeat(area * normal[:, i], 3), len(point)) for i in range(3)], axis=1
-    )
-    edge_m = np.sqrt(4 * area.sum() / most) / 1.5
-    while True:
-        cell = _cells(point, outward, edge_m)
-        size = np.bincount(cell)
-        middle = np.stack([np.bincount(cell, point[:, i]) / size for i in range(3)], axis=1)
-        direction = np.stack([np.bincount(cell, outward[:, i]) for i in range(3)], axis=1)
-        direction = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
-        reach = np.zeros(len(middle))
-        np.maximum.at(reach, cell, ((point - middle[cell]) * direction[cell]).sum(axis=1))
-        middle += reach[:, None] * direction  # else edges are cut off
-        triangle = cell[name]
-        triangle = triangle[
-            (triangle[:, 0] != triangle[:, 1]) & (triangle[:, 1] != triangle[:, 2]) & (triangle[:, 2] != triangle[:, 0])
-        ]
-        _, first, alike = np.unique(np.sort(triangle, axis=1), axis=0, return_index=True, return_inverse=True)
-        odd = (triangle[:, 0] < triangle[:, 1]) ^ (triangle[:, 1] < triangle[:, 2]) ^ (triangle[:, 2] < triangle[:, 0])
-        odd_ones = np.bincount(alike.ravel(), odd)
-        triangle = triangle[first[(odd_ones == 0) | (odd_ones == np.bincount(alike.ravel()))]]  # folds cancel
-        coarse = middle[triangle]
-        twice = np.cross(coarse[:, 1] - coarse[:, 0], coarse[:, 2] - coarse[:, 0])
-        length = np.linalg.norm(twice, axis=1)
-        kept = length > 1e-3 * edge_m**2
-        if kept.sum() <= most:
-            break
-        edge_m *= 1.1
-    coarse, facing = coarse[kept], twice[kept] / length[kept, None]
-    tree = cKDTree(np.hstack([coarse.mean(axis=1), edge_m * facing]))
-    return coarse, tree.query(np.hstack([corner.mean(axis=1), edge_m * normal]))[1]
-
-
-def _near_field(k: Array, curved_per_m: float, moved: Moved, flow: Array, nearest: Array) -> Array:
-    """Compute ψ (f, m) in m·(1/√kg), complex, on faces with volume flow (f, m).
-
-    nearest (f,): the triangle of `moved` that represents each face.
+    Of the nearest face where it represents none.
     """
-    speed = (
-        np.stack([np.bincount(nearest, one, len(moved.area_m2)) for one in flow.T], axis=1)
-        / np.sqrt(moved.area_m2)[:, None]
-    )
+    size = np.bincount(nearest, area, len(moved.area_m2))
+    flow = np.stack([np.bincount(nearest, area * one, len(size)) for one in speed.T], axis=1)
+    none = np.flatnonzero(size == 0)
+    if len(none):
+        from scipy.spatial import cKDTree
+
+        face = cKDTree(corner.mean(axis=1)).query(moved.corner_m[none].mean(axis=1))[1]
+        flow[none], size[none] = speed[face], 1.0
+    return np.asarray(flow / size[:, None])
+
+
+def _near_field(k: Array, curved_per_m: float, moved: Moved, speed: Array) -> Array:
+    """Compute ψ (c, m) in m·(1/√kg), complex, of the triangles' mean speeds (c, m)."""
+    root = np.sqrt(moved.area_m2)[:, None]
     curved = np.minimum(curved_per_m, 0.5 / moved.length_m)[:, None]
     across = (1 / moved.length_m[:, None] - curved) ** 2 - curved**2
     q = curved + np.sqrt(across + (curved + 1j * k) ** 2)
-    share: Array = moved.vector.T @ speed
-    return np.asarray((moved.vector @ np.divide(share, q) / np.sqrt(moved.area_m2)[:, None])[nearest])
+    share: Array = moved.vector.T @ (root * speed)
+    return np.asarray(moved.vector @ np.divide(share, q) / root)
 
 
 def _moments(

@@ -14,12 +14,14 @@ import numpy as np
 from sonic_bullet.files import cache as store
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.modal.keys import code_digest, key
-from sonic_bullet.radiation import compact
+from sonic_bullet.radiation import compact, near_mesh, surface_waves
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
 
-SOURCES = tuple(Path(str(room.__file__)).resolve() for room in (radiation, added_mass, compact))
+SOURCES = tuple(
+    Path(str(room.__file__)).resolve() for room in (radiation, added_mass, near_mesh, surface_waves, compact)
+)
 PACKAGES = ("numpy", "scipy", "numba")
 
 
@@ -65,17 +67,25 @@ def radiation_and_note(
     return known
 
 
-def _kept_air(cache: store.Place, corner: Array, area: Array, normal: Array) -> tuple[added_mass.Moved, Array] | None:
-    """Recall `radiation.far_field.surface_air` of a surface, or compute it."""
-    name = key("surface", corner, code=code_digest(SOURCES, PACKAGES))
+def _kept_air(
+    cache: store.Place, corner: Array, area: Array, normal: Array, modes: int
+) -> tuple[added_mass.Moved, Array] | None:
+    """Recall `radiation.near_mesh.surface_air` of a surface, or compute it."""
+    name = key("surface", corner, modes, code=code_digest(SOURCES, PACKAGES))
     found = store.load(cache, name)
     if found is not None:
         a = found[0]
-        return added_mass.Moved(a["area"], a["length"], a["vector"]), a["nearest"]
-    made = radiation.surface_air(corner, area, normal)
+        return added_mass.Moved(a["corner"], a["area"], a["length"], a["vector"]), a["nearest"]
+    made = near_mesh.surface_air(corner, area, normal, modes)
     if made is not None:
         moved, nearest = made
-        arrays = {"area": moved.area_m2, "length": moved.length_m, "vector": moved.vector, "nearest": nearest}
+        arrays = {
+            "corner": moved.corner_m,
+            "area": moved.area_m2,
+            "length": moved.length_m,
+            "vector": moved.vector,
+            "nearest": nearest,
+        }
         store.save(cache, name, arrays, "")
     return made
 
