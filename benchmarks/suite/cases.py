@@ -279,6 +279,8 @@ def _declared(
             },
             "direction": {b.name: np.round(way, 6).tolist() for b, (_, way) in zip(bodies, sensors, strict=True)},
         },
+        # what radiates is planted as an effect of unknown strength; all else rings in a vacuum
+        "medium": "unknown" if any(name == "radiation" for name, _ in plan.effects) else "none",
         "band_hz": [20, 20000],
         "onset": "the impulse arrives at sample 0 of every file",
         "recordings": entries,

@@ -288,8 +288,9 @@ def case() -> None:
 )
 @click.option(
     "--medium",
-    type=click.Choice(["air", "none"]),
-    help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
+    type=click.Choice(["air", "none", "unknown"]),
+    help="What it rang in: 'none' loses nothing to radiation, 'unknown' leaves it open. "
+    "[default: air; with --sensor sum unknown]",
 )
 def case_new(folder: str, more: tuple[str, ...], recordings: tuple[str, ...], **options: Any) -> None:
     """Write FOLDER/case.json for recordings of one object; files from elsewhere are copied into the folder."""

@@ -137,8 +137,9 @@ def strike_options(command: Any) -> Any:
             ),
             click.option(
                 "--medium",
-                type=click.Choice(["air", "none"]),
-                help="What it rang in: 'none' loses nothing to radiation. [default: air; with --sensor sum unknown]",
+                type=click.Choice(["air", "none", "unknown"]),
+                help="What it rang in: 'none' loses nothing to radiation, 'unknown' leaves it open. "
+                "[default: air; with --sensor sum unknown]",
             ),
             click.option(
                 "--onset",

@@ -130,7 +130,7 @@ def diagnose(
         start.hypothesis,
         bodies,
         takes or listed(bodies),
-        effects,
+        tuple(e for e in effects if case.medium == "unknown" or not e.traits.needs_unknown_medium),
         case.band_hz,
         seed=seed,
         progress=progress,
@@ -290,6 +290,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
             "gamma_m2_s2": d.found.fit.gamma_m2_s2 if d.found.has_material else None,
             "poisson_ratio": d.found.fit.poisson_ratio if d.found.has_material else None,
             "gain": d.closed.before.gain,
+            "radiation_factor": d.closed.before.air or None,
             "correction_rms": {
                 b.name: float(np.sqrt((b.correction**2).mean())) if len(b.correction) else 0.0
                 for b in d.bodies
@@ -300,6 +301,7 @@ def described(d: Diagnosis) -> dict[str, Any]:
             "alpha_per_s": d.closed.after.alpha_per_s,
             "beta_s": d.closed.after.beta_s,
             "gain": d.closed.after.gain,
+            "radiation_factor": d.closed.after.air or None,
         },
         "warnings": [*d.case.warnings, *d.warnings],
     }

@@ -99,6 +99,8 @@ class Traits:
     certain : bool
         It is proposed only where lines agree on it, each by its own baseband, and goes with level: a smaller gain on
         excluded strikes is enough, of which a loud one gains most.
+    needs_unknown_medium : bool
+        It is the medium's: where that is known, the baseline has it, or there is none.
     """
 
     moves_modes: bool = False
@@ -107,6 +109,7 @@ class Traits:
     cost: Cost = Cost.CHEAP
     by_line: bool = False
     certain: bool = False
+    needs_unknown_medium: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ class Radiation(Alternatives):
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "Fahy & Gardonio 2007, ch. 3"
-    traits: ClassVar[Traits] = Traits()
+    traits: ClassVar[Traits] = Traits(needs_unknown_medium=True)
 
     radius_m: float
     strength: float

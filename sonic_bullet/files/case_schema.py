@@ -27,7 +27,8 @@ ABOUT: dict[str, tuple[str, dict[str, str]]] = {
             "support": "clamps, or words",
             "sensor": "one for all recordings",
             "band_hz": "Hz, what the recordings hold; absent: 20 to 20 000",
-            "medium": "`air`, or `none` where nothing takes sound away; absent: air for a microphone or a vibrometer",
+            "medium": "`air`, `none` where nothing takes sound away, or `unknown`; absent: air for a microphone or a "
+            "vibrometer",
             "dimension_tolerance": "of its objects that do not say their own; absent: 0.005",
             "onset": "arrival of the impulse in every file: s, or words with `sample 0`; absent: found, phases not "
             "used",

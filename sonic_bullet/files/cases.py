@@ -57,7 +57,7 @@ BYTES_MAX = 1 << 24
 NAME_BYTES, PATH_BYTES = 255, 4095  # of POSIX file systems
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
-MEDIA = ("air", "none")
+MEDIA = ("air", "none", "unknown")
 IN_AIR = ("velocity", "pressure")
 """Sensors of real objects: their recordings are in air where a case does not say otherwise."""
 DIMENSION_TOLERANCE = 0.005

@@ -88,6 +88,7 @@ def make(
     decay: Array | None = None,
     fixed: tuple[tuple[float, float, float, float], ...] = (),
     edge_m: float | None = None,
+    to_hz: float = 18_000,
     seed: int = 3,
     **changes: Any,
 ) -> Planted:
@@ -96,7 +97,7 @@ def make(
     """
     rng = np.random.default_rng(seed)
     write_box(folder / "box.obj", size_m)
-    model = modal.analyse((modal.read_mesh(folder / "box.obj"),), material, to_hz=18_000, fixed=fixed, edge_m=edge_m)
+    model = modal.analyse((modal.read_mesh(folder / "box.obj"),), material, to_hz=to_hz, fixed=fixed, edge_m=edge_m)
     decay = model.decay_per_s if decay is None else decay
     top = np.flatnonzero(model.vertex_m[:, 2] > size_m[2] / 2 - 1e-9)
     end = int(top[np.argmax(model.vertex_m[top] @ (1.0, 0.7, 0))])

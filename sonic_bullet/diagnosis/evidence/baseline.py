@@ -165,7 +165,7 @@ def _off_db(b: Baseline) -> float:
 
 def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
     """Build the baseline of some evidence."""
-    found = fit_evidence(case, recorded, total=True, progress=progress)
+    found = fit_evidence(case, recorded, progress=progress)
     lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g)}
     shaped = struck_bodies(found, cache=cache, progress=progress) if len(lines) < len(recorded) else ()
     bodies = (*(body for body in shaped if body.name not in lines), *lines.values())
@@ -173,6 +173,7 @@ def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Call
     bodies = tuple(with_levels(separated(body), gain) for body in bodies)
     bodies = with_elastic(found, bodies, cache=cache, progress=progress)
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
+    base = replace(base, air=1.0 if found.radiation == "apart" else 0.0)
     bodies = settled(refitted(base, bodies), bodies)
     return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.diagnosis.evidence.air_factor import air_factor
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
@@ -209,25 +210,37 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     if known:
         return replace(h, alpha_per_s=known[-1][0], beta_s=known[-1][1])
     bare = replace(h, alpha_per_s=0.0, beta_s=0.0)
-    lam, left, sd, all_of_it = [], [], [], []
+    lam, left, sd, all_of_it, air = [], [], [], [], []
     for one in observed:
         if not len(one.freq_hz):
             continue
-        extra = np.zeros(len(one.freq_hz))
+        extra = radiated = np.zeros(len(one.freq_hz))
         if moves(h):  # ``one`` is of h itself, and its lines are paired anew
             extra = np.maximum(one.expected_decay_per_s - (h.alpha_per_s + h.beta_s * one.omega**2) / 2, 0.0)
-        elif h.at(Stage.MODES):
-            model = predict(bare, _whose(one, bodies)).model
-            extra = np.array([model.decay_per_s[who].mean() for who in _members(one, model)])
+        elif h.at(Stage.MODES) or h.air:
+            extra = _taken(predict(bare, _whose(one, bodies)), one)
+            if h.air:
+                radiated = np.maximum(extra - _taken(predict(replace(bare, air=0.0), _whose(one, bodies)), one), 0.0)
         lam.append(one.omega**2)
-        left.append(np.maximum(one.decay_per_s - extra, 1e-3 * one.decay_per_s))
+        left.append(one.decay_per_s - extra)
+        air.append(radiated)
         sd.append(np.hypot(one.decay_sd_per_s, 0.02 * extra))
         all_of_it.append(one.decay_per_s)
     if not lam:
         return h
     guess = (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12))
-    found = rayleigh(np.concatenate(lam), np.concatenate(left), np.concatenate(sd), guess, np.concatenate(all_of_it))
+    lines, rest, spread, whole_decay, lost = (np.concatenate(many) for many in (lam, left, sd, all_of_it, air))
+    if h.air and lost.any():
+        factor = air_factor(lines, rest + lost, np.hypot(spread, ROUGH * whole_decay), lost / h.air)
+        h, rest = replace(h, air=factor), rest + (1 - factor / h.air) * lost
+    rest = np.maximum(rest, 1e-3 * whole_decay)
+    found = rayleigh(lines, rest, spread, guess, whole_decay)
     return replace(h, alpha_per_s=found.alpha_per_s, beta_s=found.beta_s)
+
+
+def _taken(bare: Prediction, one: ObjectEvidence) -> Array:
+    """Compute the decays (k,) of the lines' modes by a prediction."""
+    return np.array([bare.model.decay_per_s[who].mean() for who in _members(one, bare.model)])
 
 
 def _members(one: ObjectEvidence, model: ModalModel) -> list[Array]:

@@ -30,6 +30,8 @@ class Hypothesis:
         ln of the factor of all frequencies, as E/ρ is fitted again with effects that move modes.
     poisson : float
         ν, where it is fitted again; else the baseline's.
+    air : float
+        What the modes lose to the air over what their bodies' shapes say, `Struck.radiated_per_s`; 0 without air.
     """
 
     alpha_per_s: float
@@ -39,6 +41,7 @@ class Hypothesis:
     correction: dict[str, Array] | None = None
     stretch: float = 0.0
     poisson: float | None = None
+    air: float = 0.0
 
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """Return the effects of a stage; for an object that was not fitted only those that carry over."""

@@ -162,9 +162,13 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
     lam = (2 * np.pi * base.freq_hz * (1 + (none if last else correction)) * np.exp(h.stretch)) ** 2
     decay = (h.alpha_per_s + h.beta_s * lam) / 2 if body.own_decay_per_s is None else body.own_decay_per_s
     model, order = ordered(base, np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi), decay)
-    for effect in sorted(
-        h.at(Stage.MODES, fitted=fitted), key=lambda e: e.owner is not Owner.MATERIAL
-    ):  # a law of the material is no fixture's
+    effects = h.at(Stage.MODES, fitted=fitted)
+    for effect in (
+        e for e in effects if e.owner is Owner.MATERIAL
+    ):  # a law of the material is no fixture's, nor the air's
+        model = effect.apply(model)
+    model, order = _in_air(h, body, model, order)
+    for effect in (e for e in effects if e.owner is not Owner.MATERIAL):
         before, model = model, effect.apply(model)
         if effect.traits.mixing is Mixing.NEIGHBOURS:
             order = order[came_from(before, model)]
@@ -174,6 +178,20 @@ def predict(h: Hypothesis, body: Struck) -> Prediction:
     if last:
         model, order = ordered(model, model.freq_hz * (1 + correction[: model.mode_count]), model.decay_per_s)
     return Prediction(h, body, base, model, order)
+
+
+def _in_air(h: Hypothesis, body: Struck, model: ModalModel, order: Array) -> tuple[ModalModel, Array]:
+    """Add what the modes of a model lose to the air; order (m,): which of the body's each was.
+
+    Modes of another elasticity are as many, and radiate as those that they have come from.
+    """
+    if not h.air or body.radiated_per_s is None or body.own_decay_per_s is not None:
+        return model, order
+    known = body.radiated_per_s[np.minimum(order, len(body.radiated_per_s) - 1)]
+    omega = np.sqrt(model.omega0_squared_per_s2)
+    decay = model.decay_per_s + h.air * known
+    made, moved = ordered(model, np.sqrt(np.maximum(omega**2 - decay**2, 0)) / (2 * np.pi), decay)
+    return made, order[moved]
 
 
 def impact_of(impulse_n_s: float, effects: Iterable[Effect]) -> Impact:

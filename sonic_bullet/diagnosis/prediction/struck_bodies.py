@@ -66,6 +66,9 @@ class Struck:
         In place of a law of the material; None where the model has them.
     own_phase : (s, m)
         Of the modes at the onset, of magnitude 1; None where the model has them.
+    radiated_per_s : (m,)
+        What the modes lose to the air, computed of this body's own surface; None where nothing is known of the medium,
+        or nothing is lost to it.
     relative : (s,)
         Impulses that are not known, over the mean of those; else 1.
     """
@@ -86,6 +89,7 @@ class Struck:
     poisson: Poisson | None = None
     own_decay_per_s: Array | None = None
     own_phase: Array | None = None
+    radiated_per_s: Array | None = None
     relative: Array | None = None
 
     @property
@@ -154,7 +158,10 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
             if at >= 0:  # modes that one line stands for are one frequency, whatever the mesh made of them
                 member = np.sqrt(value[inside])
                 correction[inside] = (1 + ratio) * np.exp(np.log(member).mean()) / member - 1
-    model, direction = modal_model(case, name, mine, family, density, value, vector)
+    weight, radiated = None, None
+    if case.sensor == "pressure" or found.radiation == "apart":
+        weight, radiated = into_air(family, density, np.sqrt(value) / (2 * np.pi), vector)
+    model, direction = modal_model(case, name, mine, family, density, value, vector, weight)
     impulse = np.array([np.nan if r.impulse_n_s is None else r.impulse_n_s for r in mine])
 
     def lowest(poisson: float) -> tuple[Array, Array]:
@@ -185,6 +192,7 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
         band_hz=case.band_hz,
         other=other,
         poisson=nu,
+        radiated_per_s=radiated if found.radiation == "apart" else None,
     )
 
 
@@ -196,6 +204,7 @@ def modal_model(
     density: float,
     value: Array,
     vector: Array,
+    weight: Array | None = None,
 ) -> tuple[ModalModel, Array]:
     """Build an undamped model with strikes and sensor as last vertices. Raises MeshError.
 
@@ -213,6 +222,8 @@ def modal_model(
         In kg/m³.
     value, vector : (m,), (b, m)
         λ of the modes and their coefficients.
+    weight : (m,)
+        How loud a microphone hears them, where it has been computed.
 
     Returns
     -------
@@ -236,8 +247,10 @@ def modal_model(
         place.append(np.array(position, float))
     freq = np.sqrt(value) / (2 * np.pi)
     if case.sensor != "velocity":
-        weight = into_air(family, density, freq, vector)[0] if case.sensor == "pressure" else np.ones(len(freq))
-        extra.append(np.stack([weight, 0 * weight, 0 * weight]))
+        loud = np.ones(len(freq))
+        if case.sensor == "pressure":
+            loud = into_air(family, density, freq, vector)[0] if weight is None else weight
+        extra.append(np.stack([loud, 0 * loud, 0 * loud]))
         direction.append(axes[0])
         place.append(family.vertex_m.mean(axis=0))
     skin = np.einsum("vxb,bm->vxm", family.skin, vector.astype(np.float32)) / np.float32(scale)

@@ -99,13 +99,9 @@ def fit_evidence(
     evidence: tuple[RecordedObject, ...],
     *,
     cache: Place = "default",
-    total: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> CaseFit:
-    """`fit_case` on evidence already gathered.
-
-    total: α and β of the decays as they are, whatever the air takes of them. Raises SonicBulletError.
-    """
+    """`fit_case` on evidence already gathered. Raises SonicBulletError."""
     if len({e.guess.name for e in evidence}) > 1:
         raise FileError("the 'fit' strikes are of objects of several materials", "give a case for each material")
     if not any(len(e.lines.freq_hz) for e in evidence):
@@ -123,7 +119,6 @@ def fit_evidence(
         pairs, information, scatter = (), np.zeros((2, 2)), np.nan
         log_gamma, poisson = float(np.log(guess.youngs_pa / guess.density_kg_m3)), guess.poisson
     radiation = radiation_in(case, evidence)
-    radiation = "damping" if total and radiation == "apart" else radiation
     apart = radiation == "apart"
     if apart and progress is not None:
         progress("how its modes radiate")
