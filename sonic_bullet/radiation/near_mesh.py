@@ -11,7 +11,7 @@ from sonic_bullet.radiation.entrained_mass import Moved, moved_air
 from sonic_bullet.radiation.surface_waves import RESOLVED
 from sonic_bullet.records import Array
 
-MOST_TRIANGLES = (700, 950, 1200, 1400)
+MOST_TRIANGLES = (700, 850, 950, 1200, 1400)
 """Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
 its triangles' chords would cross. The last takes 2 s of processor, and some 0.1 s a mode."""
 FINEST = 950  # triangles with which the search begins at most, whatever the waves

@@ -64,9 +64,10 @@ class SurfaceWaves:
         for mine in _alike(k * self._radius_m):
             mean = float(k[mine].mean())
             b = -1 / max(mean, 1 / self._equal_radius_m)
-            made = _at(np.float32(mean), np.float32(b), self._place, self._static, NUMBERS).view(np.complex64)
-            given = (speed[:, mine].T.astype(np.complex64) @ made[:, :, 1]).T
-            factor = lu_factor(made[:, :, 0].T, check_finite=False)
+            both = _at(np.float32(mean), np.float32(b), self._place, self._static, NUMBERS)
+            left, right = (one.view(np.complex64)[:, :, 0] for one in both)
+            given = (speed[:, mine].T.astype(np.complex64) @ right).T
+            factor = lu_factor(left.T, overwrite_a=True, check_finite=False)
             found[:, mine] = lu_solve(factor, given, check_finite=False)
         return found
 
@@ -116,16 +117,16 @@ def _kernels(corner, normal):
 
 @njit(nogil=True, fastmath=True)
 def _at(k, b, place, static, numbers):
-    """½ - K - βD and S + β(½ + K') at k (f, f, 4), [j, i]: real and imaginary parts of each; β = ib.
+    """½ - K - βD and S + β(½ + K') at k, each (f, f, 2), [j, i]: real and imaginary parts; β = ib.
 
     place (f, 7): centroids, normals, areas. All in single precision, `NUMBERS` too, and few arrays: it runs in vectors.
     """
     count = len(place)
-    made = np.empty((count, count, 4), np.float32)
+    left, right = np.empty((count, count, 2), np.float32), np.empty((count, count, 2), np.float32)
     one, two, half, turn, pi, tiny, even, c3, c5, c7, c9, c11, c4, c6, c8, c10, c12 = numbers
     for j in range(count):
         y0, y1, y2, m0, m1, m2, w = place[j]
-        known, row = static[j], made[j]
+        known, row, given = static[j], left[j], right[j]
         for i in range(count):
             r0, r1, r2 = place[i, 0] - y0, place[i, 1] - y1, place[i, 2] - y2
             n0, n1, n2 = place[i, 3], place[i, 4], place[i, 5]
@@ -149,10 +150,10 @@ def _at(k, b, place, static, numbers):
             d_im = w * ((g_im - f_im * over) * rx * ry - f_im * over * both)
             row[i, 0] = even * (b * d_im - known[i, 1] - w * f_re * ry)
             row[i, 1] = -even * (w * f_im * ry + b * d_re)
-            row[i, 2] = even * (known[i, 0] + w * (cosine - one) * over - b * w * f_im * rx)
-            row[i, 3] = even * (b * (known[i, 2] + w * f_re * rx) - w * sine * over)
+            given[i, 0] = even * (known[i, 0] + w * (cosine - one) * over - b * w * f_im * rx)
+            given[i, 1] = even * (b * (known[i, 2] + w * f_re * rx) - w * sine * over)
         row[j, 0] = 0.5 - b * k**3 / 3 * w * even
         row[j, 1] = -b * (known[j, 3] + 0.5 * k * k * known[j, 0]) * even
-        row[j, 2] = known[j, 0] * even
-        row[j, 3] = -k * w * even + b * (0.5 + known[j, 2] * even)
-    return made
+        given[j, 0] = known[j, 0] * even
+        given[j, 1] = -k * w * even + b * (0.5 + known[j, 2] * even)
+    return left, right
