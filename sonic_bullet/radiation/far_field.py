@@ -33,7 +33,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.radiation.compact import COMPACT, MODES_AT_ONCE, compact_weight, sound_faces
 from sonic_bullet.radiation.entrained_mass import Moved
-from sonic_bullet.radiation.near_mesh import cells, surface_air
+from sonic_bullet.radiation.near_mesh import cells, least_triangles, surface_air
 from sonic_bullet.radiation.surface_waves import RESOLVED, SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
 
@@ -71,7 +71,7 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
     normal = twice / (2 * area[:, None])
     extent = np.sort(np.ptp(corner.reshape(-1, 3), axis=0))
     patch, place = _patches(corner, area, normal, most_patches)
-    near = (near_field or surface_air)(corner, area, normal, m)
+    near = (near_field or surface_air)(corner, area, normal, least_triangles(m))
     if near is None:
         weight = compact_weight(model, face, area, normal @ turn, k, air)
         return weight, _damping(weight, air), COMPACT

@@ -17,16 +17,24 @@ its triangles' chords would cross. The last takes 2 s of processor, and some 0.1
 FINEST = 950  # triangles with which the search begins at most, whatever the waves
 
 
-def surface_air(corner: Array, area: Array, normal: Array, modes: int) -> tuple[Moved, Array] | None:
-    """Compute the air moved by the body, and the triangle (f,) of it that represents each face; else None.
+def least_triangles(modes: int) -> int:
+    """Return the size from which meshes are tried, of `MOST_TRIANGLES`: as bending waves ask, within limits.
 
-    The mesh is as fine as the bending waves of so many modes ask, as `RESOLVED` has it for sound, within limits: m
-    modes of a wall with both sides' area S reach κ = √(8πm/S) [Courant & Hilbert 1924, ch. VI.4], an edge is √(4S/√3f).
+    Three edges a wave, as `RESOLVED` has it for sound: m modes of a wall with both sides' area S reach κ = √(8πm/S)
+    [Courant & Hilbert 1924, ch. VI.4], an edge is √(4S/√3f).
     """
     wanted = min(32 * np.pi / np.sqrt(3) * modes / RESOLVED**2, FINEST)
+    return next(most for most in MOST_TRIANGLES if most >= wanted)
+
+
+def surface_air(corner: Array, area: Array, normal: Array, least: int) -> tuple[Moved, Array] | None:
+    """Compute the air moved by the body, and the triangle (f,) of it that represents each face; else None.
+
+    least: of `least_triangles`.
+    """
     tried = 0
     for most in MOST_TRIANGLES:
-        if most < wanted:
+        if most < least:
             continue
         coarse, nearest = near_mesh(corner, area, normal, most)
         moved = moved_air(coarse) if len(coarse) > tried else None
