@@ -19,4 +19,4 @@ def build(client):
     for body, restitution in ((board, 0.8), (mug, 0.6)):
         client.changeDynamics(body, -1, restitution=restitution)
     sb.keep_restitution(client)
-    return {board: {"material": "spruce", "name": "board"}, mug: {"material": "porcelain", "name": "mug"}}
+    return {board: {"material": "made-spruce", "name": "board"}, mug: {"material": "made-porcelain", "name": "mug"}}

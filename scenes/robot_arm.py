@@ -29,8 +29,8 @@ def build(client):
     for joint, angle in enumerate(REST):
         client.resetJointState(arm, joint, angle)
     cast = {
-        table: {"material": "wood", "name": "table", "count": 80},
-        (arm, WRIST): {"material": "aluminium", "name": "wrist"},
+        table: {"material": "made-wood", "name": "table", "count": 80},
+        (arm, WRIST): {"material": "made-aluminium", "name": "wrist"},
     }
     for i in range(8):
         domino = client.loadURDF(
@@ -40,13 +40,13 @@ def build(client):
         )
         # plastic; the file says 1 kg·m²
         client.changeDynamics(domino, -1, mass=0.0098, localInertiaDiagonal=[2.6e-6, 2.1e-6, 5.6e-7])
-        cast[domino] = {"material": "plastic", "name": f"domino {i + 1}"}
+        cast[domino] = {"material": "made-plastic", "name": f"domino {i + 1}"}
     mug = client.loadURDF("objects/mug.urdf", [0.51, 0.31, 0.003])
     client.changeDynamics(mug, -1, mass=0.35, localInertiaDiagonal=[5e-4, 5e-4, 5e-4])
-    cast[mug] = {"material": "porcelain", "name": "mug"}
+    cast[mug] = {"material": "made-porcelain", "name": "mug"}
     duck = client.loadURDF("duck_vhacd.urdf", [0.46, 0.4, 0.031], client.getQuaternionFromEuler([math.pi / 2, 0, 0]))
     client.changeDynamics(duck, -1, mass=0.06)
-    cast[duck] = {"material": "plastic", "name": "duck"}
+    cast[duck] = {"material": "made-plastic", "name": "duck"}
     for body in range(client.getNumBodies()):
         for link in range(-1, client.getNumJoints(body)):
             client.changeDynamics(body, link, restitution=0.5, lateralFriction=0.5)

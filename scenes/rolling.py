@@ -28,7 +28,7 @@ def build(client):
     client.resetBaseVelocity(ball, [SPEED_M_S, 0, 0], [0, SPEED_M_S / RADIUS_M, 0])
     sb.keep_restitution(client)
     return {
-        smooth: {"material": "wood", "name": "smooth board", "roughness_m": 0.1e-6},
-        rough: {"material": "wood", "name": "rough board", "roughness_m": 4e-6},
-        ball: {"material": "steel", "name": "ball", "roughness_m": 0.02e-6},
+        smooth: {"material": "made-wood", "name": "smooth board", "roughness_m": 0.1e-6},
+        rough: {"material": "made-wood", "name": "rough board", "roughness_m": 4e-6},
+        ball: {"material": "made-steel", "name": "ball", "roughness_m": 0.02e-6},
     }

@@ -25,6 +25,6 @@ def build(client):
     client.resetBaseVelocity(box, [1.5, 0, 0])
     sb.keep_restitution(client)
     return {
-        board: {"material": "wood", "name": "board", "roughness_m": 3e-6},
-        box: {"material": "wood", "name": "box", "roughness_m": 3e-6},
+        board: {"material": "made-wood", "name": "board", "roughness_m": 3e-6},
+        box: {"material": "made-wood", "name": "box", "roughness_m": 3e-6},
     }

@@ -23,7 +23,7 @@ def build(client):
     table = client.createMultiBody(
         0, client.createCollisionShape(client.GEOM_BOX, halfExtents=[0.45, 0.3, 0.012]), basePosition=[0, 0, -0.012]
     )
-    cast = {table: {"material": "spruce", "name": "table", "count": 120}}
+    cast = {table: {"material": "made-spruce", "name": "table", "count": 120}}
 
     def place(name, material, volume, shape, position, euler=(0, 0, 0), velocity=(0, 0, 0), spin=(0, 0, 0)):
         mass = DENSITY_KG_M3[material] * volume
@@ -31,7 +31,7 @@ def build(client):
             mass, shape, basePosition=position, baseOrientation=client.getQuaternionFromEuler(euler)
         )
         client.resetBaseVelocity(body, velocity, spin)
-        cast[body] = {"material": material, "name": name}
+        cast[body] = {"material": f"made-{material}", "name": name}
         return body
 
     def mesh(name):
@@ -83,7 +83,7 @@ def build(client):
         client.getQuaternionFromEuler((0.4, 0.2, 0)),
     )
     client.changeDynamics(toy, -1, mass=700 * 86.9e-6, localInertiaDiagonal=[6e-5, 4e-5, 8e-5])  # the file says 1 kg·m²
-    cast[toy] = {"material": "wood", "name": "toy"}
+    cast[toy] = {"material": "made-wood", "name": "toy"}
     for body in cast:
         client.changeDynamics(
             body, -1, restitution=0.75, lateralFriction=0.5, rollingFriction=1e-4, spinningFriction=2e-5
