@@ -103,6 +103,7 @@ class _Microphone(msgspec.Struct, tag="microphone", omit_defaults=True):
     ambisonics: int | None = None
     head: str | None = None
     head_sr: int = 0
+    directivity: bool = False
 
 
 class _Vibrometer(msgspec.Struct, tag="vibrometer"):
@@ -237,6 +238,7 @@ def _pack_microphone(one: Microphone) -> _Microphone:
         one.order if isinstance(one, Ambisonics) else None,
         None if head is None else as_json_text(head.name),
         0 if head is None else int(head.sr),
+        one.directivity,
     )
 
 
@@ -309,6 +311,7 @@ def _unpack_microphone(x: _Microphone, arrays: Mapping[str, Array], index: int, 
         "body_id": x.body_id,
         "link": x.link,
         "path": along,
+        "directivity": x.directivity,
     }
     if x.head is not None:
         direction = take(arrays, f"head{index}_direction", float, (None, 3), path)

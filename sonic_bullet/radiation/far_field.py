@@ -27,6 +27,7 @@ v vertices, f faces, m modes, s patches, n directions in pairs ±r̂.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,21 @@ from sonic_bullet.radiation.surface_waves import RESOLVED, SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
 
 NearField = Callable[[Array, Array, Array, int], tuple[Moved, Array] | None]
+
+
+class SurfaceTerms(NamedTuple):
+    """What a body's modes send, in its principal frame, which ``turn`` (3, 3) leads to.
+
+    k (m,); moment (m, 7, s) at place (s, 3), see `_moments`; point (p, 3): corners.
+    """
+
+    k: Array
+    moment: Array
+    place: Array
+    point: Array
+    turn: Array
+
+
 LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
 EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
 LOUDER = 16  # power of |p| by which directions count: half of a plate's modes are within 2° of the loudest one's phase
@@ -59,11 +75,53 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
 
     near_field: takes the place of `surface_air`.
     """
+    m = model.mode_count
+    face = sound_faces(model)[1]
+    if m == 0 or len(face) == 0:
+        return np.zeros(m, complex), np.zeros(m), ""
+    terms = surface_terms(model, air, near_field)
+    if not isinstance(terms, SurfaceTerms):
+        weight = compact_weight(model, face, *terms, air)
+        return weight, _damping(weight, air), COMPACT
+    k = terms.k
+    rings = np.clip(np.ceil(k * np.linalg.norm(terms.point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS + 1).astype(int)
+    weight = np.zeros(m, complex)
+    for count in np.unique(rings):
+        now = np.flatnonzero(rings == count)
+        direction, share = directions(int(count)) if count <= MOST_RINGS else spread_directions(SPREAD)
+        pressure, reach = surface_pressure(terms, air, direction, now)
+        every, both = np.concatenate([share, share]), np.concatenate([direction, -direction])
+        mean = np.abs(pressure) ** 2 @ every
+        left = pressure * np.exp(-1j * k[now, None] * reach)
+        loud = (np.abs(left) / np.maximum(np.abs(left).max(axis=1, keepdims=True), 1e-300)) ** LOUDER
+        phase = _unit(np.sqrt((loud * left**2) @ every))
+        sense = ((loud * left) @ (every * np.exp(both @ UNEVEN)) * phase.conj()).real
+        weight[now] = np.sqrt(mean) * np.where(sense < 0, -phase, phase)
+    return weight, _damping(weight, air), ""
+
+
+def surface_pressure(terms: SurfaceTerms, air: Air, direction: Array, modes: Array) -> tuple[Array, Array]:
+    """Compute the pressure (k, 2·n) of some modes (k,) at 1 m towards directions (n, 3) and their negatives.
+
+    Also return how far (2·n,) the surface reaches that way: p e^{-ik reach} counts from when sound leaves it there.
+    """
+    ahead, behind = _map(terms.k[modes], terms.moment[modes], np.ascontiguousarray(terms.place.T), direction)
+    pressure = (
+        np.concatenate([ahead, behind], axis=1)
+        * (1j * terms.k[modes] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
+    )
+    both = np.concatenate([direction, -direction])
+    reach = np.concatenate([(terms.point @ some.T).max(axis=0) for some in np.array_split(both, 16)])
+    return pressure, reach
+
+
+def surface_terms(
+    model: ModalModel, air: Air, near_field: NearField | None = None
+) -> SurfaceTerms | tuple[Array, Array, Array]:
+    """Compute what the modes of a body with a surface send; areas, normals and k where its near field cannot be."""
     most_patches = 1800
     m = model.mode_count
     corner, face = sound_faces(model)
-    if m == 0 or len(face) == 0:
-        return np.zeros(m, complex), np.zeros(m), ""
     k = 2 * np.pi * model.freq_hz / air.sound_speed_m_s
     corner, turn = _principal(corner, (model.shape**2).sum(axis=(1, 2), dtype=float)[face].mean(axis=1))
     twice = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -73,8 +131,7 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
     patch, place = _patches(corner, area, normal, most_patches)
     near = (near_field or surface_air)(corner, area, normal, least_triangles(m))
     if near is None:
-        weight = compact_weight(model, face, area, normal @ turn, k, air)
-        return weight, _damping(weight, air), COMPACT
+        return area, normal @ turn, k
     moved, nearest = near
     low = k * np.sqrt(4 / np.sqrt(3) * moved.area_m2.mean()) < RESOLVED
     waves = SurfaceWaves(moved.corner_m) if low.any() else None
@@ -87,27 +144,7 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
         if waves is not None and low[some].any():
             level[:, low[some]] = waves.potential(k[some][low[some]], mean[:, low[some]])
         _moments(speed, level[nearest], corner, area, normal, patch, place, moment[some])
-    point = corner.reshape(-1, 3)
-    rings = np.clip(np.ceil(k * np.linalg.norm(point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS + 1).astype(int)
-    weight = np.zeros(m, complex)
-    for count in np.unique(rings):
-        now = np.flatnonzero(rings == count)
-        direction, share = directions(int(count)) if count <= MOST_RINGS else spread_directions(SPREAD)
-        ahead, behind = _map(k[now], moment[now], np.ascontiguousarray(place.T), direction)
-        pressure = (
-            np.concatenate([ahead, behind], axis=1)
-            * (1j * k[now] * air.sound_speed_m_s * air.density_kg_m3 / (4 * np.pi))[:, None]
-        )
-        both = np.concatenate([direction, -direction])
-        mean = np.abs(pressure) ** 2 @ np.concatenate([share, share])
-        reach = np.concatenate([(point @ some.T).max(axis=0) for some in np.array_split(both, 16)])
-        left = pressure * np.exp(-1j * k[now, None] * reach)
-        loud = (np.abs(left) / np.maximum(np.abs(left).max(axis=1, keepdims=True), 1e-300)) ** LOUDER
-        every = np.concatenate([share, share])
-        phase = _unit(np.sqrt((loud * left**2) @ every))
-        sense = ((loud * left) @ (every * np.exp(both @ UNEVEN)) * phase.conj()).real
-        weight[now] = np.sqrt(mean) * np.where(sense < 0, -phase, phase)
-    return weight, _damping(weight, air), ""
+    return SurfaceTerms(k, moment, place, corner.reshape(-1, 3), turn)
 
 
 def _damping(weight: Array, air: Air) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from sonic_bullet.files import cache as store
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.modal.keys import code_digest, key
-from sonic_bullet.radiation import compact, near_mesh, surface_waves
+from sonic_bullet.radiation import compact, near_mesh, pattern, surface_waves
 from sonic_bullet.radiation import entrained_mass as added_mass
 from sonic_bullet.radiation import far_field as radiation
 from sonic_bullet.records import Air, Array, ModalModel
@@ -65,6 +65,24 @@ def radiation_and_note(
         known = radiation.radiation_and_note(model, air, partial(_kept_air, cache) if keep_surface else None)
         store.save(cache, name, {"real": known[0].real, "imag": known[0].imag, "damping": known[1]}, known[2])
     return known
+
+
+@WhileAlive
+def pattern_of(model: ModalModel, air: Air, cache: store.Place = "default") -> Array | None:
+    """Compute `radiation.pattern.radiation_pattern` of a model, cached as by `radiation_of`; None: even all around."""
+    if model.mode_count == 0 or len(model.face) == 0:
+        return None
+    code = code_digest((*SOURCES, Path(str(pattern.__file__)).resolve()), PACKAGES)
+    parts = model.freq_hz, model.shape, model.vertex_m, model.face, air.density_kg_m3, air.sound_speed_m_s
+    name = key("pattern", *parts, code=code)
+    found = store.load(cache, name)
+    if found is None or found[0]["real"].shape != (pattern.ROWS * pattern.TURNS, model.mode_count):
+        made = pattern.radiation_pattern(model, air)
+        if made is None:
+            return None
+        found = {"real": made.real.astype(np.float32), "imag": made.imag.astype(np.float32)}, ""
+        store.save(cache, name, *found)
+    return np.asarray(found[0]["real"] + 1j * found[0]["imag"])
 
 
 def _kept_air(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
-from sonic_bullet.records.coerce import as_kind, as_number, as_whole
+from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_whole
 from sonic_bullet.records.receivers import AHEAD_XYZW, Head, MicrophonePath, unit_quaternions
 from sonic_bullet.records.touching.sensor_response import SensorResponse
 
@@ -22,6 +22,7 @@ class Microphone:
 
     position_m (3,): in the world, fixed; with body_id in the frame of that body, with which it moves; None with a path:
     where that begins. quaternion_xyzw (4,): how it is turned there, which matters to ambisonics and heads alone.
+    directivity: whether a mode sounds as its pressure is on this side of the body, or as its mean over all directions.
     """
 
     position_m: Array = None  # type: ignore[assignment]  # a path's first, in its stead
@@ -29,9 +30,11 @@ class Microphone:
     body_id: int | None = None
     link: int = -1
     path: MicrophonePath | None = None
+    directivity: bool = False
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        store(self, directivity=as_flag(self.directivity, "microphone: directivity"))
         path, remedy = self.path, "give one of position_m, in the world or in a body's frame, and path"
         if path is not None:
             path = as_kind(path, MicrophonePath, "microphone: path", "give a MicrophonePath(time_s, position_m)")

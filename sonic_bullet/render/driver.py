@@ -209,7 +209,7 @@ def finish(i, number, x, given, frames, window, scratch, path):  # pragma: no co
     """
     step, here, there = given.steps[i], number % SPAN, (number + 1) % SPAN
     at, aim_m, out, reads = step.sample - frames.start, given.aim_m, frames.out, frames.reads
-    emission = Emission(scratch.source[0], scratch.pushed, np.int64(0))
+    emission = Emission(scratch.source, scratch.pushed, np.int64(0), frames.sets)
     course = Course(
         window.position_m[here], window.position_m[there], window.teleported[there], x,
         aim_m[i : i + 2] if len(aim_m) > 0 else aim_m,

@@ -47,12 +47,13 @@ class Frames(NamedTuple):
     """What the driver fills: out (channels, ·), from sample ``start`` on, and pressure (microphones, ·).
 
     apart 1: out is (bodies·channels, …) and pressure (bodies·microphones, …), body by body, nothing summed. reads (c,):
-    weight set of each channel, 0 for a microphone.
+    weight set of each channel, 0 for a microphone; sets: of each microphone.
     """
 
     start: int
     apart: int
     reads: Array
+    sets: Array
     pressure: Array
     out: Array
 

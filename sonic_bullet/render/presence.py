@@ -125,7 +125,7 @@ def subset(state: State, keep: Array) -> None:
     state.stand = state.stand[keep]
     state.travelling = path.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
-    for part in (state.space, state.surface):
+    for part in (state.space, state.surface, state.directions):
         if part is not None:
             part.subset(keep)
     state.pairs.subset(number)

@@ -50,6 +50,7 @@ class Resonator:
     bend, damping_growth : (m,) of frequency per |z|², of decay by (damping_growth·|z|)^damping_growth_power
         None in a linear body
     rigid_columns : 6 where its rigid motion is played too, else 0
+    keep : which of its model's modes are audible
     """
 
     body: Body
@@ -68,6 +69,7 @@ class Resonator:
     damping_growth: Array | None = None
     damping_growth_power: float = 1.0
     rigid_columns: int = 0
+    keep: Array | None = None
 
     @property
     def mode_count(self) -> int:
@@ -82,13 +84,36 @@ def weight_sets(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
 
 def weight_set_count(sensors: tuple[Sensor, ...]) -> int:
     """Count row 0, a row for each of `weight_sets`, and those that read rigid motions."""
-    return 1 + len(weight_sets(sensors)) + rigid_rows(sensors)
+    return 1 + len(weight_sets(sensors)) + len(directional(sensors)) + rigid_rows(sensors)
+
+
+def directional(sensors: tuple[Sensor, ...]) -> tuple[int, ...]:
+    """Return the numbers, among the microphones, of those that hear on which side of a body they are."""
+    microphones = [one for one in sensors if isinstance(one, Microphone)]
+    return tuple(c for c, one in enumerate(microphones) if one.directivity)
+
+
+def aimed_sets(sensors: tuple[Sensor, ...]) -> Array:
+    """Return (W,) which of the `directional` microphones each weight set is of, -1 for none."""
+    first, count = 1 + len(weight_sets(sensors)), len(directional(sensors))
+    aims = np.full(weight_set_count(sensors), -1, np.int64)
+    aims[first : first + count] = np.arange(count)
+    return aims
+
+
+def microphone_sets(sensors: tuple[Sensor, ...]) -> Array:
+    """Return the weight set (c,) of each microphone: 0, that of all, or its own."""
+    sets = np.zeros(sum(isinstance(one, Microphone) for one in sensors), np.int64)
+    sets[list(directional(sensors))] = np.flatnonzero(aimed_sets(sensors) >= 0)
+    return sets
 
 
 def read_sets(sensors: tuple[Sensor, ...]) -> Array:
     """Return the weight set (c,) that each sensor reads, 0 for all microphones; then those of rigid motions."""
     own = np.array([not isinstance(one, Microphone) for one in sensors] + [True] * rigid_rows(sensors), bool)
-    return np.where(own, np.cumsum(own), 0).astype(np.int64)
+    sets = np.where(own, np.cumsum(own), 0)
+    sets[len(sensors) :] += len(directional(sensors))  # which stand between
+    return sets.astype(np.int64)
 
 
 def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) -> Resonator:
@@ -120,6 +145,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr, body.mounting)
     weight = np.zeros((sets, len(omega)), complex)
     weight[0] = pressure
+    weight[aimed_sets(sensors) >= 0] = pressure
     for row, sensor in enumerate(readers, start=1):
         if isinstance(sensor, ModalSum):
             weight[row] = sensor.scale * -1j / (1 + 1j * decay / omega)
@@ -156,6 +182,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         damping_growth,
         model.damping_growth_power,
         rigid_columns(body, sensors) if index is not None else 0,
+        keep,
     )
 
 

@@ -19,7 +19,16 @@ from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.groups import Groups
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
-from sonic_bullet.render.resonator import Resonator, build_resonator, read_sets, weight_set_count
+from sonic_bullet.render.resonator import (
+    Resonator,
+    aimed_sets,
+    build_resonator,
+    directional,
+    microphone_sets,
+    read_sets,
+    weight_set_count,
+)  # fmt: skip
+from sonic_bullet.render.space.directions import Directions
 from sonic_bullet.render.space.space_state import SpaceState, is_spatial
 from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
 from sonic_bullet.render.surface.surface_state import SurfaceState, start_surface
@@ -207,8 +216,9 @@ class State:
     have left, and ring on where they were); newest: the highest so far. quenches: steps before which all ringing stops.
     voices (b): residuals; grains, rubs: their grains and sections under way. witness: called with every step once it
     rings, then one at a time. stand (b,) STAND: support state; credit_s (1,): time left for new poles, (0,) where
-    nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces. lifted: of
-    bodies that left, by name, the steps that they rang on contacts, and those with contact separation.
+    nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces;
+    directions: of microphones with directivity; sets (c,): the weight set of each microphone. lifted: of bodies that
+    left, by name, the steps that they rang on contacts, and those with contact separation.
     """
 
     window: Window
@@ -238,6 +248,8 @@ class State:
     lifted: dict[str, tuple[int, int]] = field(default_factory=dict)
     space: SpaceState | None = None
     surface: SurfaceState | None = None
+    directions: Directions | None = None
+    sets: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -273,6 +285,7 @@ class State:
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.witness, self.stand.copy(), self.credit_s.copy(), dict(self.lifted),
             self.space and self.space.copy(), self.surface and self.surface.copy(),
+            self.directions and self.directions.copy(), self.sets,
         )  # fmt: skip
 
 
@@ -287,16 +300,11 @@ class Witness(Protocol):
 def start(setup: Setup) -> State:
     """Return silence at time 0, without bodies."""
     sets, passes = weight_set_count(setup.sensors), bank.PASSES if setup.supports else 0
-    instrument, ringing = bank.empty_bank(setup.sr, sets, passes=passes)
+    instrument, ringing = bank.empty_bank(setup.sr, sets, passes=passes, aims=aimed_sets(setup.sensors))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
     none = np.zeros(0, np.int64)
-    window = Window(
-        np.zeros(SPAN, WINDOW),
-        np.zeros((SPAN, 0, 3)),
-        np.zeros((SPAN, 0, 4)),
-        np.zeros((SPAN, 0), bool),
-        np.zeros(0, ROW),
-    )
+    poses = np.zeros((SPAN, 0, 3)), np.zeros((SPAN, 0, 4)), np.zeros((SPAN, 0), bool)
+    window = Window(np.zeros(SPAN, WINDOW), *poses, np.zeros(0, ROW))
     pairs = TouchingPairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)), np.zeros(0, HELD))
     credit_s = np.full(1 if setup.supports else 0, SAVED_S)
     state = State(
@@ -304,6 +312,8 @@ def start(setup: Setup) -> State:
     )
     state.space = SpaceState(setup.sensors, setup.sr, setup.air) if is_spatial(setup.sensors) else None
     state.surface = start_surface(setup.sensors, setup.sr, setup.seed, apart=setup.apart)
+    state.sets = microphone_sets(setup.sensors)
+    state.directions = Directions(directional(setup.sensors)) if directional(setup.sensors) else None
     return state
 
 
@@ -323,6 +333,8 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     state.has_residual = any(voice is not None for voice in state.voices)
     state.stand = np.concatenate([state.stand, np.zeros(len(new), STAND)])
     state.scratch = StepScratch()
+    if state.directions is not None:
+        state.directions.with_bodies(new, voices, setup.air)
     state.changed()
 
 

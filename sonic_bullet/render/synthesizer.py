@@ -25,6 +25,7 @@ from sonic_bullet.render.groups import DriverCall, Frames, StepTables
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
 from sonic_bullet.render.ringing_on import with_tail
+from sonic_bullet.render.space.directions import take_aim, until_turned
 from sonic_bullet.render.space.space_state import hears_apart
 from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.surface.finished_channels import finish_channels
@@ -56,6 +57,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
         count = 1 if state.has_residual or state.witness is not None else len(steps)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead), until_motions(steps)])
+        count = min(count, until_turned(setup, state, steps[:count]))
         frames.append(_advanced(setup, state, steps[:count]))
         steps = steps[count:]
     return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
@@ -97,8 +99,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     aim, sensors = AT_REST, len(state.reads)
     by_body = setup.apart or hears_apart(setup.sensors) or state.surface is not None
     if state.space is not None:
-        next_s = clock.after(waiting[0]).time_s
-        aim = state.space.aim(table, next_s, poses, state.resonators)
+        aim = state.space.aim(table, clock.after(waiting[0]).time_s, poses, state.resonators)
+    take_aim(setup, state)
     groups, microphones = len(state.body) if by_body else 1, len(state.path.microphone_m)
     out = np.zeros((groups * sensors, stop - begin))
     pressure = out if microphones == sensors else np.zeros((groups * microphones, stop - begin))
@@ -106,7 +108,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
     given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.ANEW
-    frames = Frames(begin, int(by_body), state.reads, pressure, out)
+    frames = Frames(begin, int(by_body), state.reads, state.sets, pressure, out)
     while done < len(steps):
         values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
         if not getattr(driver.advance_steps, "overloads", True):
@@ -140,10 +142,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
 
 
 def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
-    """Join contact rows of all steps, and their poses (k, b, ·).
-
-    Read-only, as those of one step are, so that one type is compiled once.
-    """
+    """Join contact rows of all steps, and their poses (k, b, ·): read-only, so that one type is compiled once."""
     first = steps[0]
     if len(steps) == 1:
         return first.contacts.row, (first.position_m[None], first.quaternion_xyzw[None], first.teleported[None])

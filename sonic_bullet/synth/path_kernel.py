@@ -178,19 +178,19 @@ def _listen(line, at, n, steep, ring, taps, work):  # pragma: no cover - compile
 
 
 @njit(nogil=True, error_model="numpy")
-def _emit(b, first, n, emission, x, fade, work):  # pragma: no cover - compiled
-    """Compute a and D of body b as `fractional_delay.emit`, faded; return whether delays fall fast.
+def _emit(b, w, first, n, emission, x, fade, work):  # pragma: no cover - compiled
+    """Compute a and D of body b, weight set w, as `fractional_delay.emit`, faded; return whether delays fall fast.
 
     fade: 0 none, 1 in, -1 out, 2 silent from now on. work.tail (5·LANES,): samples after the last whole group.
     """
     source, pushed, tail = emission.source, emission.pushed, work.tail
-    whole, long = n & -LANES, source.shape[1]
+    whole, bodies, long = n & -LANES, source.shape[1], source.shape[2]
     for k in range(n - whole):
         i = first + whole + k
-        tail[k], tail[4 * LANES + k] = source[b, i], x[i]
+        tail[k], tail[4 * LANES + k] = source[w, b, i], x[i]
         for axis in range(3):
             tail[(1 + axis) * LANES + k] = pushed[b, axis, i]
-    arrays = At(source, b * long + first), At(pushed, 3 * b * long + first), At(x, first)
+    arrays = At(source, (w * bodies + b) * long + first), At(pushed, 3 * b * long + first), At(x, first)
     steep = emit(arrays, long, tail, n, work.geometry, work.emitted, work.delay)
     if fade != 0:
         begin, slope = 1.0 if fade == -1 else 0.0, 0.0 if fade == 2 else float(fade)
@@ -259,7 +259,7 @@ def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR09
                     count = place.size - ((at + lo) & mask)
                     count = count if count < BLOCK else BLOCK
                     count = count if count < n - lo else n - lo
-                    steep = _emit(b, first + lo, count, emission, course.x, fade, work)
+                    steep = _emit(b, emission.sets[c], first + lo, count, emission, course.x, fade, work)
                     if _listen(line, at + lo, count, steep, ring, path.taps, work):
                         row = (b * channels if apart else 0) + c
                         add(work.observed, out, row * out.shape[1] + arrivals.at + lo, count)

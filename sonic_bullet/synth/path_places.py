@@ -74,11 +74,15 @@ class PathTables(NamedTuple):
 
 
 class Emission(NamedTuple):
-    """What bodies emit, from column ``first`` on: source (≥ b, ·) and pushed (≥ b, 3, ·), along each axis, in Pa·m."""
+    """What bodies emit, from column ``first`` on, in Pa·m.
+
+    source (W, ≥ b, ·): of each weight set; pushed (≥ b, 3, ·): along each axis; sets (c,): which each microphone hears.
+    """
 
     source: Array
     pushed: Array
     first: int | np.int64
+    sets: Array
 
 
 class Course(NamedTuple):
@@ -154,7 +158,7 @@ def survey(step, n, emission, course, path):  # pragma: no cover - compiled
     """
     begin_m, end_m, aim_m, microphone_m = course.begin_m, course.end_m, course.aim_m, path.microphone_m
     sources, places, lines, first = path.sources, path.places, path.lines, emission.first
-    channels, long = len(microphone_m), emission.source.shape[1]
+    channels, long = len(microphone_m), emission.source.shape[2]
     free, wrong = np.int64(0), DONE  # a plain 0 has its own type, and each callee would be compiled for it too
     for b in range(len(sources)):
         body = sources[b]

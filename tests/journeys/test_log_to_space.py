@@ -41,6 +41,8 @@ def inside(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (("--head", "head.sofa", "--facing", "0,0,0"), 2),
         (("--microphone-path", "walk.csv"), 1),
         (("--microphone-on", "bar=0,0,0.1", "--ambisonics", "1"), 4),
+        (("--directivity",), 1),
+        (("--directivity", "--ambisonics", "1", "--microphone-path", "walk.csv"), 4),
     ],
 )
 def test_a_render_in_space_comes_again_from_its_own_log(

@@ -39,7 +39,16 @@ def propagate(
     while True:
         course = Course(position0_m, position1_m, moved, progress, AT_REST)
         tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
-        status = hear(state.at, step, n, Emission(source, pushed, 0), course, tables, work, arrivals)
+        status = hear(
+            state.at,
+            step,
+            n,
+            Emission(source[None], pushed, 0, np.zeros(len(path.microphone_m), np.int64)),
+            course,
+            tables,
+            work,
+            arrivals,
+        )
         if status == DONE:
             break
         grow(path, state, status)

@@ -118,6 +118,7 @@ PLACED = {
     "body_id": None,
     "link": -1,
     "path": None,
+    "directivity": False,
 }
 ALONG = {"time_s": [0.0, 1.0], "position_m": [[0, 0, 0], [1, 0, 0]], "quaternion_xyzw": None}
 HEAD = {"direction": [[1.0, 0, 0], [0, 1, 0]], "response": np.ones((2, 2, 4)), "sr": 48_000, "name": "head"}
@@ -374,6 +375,7 @@ PLACED_BAD: dict[str, list[Any]] = {
     "body_id": [*OPTIONAL, 1.5],
     "link": WHOLE,
     "path": RECORD,
+    "directivity": FLAG,
 }
 BAD: dict[str, dict[str, list[Any]]] = {
     "Air": {"density_kg_m3": [*NUMBER, 0, -1], "sound_speed_m_s": [*NUMBER, 0]},

@@ -53,7 +53,16 @@ def called(
     push = np.zeros((1, 3, n)) if pushed is None else pushed
     course = Course(begin_m, end_m, np.array([moved]), np.arange(n) / n, AT_REST)
     tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
-    status = hear(state.at, step, n, Emission(source, push, 0), course, tables, np.zeros(WORK), arrivals)
+    status = hear(
+        state.at,
+        step,
+        n,
+        Emission(source[None], push, 0, np.zeros(2, np.int64)),
+        course,
+        tables,
+        np.zeros(WORK),
+        arrivals,
+    )
     return status, out
 
 
@@ -186,7 +195,16 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
     for k in range(steps):
         course = Course(place[k], place[k + 1], still, along, AT_REST)
         tables, arrivals = gather(PathTables, path, state), Arrivals(out, k * n + 3, 0)
-        status = hear(k * n, k, n, Emission(source, pushed, k * n), course, tables, work, arrivals)
+        status = hear(
+            k * n,
+            k,
+            n,
+            Emission(source[None], pushed, k * n, np.zeros(len(path.microphone_m), np.int64)),
+            course,
+            tables,
+            work,
+            arrivals,
+        )
         assert status == DONE
     assert np.isnan(out[:, :3]).all()
     assert np.ascontiguousarray(out[:, 3:]).tobytes() == np.concatenate(parts, axis=1).tobytes()

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from sonic_bullet.records import Array, Body, Head, Microphone, Sensor, SensorResponse, Vibrometer
 
 OPTIONS = (
-    "ambisonics", "head", "facing", "microphone_path", "microphone_on", "contact_microphone", "vibrometer",
-    "contact_response", "contact_noise",
+    "ambisonics", "head", "facing", "directivity", "microphone_path", "microphone_on", "contact_microphone",
+    "vibrometer", "contact_response", "contact_noise",
 )  # fmt: skip
 COLUMNS = (4, 8)
 """Of a path's table: time and place, and, it may be, the quaternion."""
@@ -46,6 +46,12 @@ def space_options(command: Any) -> Any:
                 "--facing",
                 type=Numbers("X,Y,Z"),
                 help="Where ambisonics and heads look, in the world, in m. [default: along x]",
+            ),
+            click.option(
+                "--directivity",
+                is_flag=True,
+                default=None,
+                help="Each mode sounds as it does on that side of its body. [default: as its mean over all sides]",
             ),
             click.option(
                 "--microphone-path",
@@ -132,6 +138,7 @@ class SpaceWish:
     paths: tuple[Microphone, ...] = ()
     on: tuple[tuple[str, tuple[float, ...]], ...] = ()
     touching: tuple[Touching, ...] = ()
+    directivity: bool | None = None
 
     @classmethod
     def read(
@@ -140,6 +147,7 @@ class SpaceWish:
         ambisonics: int | None,
         head: str | None,
         facing: tuple[float, float, float] | None,
+        directivity: bool | None,
         microphone_path: tuple[str, ...],
         microphone_on: tuple[str, ...],
         contact_microphone: tuple[str, ...],
@@ -173,11 +181,12 @@ class SpaceWish:
         touching = [Touching.read("contact-microphone", one, chain) for one in contact_microphone]
         touching += [Touching.read("vibrometer", one) for one in vibrometer]
         paths = tuple(read_path(path) for path in microphone_path)
-        return cls(ambisonics, found, facing, paths, tuple(on), tuple(touching))
+        return cls(ambisonics, found, facing, paths, tuple(on), tuple(touching), directivity)
 
     def __bool__(self) -> bool:
         """Return whether anything is asked for."""
-        return bool(self.ambisonics or self.head or self.facing or self.paths or self.on or self.touching)
+        asked = self.ambisonics, self.head, self.facing, self.directivity, self.paths, self.on, self.touching
+        return any(bool(one) for one in asked)
 
     @property
     def channels(self) -> int:
@@ -213,6 +222,7 @@ class SpaceWish:
                 continue
             how: dict[str, Any] = {name: getattr(one, name) for name in ("quaternion_xyzw", "body_id", "link", "path")}
             how["position_m"] = None if one.path is not None else one.position_m
+            how["directivity"] = one.directivity or bool(self.directivity)
             if self.facing is not None:
                 how["quaternion_xyzw"] = turn_to(one.position_m, self.facing)
             if self.ambisonics is not None:
@@ -221,8 +231,8 @@ class SpaceWish:
                 made[i] = Binaural(**how, head=self.head)
                 if self.head.sr != sr:
                     notes.append(f"{self.head.name} is resampled from {self.head.sr} Hz to {sr} Hz")
-            elif self.facing is not None:
-                made[i] = replace(one, quaternion_xyzw=how["quaternion_xyzw"])
+            else:
+                made[i] = replace(one, quaternion_xyzw=how["quaternion_xyzw"], directivity=how["directivity"])
         return tuple(made), tuple(dict.fromkeys(notes))
 
 

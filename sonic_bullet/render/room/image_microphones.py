@@ -71,7 +71,7 @@ def mirrored(microphone: Microphone, sign: Array, offset_m: Array) -> tuple[Micr
         also = None if path.quaternion_xyzw is None else _turn(path.quaternion_xyzw, sign, odd)
         path = replace(path, position_m=place(path.position_m), quaternion_xyzw=also)
     at: Any = None if path is not None else place(microphone.position_m)
-    made = replace(microphone, path=path, position_m=at, quaternion_xyzw=_turn(turned, sign, odd))
+    made = replace(microphone, directivity=False, path=path, position_m=at, quaternion_xyzw=_turn(turned, sign, odd))
     signs = np.ones(microphone.channels)
     if odd and isinstance(made, Binaural):
         made = replace(made, head=_exchanged(made.head))

@@ -113,8 +113,14 @@ def _turned_on_path(one: Microphone, time_s: Array) -> Array:
 def rotate(quaternion_xyzw: Array, vector: Array) -> Array:
     """Turn vectors (…, 3) by quaternions (…, 4)."""
     axis, real = quaternion_xyzw[..., :3], quaternion_xyzw[..., 3:]
-    twice = 2 * np.cross(axis, vector)
-    return np.asarray(vector + real * twice + np.cross(axis, twice))
+    twice = 2 * _cross(axis, vector)
+    return np.asarray(vector + real * twice + _cross(axis, twice))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Compute the bits of np.cross, which takes ten times as long for few vectors."""
+    (ax, ay, az), (bx, by, bz) = ((v[..., 0], v[..., 1], v[..., 2]) for v in (a, b))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def turn_back(quaternion_xyzw: Array, vector: Array) -> Array:

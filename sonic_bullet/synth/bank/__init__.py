@@ -19,8 +19,6 @@ into calls gives the same bits. All work in place: `copy()` a state first to loo
 from sonic_bullet.synth.bank.instrument import (
     Bank,
     BankState,
-    ModeSet,
-    Translation,
     append,
     audible,
     empty_bank,
@@ -29,6 +27,7 @@ from sonic_bullet.synth.bank.instrument import (
     subset,
 )
 from sonic_bullet.synth.bank.layout import FLOOR
+from sonic_bullet.synth.bank.mode_set import ModeSet, Translation
 from sonic_bullet.synth.bank.passing import PASSES, set_passes
 from sonic_bullet.synth.bank.poles import set_poles
 

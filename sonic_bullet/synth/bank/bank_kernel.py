@@ -30,7 +30,7 @@ DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
 @uncounted
-def _ring(b, bank, scratch):  # pragma: no cover - compiled
+def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover - compiled
     """Compute the tiles of body b for the block that starts: sound (W, b, BLOCK), pass_sound (J·W, b, BLOCK).
 
     Advances z to the next block. False where all modes are below the floor. scratch: RING_SCRATCH numbers.
@@ -50,20 +50,49 @@ def _ring(b, bank, scratch):  # pragma: no cover - compiled
             for w in range(sets):
                 if bank.observed[w, b]:
                     bank.sound[w, b, :] = 0.0
+            bank.glide[:, :] = 0.0
             for j in range(partners):
                 bank.pass_sound[j * sets : (j + 1) * sets, b, :] = 0.0
         real = min(lanes.count, start + columns - lo)  # spare lanes need no table
         tile.rows(powers, real, table)
         for w in range(sets):
             if bank.observed[w, b]:
-                tile.columns(now, bank.weight[w], lanes, powers, column)
+                k = bank.aims[w]
+                tile.columns(now, bank.weight[w] if k < 0 else bank.aim[2 * k], lanes, powers, column)
                 tile.outer(column, table, real, bank.sound[w, b])
+                if k >= 0 and bank.turned[k, b]:
+                    tile.columns(now, bank.aim[2 * k + 1], lanes, powers, column)
+                    tile.outer(column, table, real, bank.glide[k])
         for j in range(partners):
             if passing.sounds(bank.passes[b, j].phase):
                 for w in range(j * sets, (j + 1) * sets):
                     tile.columns(now, bank.pass_weight[w], lanes, powers, column)
                     tile.outer(column, table, real, bank.pass_sound[w, b])
+    if alive:
+        _turn(b, bank)
     return alive
+
+
+@uncounted
+def _turn(b, bank):  # pragma: no cover - compiled
+    """Let the block's free sound of aimed sets pass from the weights as they were to those from its end on."""
+    for w in range(len(bank.observed)):
+        k = bank.aims[w]
+        if k >= 0 and bank.turned[k, b] and bank.observed[w, b]:
+            for n in range(BLOCK):
+                bank.sound[w, b, n] += n / BLOCK * (bank.glide[k, n] - bank.sound[w, b, n])
+
+
+@uncounted
+def _take_aim(b, bank):  # pragma: no cover - compiled
+    """Let what is driven from here on have the new weights of aimed sets."""
+    modes = bank.law.shape[1]
+    for k in range(len(bank.turned)):
+        if bank.turned[k, b]:
+            bank.turned[k, b] = 0
+            for re in range(bank.body[b].start, bank.body[b].stop):
+                bank.aim[2 * k, re] = bank.aim[2 * k + 1, re]
+                bank.aim[2 * k, re + modes] = bank.aim[2 * k + 1, re + modes]
 
 
 @uncounted
@@ -163,7 +192,7 @@ def _press_strikes(b, stretch, column, keep, pushes, bank, work):  # pragma: no 
 
 
 @uncounted
-def _drive(b, stretch, bank, scratch, work):  # pragma: no cover - compiled
+def _drive(b, stretch, bank, scratch, work):  # noqa: PLR0912 - a loop a set  # pragma: no cover - compiled
     """Advance body b by a stretch within one of the DRIVEN; sum driven and free part."""
     modes, ringing, count = bank.law.shape[1], bank.ringing[b], stretch.count
     start, stop, f0, f1 = bank.body[b].start, bank.body[b].stop, work.first[b], work.first[b + 1]
@@ -191,6 +220,8 @@ def _drive(b, stretch, bank, scratch, work):  # pragma: no cover - compiled
                 for k in range(drive.STEP):
                     push[k] = 0.0
             weight = At(bank.weight if j < 0 else bank.pass_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
+            if j < 0 and bank.aims[w] >= 0:
+                weight = At(bank.aim, 4 * bank.aims[w] * modes + lo)
             motion = drive.DrivenModes(bank.driven, bank.pole)
             drive.run(motion, lanes, weight, drive.Pushes(push, pushes), count, partial, keep)
         if j >= 0 or bank.observed[w, b]:
@@ -232,6 +263,7 @@ def _open_block(b, bank, scratch):  # pragma: no cover - compiled
         poles.bend_poles(b, np.int64(BLOCK), bank)
     alive = ringing.ringing != 0 and _ring(b, bank, scratch)
     ringing.tiled = ringing.ringing = 1 if alive else 0
+    _take_aim(b, bank)
 
 
 @uncounted

@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.bank.layout import BANK_BODY, FLUSH, PAIR, RINGING, STRIKE
+from sonic_bullet.synth.bank.mode_set import ModeSet, Translation
 from sonic_bullet.synth.bank.passing import OFF, PASS, SILENCED
 from sonic_bullet.synth.bank.tile import BLOCK
 from sonic_bullet.synth.pulse import pulse_table
@@ -23,47 +24,13 @@ FASTEST_DECAY_PER_SAMPLE = 2.0
 SLOWEST_TURN = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
-class Translation:
-    """Pole of a body's three translations, and weight: pressure at 1 m, in Pa·m per N·s along an axis.
-
-    Forces act evenly over the sample before each instant, pulses over cells of the sample grid, not at once: such modes
-    decay within a few samples, and a slow force must contribute by its slope alone.
-    """
-
-    omega_rad_s: float
-    decay_per_s: float
-    weight: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ModeSet:
-    """Modes of one body for the bank, all `audible`.
-
-    Attributes
-    ----------
-    omega_rad_s, decay_per_s : (m,) of the damped modes
-    weight : (W, m) complex
-    bend, damping_growth : (m,) of level-dependent modes, None: linear; see `poles.bend_poles`
-        ω (1 + bend·|z|²) and d (1 + (damping_growth·|z|)^damping_growth_power)
-    translation : None where only the modes sound
-    """
-
-    omega_rad_s: Array
-    decay_per_s: Array
-    weight: Array
-    bend: Array | None = None
-    damping_growth: Array | None = None
-    damping_growth_power: float = 1.0
-    translation: Translation | None = None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Bank:
     """Constants of the instrument.
 
     body (b,) BANK_BODY; law (6, m): of each lane s/sr, d/ω and how its pole depends on its level; weight (W, 2·m), real
-    parts first; observed (W, b): whether any weight of the body is not zero.
+    parts first; observed (W, b): whether any weight of the body is not zero; aims (W,): which pair of rows of
+    `BankState.aim` a set has in place of its weights, -1 for none.
     """
 
     sr: int
@@ -71,6 +38,7 @@ class Bank:
     law: Array
     weight: Array
     observed: Array
+    aims: Array
 
     @property
     def hertz(self) -> Array:
@@ -105,6 +73,8 @@ class BankState:
     pole, block : (2·m,) e^s and e^{256 s}, bent by level where a body is
     law, coming : (7, m) the bank's, with poles as they are now; (8, m) see `poles`
     passes, pass_weight, pass_sound : (b, J) PASS, (J·W, 2·m), (J·W, b, 256), see `passing`
+    aim, turned, glide : (2·D, 2·m) weights of aimed sets as they are, and from the next block on; (D, b) 1 where these
+        differ; (D, 256) scratch
     ringing : (b,) RINGING
     strikes, rows : (pool,) STRIKE and (pool, 8, columns) their phasors
     free : (pool + 1,) how many rows are free, and which
@@ -121,6 +91,9 @@ class BankState:
     passes: Array
     pass_weight: Array
     pass_sound: Array
+    aim: Array
+    turned: Array
+    glide: Array
     ringing: Array
     strikes: Array
     rows: Array
@@ -171,22 +144,28 @@ def flushed(values: Array) -> Array:
     return np.asarray(np.where(np.abs(values) < FLUSH, 0, values))
 
 
-def empty_bank(sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0) -> tuple[Bank, BankState]:
+def empty_bank(
+    sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0, aims: Array | None = None
+) -> tuple[Bank, BankState]:
     """Build a bank without bodies and its state at absolute sample ``at``.
 
-    passes: partners to which each body may transmit. Raises AudioError on a rate outside 1 … 10 MHz.
+    passes: partners to which each body may transmit. aims: as of `Bank`, None: none is aimed. Raises
+    AudioError on a rate outside 1 … 10 MHz.
     """
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
         raise AudioError(f"sample rate {sr}", "give a whole number of Hz, 44100 or 48000 say")
     none = np.zeros((weight_sets, 0))
-    bank = Bank(int(sr), np.zeros(0, BANK_BODY), np.zeros((6, 0)), none, none.astype(bool))
+    aims = np.full(weight_sets, -1, np.int64) if aims is None else aims
+    aimed = int(np.count_nonzero(aims >= 0))
+    bank = Bank(int(sr), np.zeros(0, BANK_BODY), np.zeros((6, 0)), none, none.astype(bool), aims)
     z, driven, pole, block = np.zeros((4, 0))
     silent, strikes = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
     rows, free = np.zeros((0, 8, PAIR)), np.zeros(1, np.int64)
     state = BankState(
         int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)), np.zeros((0, passes), PASS),
-        np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)), np.zeros(0, RINGING), strikes,
-        rows, free,
+        np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)),
+        np.zeros((2 * aimed, 0)), np.zeros((aimed, 0), np.int64), np.zeros((aimed, BLOCK)), np.zeros(0, RINGING),
+        strikes, rows, free,
     )  # fmt: skip
     return bank, state
 
@@ -228,7 +207,9 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         np.concatenate([bank.law, law], axis=1),
         np.stack([_joined(bank.weight[w], weight[w]) for w in range(sets)]).reshape(sets, -1),
         np.concatenate([bank.observed, observed], axis=1),
+        bank.aims,
     )
+    aimed = np.repeat(weight[np.flatnonzero(bank.aims >= 0)], 2, axis=0)
     state = state.copy()
     silent, ringing = np.zeros(total, complex), np.zeros(len(bodies), RINGING)
     ringing["strike"] = -1
@@ -250,6 +231,10 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         if len(state.pass_weight)
         else np.zeros((0, 2 * grown.law.shape[1])),
         pass_sound=np.concatenate([state.pass_sound, np.zeros((len(state.pass_sound), len(bodies), BLOCK))], axis=1),
+        aim=np.array([_joined(one, more) for one, more in zip(state.aim, aimed, strict=True)]).reshape(
+            len(aimed), 2 * grown.law.shape[1]
+        ),
+        turned=np.concatenate([state.turned, np.zeros((len(state.turned), len(bodies)), np.int64)], axis=1),
         ringing=np.concatenate([state.ringing, ringing]),
         rows=rows,
     )
@@ -267,10 +252,11 @@ def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
     body["start"], body["stop"] = stop - size, stop
     both = np.concatenate([lane, bank.law.shape[1] + lane])
     law, weight = np.take(bank.law, lane, axis=1), np.take(bank.weight, both, axis=1)
-    few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1))
+    few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1), bank.aims)
     flat = {name: getattr(state, name)[both] for name in ("z", "driven", "pole", "block")}
     flat |= {name: np.take(getattr(state, name), lane, axis=1) for name in ("law", "coming")}
-    flat |= {name: np.take(getattr(state, name), keep, axis=1) for name in ("sound", "pass_sound")}
+    flat |= {name: np.take(getattr(state, name), keep, axis=1) for name in ("sound", "pass_sound", "turned")}
+    flat["aim"] = np.take(state.aim, both, axis=1)
     number = np.full(bank.body_count, -1)
     number[keep] = np.arange(len(keep))
     passes = state.passes[keep]

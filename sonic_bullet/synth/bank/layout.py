@@ -105,6 +105,7 @@ class BankTables(NamedTuple):
     weight: Array
     observed: Array
     hertz: Array
+    aims: Array
     ringing: Array
     law: Array
     z: Array
@@ -116,6 +117,9 @@ class BankTables(NamedTuple):
     passes: Array
     pass_weight: Array
     pass_sound: Array
+    aim: Array
+    turned: Array
+    glide: Array
     strikes: Array
     rows: Array
     free: Array
