@@ -15,19 +15,12 @@ import numpy as np
 from sonic_bullet.machine.grouping import gather, kinds_of
 from sonic_bullet.records import Air, Array, Body, Microphone, Sensor, channels_of
 from sonic_bullet.records.contacts import first_bodies
+from sonic_bullet.render import resonator
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.groups import Groups
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
-from sonic_bullet.render.resonator import (
-    Resonator,
-    aimed_sets,
-    build_resonator,
-    directional,
-    microphone_sets,
-    read_sets,
-    weight_set_count,
-)  # fmt: skip
+from sonic_bullet.render.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.render.space.directions import Directions
 from sonic_bullet.render.space.space_state import SpaceState, is_spatial
 from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
@@ -300,7 +293,7 @@ class Witness(Protocol):
 def start(setup: Setup) -> State:
     """Return silence at time 0, without bodies."""
     sets, passes = weight_set_count(setup.sensors), bank.PASSES if setup.supports else 0
-    instrument, ringing = bank.empty_bank(setup.sr, sets, passes=passes, aims=aimed_sets(setup.sensors))
+    instrument, ringing = bank.empty_bank(setup.sr, sets, passes=passes, aims=resonator.aimed_sets(setup.sensors))
     air, travelling = path.empty_path(setup.sr, setup.air, setup.microphone_m)
     none = np.zeros(0, np.int64)
     poses = np.zeros((SPAN, 0, 3)), np.zeros((SPAN, 0, 4)), np.zeros((SPAN, 0), bool)
@@ -312,8 +305,9 @@ def start(setup: Setup) -> State:
     )
     state.space = SpaceState(setup.sensors, setup.sr, setup.air) if is_spatial(setup.sensors) else None
     state.surface = start_surface(setup.sensors, setup.sr, setup.seed, apart=setup.apart)
-    state.sets = microphone_sets(setup.sensors)
-    state.directions = Directions(directional(setup.sensors)) if directional(setup.sensors) else None
+    state.sets = resonator.microphone_sets(setup.sensors)
+    hears = resonator.directional(setup.sensors)
+    state.directions = Directions(hears) if hears else None
     return state
 
 

@@ -50,7 +50,7 @@ def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover
             for w in range(sets):
                 if bank.observed[w, b]:
                     bank.sound[w, b, :] = 0.0
-            bank.glide[:, :] = 0.0
+            bank.blend[:, :] = 0.0
             for j in range(partners):
                 bank.pass_sound[j * sets : (j + 1) * sets, b, :] = 0.0
         real = min(lanes.count, start + columns - lo)  # spare lanes need no table
@@ -62,7 +62,7 @@ def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover
                 tile.outer(column, table, real, bank.sound[w, b])
                 if k >= 0 and bank.turned[k, b]:
                     tile.columns(now, bank.aim[2 * k + 1], lanes, powers, column)
-                    tile.outer(column, table, real, bank.glide[k])
+                    tile.outer(column, table, real, bank.blend[k])
         for j in range(partners):
             if passing.sounds(bank.passes[b, j].phase):
                 for w in range(j * sets, (j + 1) * sets):
@@ -80,7 +80,7 @@ def _turn(b, bank):  # pragma: no cover - compiled
         k = bank.aims[w]
         if k >= 0 and bank.turned[k, b] and bank.observed[w, b]:
             for n in range(BLOCK):
-                bank.sound[w, b, n] += n / BLOCK * (bank.glide[k, n] - bank.sound[w, b, n])
+                bank.sound[w, b, n] += n / BLOCK * (bank.blend[k, n] - bank.sound[w, b, n])
 
 
 @uncounted

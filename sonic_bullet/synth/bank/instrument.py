@@ -73,7 +73,7 @@ class BankState:
     pole, block : (2·m,) e^s and e^{256 s}, bent by level where a body is
     law, coming : (7, m) the bank's, with poles as they are now; (8, m) see `poles`
     passes, pass_weight, pass_sound : (b, J) PASS, (J·W, 2·m), (J·W, b, 256), see `passing`
-    aim, turned, glide : (2·D, 2·m) weights of aimed sets as they are, and from the next block on; (D, b) 1 where these
+    aim, turned, blend : (2·D, 2·m) weights of aimed sets as they are, and from the next block on; (D, b) 1 where these
         differ; (D, 256) scratch
     ringing : (b,) RINGING
     strikes, rows : (pool,) STRIKE and (pool, 8, columns) their phasors
@@ -93,7 +93,7 @@ class BankState:
     pass_sound: Array
     aim: Array
     turned: Array
-    glide: Array
+    blend: Array
     ringing: Array
     strikes: Array
     rows: Array

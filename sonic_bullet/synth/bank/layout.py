@@ -119,7 +119,7 @@ class BankTables(NamedTuple):
     pass_sound: Array
     aim: Array
     turned: Array
-    glide: Array
+    blend: Array
     strikes: Array
     rows: Array
     free: Array
