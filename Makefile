@@ -52,6 +52,7 @@ test: .venv/dev.stamp
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
 test-all: check
+	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 check: .venv/dev.stamp

@@ -77,10 +77,18 @@ def test_a_limited_mix_is_still_the_sum_of_its_stems() -> None:
 
 
 def test_each_stem_has_a_loudness_of_its_own() -> None:
-    told = rendered("--stems", "own", "--stem-lufs", "-20", "--stem-peak-dbfs", "-2")
+    told = rendered("--material", "board=glass", "--stems", "own", "--stem-lufs", "-20", "--stem-peak-dbfs", "-2")
     assert len(told["stems"]) == 2
     for stem in told["stems"]:
         assert abs(lufs(stem["path"]) + 20) < 0.1 and true_peak_dbtp(stem["path"]) <= -2
+
+
+def test_a_stem_that_cannot_be_so_loud_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    """A board of plain wood is one click: no limiter makes it as loud as what rings."""
+    rendered("--stems", "own", "--stem-lufs", "-20", "--stem-peak-dbfs", "-2")
+    said = capfd.readouterr().out
+    assert "00-board.wav: no -20 LUFS below that true peak, it is as loud as in the mix" in said
+    assert "01-bar.wav: no" not in said
 
 
 @parametrize_few("fade", [(0.0, 0.25), (0.05, 0.1), (0.02, 0.0)], (0, 1))

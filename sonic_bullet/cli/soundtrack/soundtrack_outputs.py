@@ -193,6 +193,11 @@ class Soundtrack:
         older = {one.name for one in Path(self.wish.stems).glob("[0-9][0-9]*-*.wav")} - {
             Path(report.path).name for report in reports
         }
+        self.words += [
+            f"{report.path}: no {self.wish.stem_lufs:g} LUFS below that true peak, it is as loud as in the mix"
+            for report in reports
+            if self.wish.stem_lufs is not None and not _is_as_loud(report, self.wish.stem_lufs)
+        ]
         if older:
             said += f"; {', '.join(sorted(older)[:5])} there {'is' if len(older) == 1 else 'are'} of another render"
         self.words.append(said)
@@ -209,3 +214,9 @@ class Soundtrack:
             }
             for stem, report in zip(stems, reports, strict=True)
         ]
+
+
+def _is_as_loud(report: AudioReport, lufs: float) -> bool:
+    """Return whether a file has the loudness asked for, to a tenth."""
+    found = None if report.loudness is None else report.loudness.integrated_lufs
+    return found is not None and abs(found - lufs) < 0.1

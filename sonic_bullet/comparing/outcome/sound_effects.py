@@ -57,9 +57,15 @@ def sound_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
 
 
 def band_levels(x: Array, sr: int) -> Array:
-    """Return mean squares (bands,) in octave bands, all channels together, dB re 1 Pa²; −inf where silent."""
-    n = max(x.shape[1], 1)
-    power = (np.abs(np.fft.rfft(x, axis=1)) ** 2).sum(axis=0) * 2 / n**2
+    """Return mean squares (bands,) in octave bands, all channels together, dB re 1 Pa²; −inf where silent.
+
+    The end fades out by half a Hann window: cut where it rings, a sound would be a click in bands without sound.
+    """
+    fade_s = 0.02  # a period of 50 Hz
+    n, fade = max(x.shape[1], 1), min(round(fade_s * sr), x.shape[1])
+    ending = 0.5 + 0.5 * np.cos(np.pi * (np.arange(fade) + 1) / (fade + 1))
+    faded = np.concatenate([x[:, : x.shape[1] - fade], x[:, x.shape[1] - fade :] * ending], axis=1)
+    power = (np.abs(np.fft.rfft(faded, axis=1)) ** 2).sum(axis=0) * 2 / n**2
     freq = np.fft.rfftfreq(n, 1 / sr)
     edge = math.sqrt(2)
     sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in OCTAVES_HZ if f / edge < sr / 2]
