@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.surface.rigid_motion import rigid_shape
@@ -48,6 +49,21 @@ class _Turned(NamedTuple):
     free: slice
     own_at: int
     turn: Array | None
+
+
+def _pairs(turn: Array) -> Array:
+    """Return the modes (p,) that a turn (m, m) mixes with the next one."""
+    return np.flatnonzero(np.diag(turn, 1))
+
+
+@njit(nogil=True)
+def _turn_columns(modes, own, pairs, turn):  # type: ignore[no-untyped-def]
+    """Write columns ``pairs`` (p,) and the next ones of modes (rows, columns), times turn (m, m), into own."""
+    for r in range(len(modes)):
+        for k in pairs:
+            one, other = modes[r, k], modes[r, k + 1]
+            own[r, k] = one * turn[k, k] + other * turn[k + 1, k]
+            own[r, k + 1] = one * turn[k, k + 1] + other * turn[k + 1, k + 1]
 
 
 _NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
@@ -185,18 +201,17 @@ class BodyTable:
             vertices = int(self.faces["vertex"][row["face_at"] : row["face_at"] + row["faces"]].max(initial=-1)) + 1
             free = slice(int(row["shape_at"]), int(row["shape_at"]) + 3 * vertices * columns)
             one = _Turned(free, self._shapes.append(self.shapes[free].copy()), None)
-        self._turned[b] = one._replace(turn=turn)
+        old, self._turned[b] = one.turn, one._replace(turn=turn)
         row["shape_at"] = one.free.start if turn is None else one.own_at
+        size = one.free.stop - one.free.start
+        modes = self.shapes[one.free].reshape(-1, columns)
+        own = self.shapes[one.own_at : one.own_at + size].reshape(-1, columns)
+        none = np.zeros(0, np.int64)
+        before, after = (none if one is None else _pairs(one) for one in (old, turn))
+        if old is not None:
+            _turn_columns(modes, own, np.setdiff1d(before, after), np.eye(len(old)))
         if turn is not None:
-            m, size = len(turn), one.free.stop - one.free.start
-            modes = self.shapes[one.free].reshape(-1, columns)
-            own = self.shapes[one.own_at : one.own_at + size].reshape(-1, columns)
-            band = np.abs(np.diag(turn, 1))
-            pairs = np.flatnonzero(band)
-            for k in pairs.tolist():
-                own[:, k : k + 2] = modes[:, k : k + 2] @ turn[k : k + 2, k : k + 2]
-            rest = np.setdiff1d(np.arange(m), np.concatenate([pairs, pairs + 1]))
-            own[:, rest] = modes[:, rest]
+            _turn_columns(modes, own, after, turn)
 
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
         """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
