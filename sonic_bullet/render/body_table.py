@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.surface.rigid_motion import rigid_shape
-from sonic_bullet.render.tables import BODY, FACE, NODE
+from sonic_bullet.render.tables import BODY, FACE, NODE, TURN
 from sonic_bullet.support import ContactSide
 from sonic_bullet.synth.pulse import spectrum_table
 from sonic_bullet.synth.strikes import SPAN
@@ -41,29 +40,6 @@ class _Place:
     node_at: int
     wall_m: float
     tie_m: float
-
-
-class _Turned(NamedTuple):
-    """Where the shapes of a body's free modes lie in the flat ones, where its turned ones begin, and the turn."""
-
-    free: slice
-    own_at: int
-    turn: Array | None
-
-
-def _pairs(turn: Array) -> Array:
-    """Return the modes (p,) that a turn (m, m) mixes with the next one."""
-    return np.flatnonzero(np.diag(turn, 1))
-
-
-@njit(nogil=True)
-def _turn_columns(modes, own, pairs, turn):  # type: ignore[no-untyped-def]
-    """Write columns ``pairs`` (p,) and the next ones of modes (rows, columns), times turn (m, m), into own."""
-    for r in range(len(modes)):
-        for k in pairs:
-            one, other = modes[r, k], modes[r, k + 1]
-            own[r, k] = one * turn[k, k] + other * turn[k + 1, k]
-            own[r, k + 1] = one * turn[k, k + 1] + other * turn[k + 1, k + 1]
 
 
 _NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
@@ -114,7 +90,7 @@ class BodyTable:
         self._bodies, self._faces, self._nodes = _Growing(BODY), _Growing(FACE), _Growing(NODE)
         self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
         self._places: dict[tuple[ModalModel, bytes, int], _Place] = {}
-        self._turned: dict[int, _Turned] = {}
+        self._turn_rows, self._turns = _Growing(TURN), dict[int, Array]()
 
     @property
     def bodies(self) -> Array:
@@ -135,6 +111,11 @@ class BodyTable:
     def shapes(self) -> Array:
         """Mode shapes, flat."""
         return self._shapes.filled
+
+    @property
+    def turns(self) -> Array:
+        """Rows of TURN."""
+        return self._turn_rows.filled
 
     @property
     def frequency_hz(self) -> Array:
@@ -176,42 +157,40 @@ class BodyTable:
         row["placed"] = -SPAN if material is None else body.since_step
         row["rebound"] = body.dynamics.get("restitution", UNKNOWN_REBOUND)
         row["loaded"] = row["cause_step"] = row["since_step"] = NEVER
+        row["turn_at"] = -1
         return self._bodies.append(row)
 
     def copy(self) -> BodyTable:
-        """Return a copy with its own bodies and turned shapes; what belongs to models is shared."""
+        """Return a copy with its own bodies and their turns; what belongs to models is shared."""
         other = BodyTable()
-        other._bodies.append(self.bodies)
+        other._take(self.bodies, self)
         other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
-        other._frequencies, other._places = self._frequencies, dict(self._places)
-        if self._turned:
-            other._shapes, other._turned = _Growing(np.float32), dict(self._turned)
-            other._shapes.append(self.shapes)
+        other._frequencies, other._places, other._turns = self._frequencies, dict(self._places), dict(self._turns)
         return other
+
+    def _take(self, bodies: Array, other: BodyTable) -> None:
+        """Take over rows of bodies of another table, and its turns."""
+        self._bodies.append(bodies)
+        self._turn_rows.append(other.turns)
 
     def turn_of(self, b: int) -> Array | None:
         """Return the turn (m, m) of a body's modes from its free ones; None where it has none."""
-        return self._turned[b].turn if b in self._turned else None
+        return self._turns.get(b)
 
     def turn(self, b: int, turn: Array | None) -> None:
-        """Turn the modes of a body: its shapes become Φ turn, in their own place; None: they are its model's again."""
-        row, one = self.bodies[b], self._turned.get(b)
-        columns = int(row["columns"])
-        if one is None:
-            vertices = int(self.faces["vertex"][row["face_at"] : row["face_at"] + row["faces"]].max(initial=-1)) + 1
-            free = slice(int(row["shape_at"]), int(row["shape_at"]) + 3 * vertices * columns)
-            one = _Turned(free, self._shapes.append(self.shapes[free].copy()), None)
-        old, self._turned[b] = one.turn, one._replace(turn=turn)
-        row["shape_at"] = one.free.start if turn is None else one.own_at
-        size = one.free.stop - one.free.start
-        modes = self.shapes[one.free].reshape(-1, columns)
-        own = self.shapes[one.own_at : one.own_at + size].reshape(-1, columns)
-        none = np.zeros(0, np.int64)
-        before, after = (none if one is None else _pairs(one) for one in (old, turn))
-        if old is not None:
-            _turn_columns(modes, own, np.setdiff1d(before, after), np.eye(len(old)))
-        if turn is not None:
-            _turn_columns(modes, own, after, turn)
+        """Turn the modes of a body, neighbours by pairs; None: they are its free ones again."""
+        row = self.bodies[b]
+        row["turns"] = 0
+        if turn is None:
+            self._turns.pop(b, None)
+            return
+        if row["turn_at"] < 0:
+            row["turn_at"] = self._turn_rows.append(np.zeros(len(turn) // 2, TURN))
+        self._turns[b] = turn
+        pairs = np.flatnonzero(np.diag(turn, 1))
+        rows = self.turns[row["turn_at"] :][: len(pairs)]
+        rows["mode"], rows["by"] = pairs, [turn[k : k + 2, k : k + 2] for k in pairs.tolist()]
+        row["turns"] = len(pairs)
 
     def subset(self, keep: Array, kept: Sequence[tuple[Resonator, Array]]) -> BodyTable:
         """Return a table of only the bodies ``keep`` (k,), with their resonators and `follows`.
@@ -219,20 +198,16 @@ class BodyTable:
         What belongs to models is shared while half of it at least is theirs, else built anew.
         """
         other = BodyTable()
-        other._bodies.append(self.bodies[keep])
-        other._turned = {new: self._turned[old] for new, old in enumerate(keep.tolist()) if old in self._turned}
+        other._take(self.bodies[keep], self)
+        other._turns = {new: self._turns[old] for new, old in enumerate(keep.tolist()) if old in self._turns}
         keys = {(one.body.model, follows.tobytes(), one.rigid_columns) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}
         if 2 * sum(place.faces for place in places.values()) >= len(self.faces):
             other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
             other._frequencies, other._places = self._frequencies, places
         else:
-            turns, other._turned = {b: one.turn for b, one in other._turned.items()}, {}
             for row, (one, follows) in zip(other.bodies, kept, strict=True):
                 _stand(row, other._place(one, follows))
-            for b, turn in turns.items():
-                if turn is not None:
-                    other.turn(b, turn)
         return other
 
     def _place(self, resonator: Resonator, follows: Array) -> _Place:

@@ -63,7 +63,7 @@ def touch(rows, r, table):
 
 @njit(nogil=True, error_model="numpy")
 def add_push(rows, r, side, factor, table, out):
-    """Add factor·Uᵀj of row r on the body of a side to out (columns,).
+    """Add factor·Uᵀj of row r on the body of a side, of its free modes, to out (columns,).
 
     Uᵀj: the shapes, linear in the triangle, times the row's impulse in N·s (with factor 1: N·s/√kg). `touch` the row
     first. The shapes are flat float32, see BODY.shape_at. out may be longer than the body's columns.
@@ -85,6 +85,17 @@ def add_push(rows, r, side, factor, table, out):
         )
         for c in range(columns):
             out[c] = out[c] + u * x * along_x[c] + u * y * along_y[c] + u * z * along_z[c]
+
+
+@njit(nogil=True, error_model="numpy")
+def turn_push(body, turns, out):
+    """Turn Uᵀj in out (columns,), of a body's free modes, to its modes as they are: Rᵀ Uᵀj of each of its pairs."""
+    for q in range(body.turns):
+        pair = turns[body.turn_at + q]
+        k, by = pair.mode, pair.by
+        one, other = out[k], out[k + 1]
+        out[k] = one * by[0, 0] + other * by[1, 0]
+        out[k + 1] = one * by[0, 1] + other * by[1, 1]
 
 
 @njit(nogil=True, error_model="numpy")

@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Body
-from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
+from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch, turn_push
 from sonic_bullet.render.strike_pulses import STEEPEST
 from sonic_bullet.synth.profile import given_octaves, height_octaves
 from sonic_bullet.synth.strikes import SPAN
@@ -86,6 +86,7 @@ def advance_friction(number, x, sr, window, table, pairs, voices, scratch):
                 aim[c] = 0.0
             for r in range(begin, end):
                 add_push(rows, r, side, 1.0 / voice.total_n_s, table, aim)
+            turn_push(table.bodies[pair.body[side]], table.turns, aim)
             for c in range(columns):
                 start[c] = kept[c] if pair.gains else aim[c]
                 aim[c] = start[c] + follow * (aim[c] - start[c]) if end > begin else start[c]

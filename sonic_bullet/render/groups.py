@@ -75,6 +75,7 @@ class BodyTables(NamedTuple):
     faces: Array
     nodes: Array
     shapes: Array
+    turns: Array
     frequency_hz: Array
     spectrum: Array
 

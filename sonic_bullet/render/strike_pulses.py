@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.render.contact_place import add_push, effective_mass, flat_area_m2, touch
+from sonic_bullet.render.contact_place import add_push, effective_mass, flat_area_m2, touch, turn_push
 from sonic_bullet.render.contact_rows import opening
 from sonic_bullet.render.struck.strike_causes import accept, date_strikes
 from sonic_bullet.synth.pulse import compliance, pulse_length
@@ -292,6 +292,7 @@ def _make(strike, quaternion, rows, table, pulse, push):
     given = 0.0
     for side in range(2):
         body = bodies[strike.body[side]]
+        turn_push(body, table.turns, push[side])
         given += compliance(push[side], table.frequency_hz, body.frequency_at, body.modes, length, table.spectrum[flat])
         pulse.body[side] = strike.body[side]
     pulse.length_s, pulse.flat = length, flat

@@ -57,9 +57,14 @@ BODY = np.dtype(
         ("since_m_s", "f8"),  # approach of the fastest such strike after that one, and its step
         ("since_step", "i8"),
         ("spread", "i8"),  # strikes dated by its phase so far (synth.strikes.phase_in_step)
+        ("turn_at", "i8"),  # first row of TURN, and how many: its pairs of modes that are not as they are free
+        ("turns", "i8"),
     ],
     align=True,
 )
+
+TURN = np.dtype([("mode", "i8"), ("by", "f8", (2, 2))], align=True)
+"""A pair of modes, that mode and the next, turned from the free ones: their shapes times ``by``."""
 
 
 ROW = np.dtype(

@@ -122,14 +122,15 @@ def _choose(vector: Array, pairs: Array, before: Array) -> tuple[Array, Array]:
     share, turn = vector[:m] ** 2, np.eye(m)
     share[pairs] = share[pairs + 1] = 0.5 * (share[pairs] + share[pairs + 1])
     chosen = likest(share)
-    for k in pairs.tolist():
-        two = slice(k, k + 2)
-        left, _, right = np.linalg.svd(vector[two, chosen[two]])
-        made, old = left @ right, before[two, two]
-        along = old.T @ made
-        if abs(along[0, 1]) + abs(along[1, 0]) > abs(along[0, 0]) + abs(along[1, 1]):
-            made, along, chosen[two] = made[:, ::-1], along[:, ::-1], chosen[two][::-1].copy()
-        turn[two, two] = made * np.where(np.diag(along) < 0, -1.0, 1.0)
+    both = np.stack([pairs, pairs + 1], axis=1)
+    block = both[:, :, None], both[:, None]
+    left, _, right = np.linalg.svd(vector[both[:, :, None], chosen[both][:, None]])
+    made = left @ right
+    along = before[block].transpose(0, 2, 1) @ made
+    crossed = np.abs(along[:, 0, 1]) + np.abs(along[:, 1, 0]) > np.abs(along[:, 0, 0]) + np.abs(along[:, 1, 1])
+    made[crossed], along[crossed] = made[crossed, :, ::-1], along[crossed, :, ::-1]
+    chosen[both[crossed]] = chosen[both[crossed]][:, ::-1]
+    turn[block] = made * np.where(np.diagonal(along, axis1=1, axis2=2) < 0, -1.0, 1.0)[:, None]
     return chosen, turn
 
 

@@ -9,7 +9,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.render.friction import FOLLOW_S, advance_friction
 from sonic_bullet.render.groups import BodyTables, PairTables, WindowTables
 from sonic_bullet.render.standing.held_contacts import HELD
-from sonic_bullet.render.tables import BODY, FACE, NODE, PAIR, PULSE, ROW, WINDOW
+from sonic_bullet.render.tables import BODY, FACE, NODE, PAIR, PULSE, ROW, TURN, WINDOW
 from sonic_bullet.synth.bank.layout import ScratchTables
 from sonic_bullet.synth.strikes import SPAN
 from sonic_bullet.synth.surface_kernel import VOICE
@@ -64,7 +64,9 @@ class Table:
             np.zeros((SPAN, 2), bool), rows,
         )  # fmt: skip
         window.step["dt_s"], window.step["row"] = DT_S, (0, len(rows))
-        table = BodyTables(self.bodies, self.faces, self.nodes, self.shapes, np.zeros(0), np.zeros((2, 0)))
+        table = BodyTables(
+            self.bodies, self.faces, self.nodes, self.shapes, np.zeros(0, TURN), np.zeros(0), np.zeros((2, 0))
+        )
         pairs = PairTables(
             self.pairs, np.zeros(1, np.int64), np.array([1, 0]), np.zeros(0, np.int64), self.gain, np.zeros(2, HELD)
         )

@@ -12,6 +12,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.render import Synthesizer
+from sonic_bullet.render.contact_place import turn_push
 from sonic_bullet.render.standing.turned_modes import turn_modes
 from tests.made.models import STEEL, WOOD, box_model
 
@@ -78,7 +79,12 @@ def test_a_turn_keeps_energy_and_sound_and_comes_back(client: Any) -> None:
         z, weight = state.ringing.z.reshape(2, -1)[:, lanes], state.bank.weight.reshape(-1, 2, state.bank.law.shape[1])
         row = state.table.bodies[b]
         shape = state.table.shapes[row["shape_at"] :][: 24 * row["columns"]].reshape(24, -1)[:, : len(PAIRED_HZ)]
-        return z @ weight[1, 0, lanes], (z**2).sum(axis=1), shape @ z.T
+        turn = state.table.turn_of(b)
+        return (
+            z @ weight[1, 0, lanes],
+            (z**2).sum(axis=1),
+            shape @ (np.eye(shape.shape[1]) if turn is None else turn) @ z.T,
+        )
 
     first = heard()
     assert first[1].min() > 0
@@ -87,5 +93,10 @@ def test_a_turn_keeps_energy_and_sound_and_comes_back(client: Any) -> None:
         for k, angle in zip(FIRST, angles or (), strict=False):
             turn[k : k + 2, k : k + 2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         turn_modes(state, b, turn)
+        push = (free := np.arange(1.0, 1 + state.table.bodies["columns"][b])).copy()
+        turn_push(state.table.bodies[b], state.table.turns, push)
+        by = np.eye(len(PAIRED_HZ)) if turn is None else turn
+        assert push[: len(by)] == pytest.approx(by.T @ free[: len(by)], rel=1e-12)
+        assert (push[len(by) :] == free[len(by) :]).all()
         for was, now in zip(first, heard(), strict=True):
             assert now == pytest.approx(was, rel=1e-5, abs=1e-6 * np.abs(was).max())
