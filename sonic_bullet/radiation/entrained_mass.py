@@ -121,11 +121,10 @@ def panel_edges(corner, normal):
 
 
 @njit(nogil=True)
-def _matrices(corner, normal, beta):
-    """Build ½ - K - βD and S + β(½ + K'), both (f, f)."""
+def static_kernels(corner, normal):
+    """S, K, K', D at k = 0 times 4π (f, f, 4): [j, i] of triangle j at the centroid of i."""
     count = len(corner)
-    left = np.empty((count, count))
-    right = np.empty((count, count))
+    made = np.empty((count, count, 4))
     x = np.empty(3)
     for j in range(count):
         n = normal[j]
@@ -137,9 +136,17 @@ def _matrices(corner, normal, beta):
             i0, i1, i2 = normal[i]
             if i == j:  # seen from its own plane: no solid angle, whatever the rounding
                 angle = 0.0
-            slope = i0 * g0 + i1 * g1 + i2 * g2 - (n[0] * i0 + n[1] * i1 + n[2] * i2) * angle
-            left[i, j] = (-angle + beta * (i0 * l0 + i1 * l1 + i2 * l2)) / (4 * np.pi)
-            right[i, j] = (potential + beta * slope) / (4 * np.pi)
-        left[j, j] += 0.5
-        right[j, j] += 0.5 * beta
+            made[j, i, 0] = potential
+            made[j, i, 1] = angle
+            made[j, i, 2] = i0 * g0 + i1 * g1 + i2 * g2 - (n[0] * i0 + n[1] * i1 + n[2] * i2) * angle
+            made[j, i, 3] = -(i0 * l0 + i1 * l1 + i2 * l2)
+    return made
+
+
+def _matrices(corner: Array, normal: Array, beta: float) -> tuple[Array, Array]:
+    """Build ½ - K - βD and S + β(½ + K'), both (f, f)."""
+    s, k, across, d = np.moveaxis(static_kernels(corner, normal), 2, 0).transpose(0, 2, 1)
+    left, right = (-k - beta * d) / (4 * np.pi), (s + beta * across) / (4 * np.pi)
+    left[np.diag_indices(len(corner))] += 0.5
+    right[np.diag_indices(len(corner))] += 0.5 * beta
     return left, right

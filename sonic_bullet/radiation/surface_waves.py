@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.radiation.entrained_mass import panel, panel_edges
+from sonic_bullet.radiation.entrained_mass import static_kernels
 from sonic_bullet.records import Array
 
 RESOLVED = 2 * np.pi / 3
@@ -74,10 +74,11 @@ class SurfaceWaves:
 
 @lru_cache(maxsize=1)
 def _kept_kernels(corner: bytes) -> Array:
-    """Compute `_kernels` of triangles; once for several materials of a shape."""
+    """Compute `static_kernels` of triangles, in single precision; once for several materials of a shape."""
     corner_m = np.frombuffer(corner).reshape(-1, 3, 3)
     twice = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
-    return np.asarray(_kernels(corner_m, twice / np.linalg.norm(twice, axis=1, keepdims=True)))
+    made = static_kernels(corner_m, twice / np.linalg.norm(twice, axis=1, keepdims=True))
+    return np.asarray(made, np.float32)
 
 
 def _alike(turns: Array) -> list[Array]:
@@ -90,29 +91,6 @@ def _alike(turns: Array) -> list[Array]:
         else:
             groups.append([int(at)])
     return [np.array(one) for one in groups]
-
-
-@njit(nogil=True)
-def _kernels(corner, normal):
-    """S, K, K', D at k = 0 times 4π (f, f, 4): [j, i] of triangle j at the centroid of i."""
-    count = len(corner)
-    made = np.empty((count, count, 4), np.float32)
-    x = np.empty(3)
-    for j in range(count):
-        n = normal[j]
-        across, edge_m = panel_edges(corner[j], n)
-        for i in range(count):
-            for c in range(3):
-                x[c] = (corner[i, 0, c] + corner[i, 1, c] + corner[i, 2, c]) / 3
-            potential, angle, _, g0, g1, g2, l0, l1, l2 = panel(corner[j], n, across, edge_m, x)
-            i0, i1, i2 = normal[i]
-            if i == j:  # seen from its own plane: no solid angle, whatever the rounding
-                angle = 0.0
-            made[j, i, 0] = potential
-            made[j, i, 1] = angle
-            made[j, i, 2] = i0 * g0 + i1 * g1 + i2 * g2 - (n[0] * i0 + n[1] * i1 + n[2] * i2) * angle
-            made[j, i, 3] = -(i0 * l0 + i1 * l1 + i2 * l2)
-    return made
 
 
 @njit(nogil=True, fastmath=True)
