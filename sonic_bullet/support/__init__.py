@@ -2,15 +2,15 @@
 
     materials, loads, contact region     -> ContactSpring     springs      N/m, complex: stiffness and loss
     modes, mass, inertia of a body       -> Moving            moving       its driving-point mobility
-    a body, its partners, its touches    -> InPlace           in_place     poles, mixing, transmission, separation
-                                                              first_order  nearly the same in a tenth of the time
+    a body, its partners, its touches    -> InPlace           in_place     its records
+                                                              first_order  poles, mixing, transmission, separation
 
 Values in, values out: no scene, step or sample. The run time calls it when a body's set of touches or their loads
 change; until then poles stay.
 """
 
 from sonic_bullet.support.first_order import first_order
-from sonic_bullet.support.in_place import InPlace, Touch, in_place
+from sonic_bullet.support.in_place import InPlace, Touch
 from sonic_bullet.support.moving import Moving, Place, wide_plate_m_n_s
 from sonic_bullet.support.springs import ContactSide, ContactSpring, Region, contact_spring, pad_spring
 
@@ -24,7 +24,6 @@ __all__ = [
     "Touch",
     "contact_spring",
     "first_order",
-    "in_place",
     "pad_spring",
     "wide_plate_m_n_s",
 ]

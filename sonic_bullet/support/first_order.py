@@ -8,7 +8,7 @@
     s² + 2 s qᵀDq + ω² − 2δ/(1 + √(1 − 4ε)) = 0     δ taken on as the one pole c²/(D + s²) that has this value and slope
 
 Of det(1 + Y(s)(Re K − Σ_n F_n F_nᵀ/(ω_n² + s²))) = 0, the springs' ends held and then released. To first order in x it
-is Rayleigh's quotient of `in_place`, whose Newton iteration finds the exact pole at many times the cost. The measured
+is Rayleigh's quotient, from which Newton's iteration finds the exact pole at many times the cost. The measured
 difference between the two is in docs/measured/in-place.md.
 """
 
@@ -20,8 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.support.coupled_poles import likest
-from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, in_place, touched_rows
+from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, free_modes, touched_rows
 from sonic_bullet.support.moving import Moving
 
 PAIR_SPLIT = 0.01
@@ -32,7 +31,9 @@ a round body by less."""
 def first_order(
     body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], before: Array | None = None
 ) -> InPlace:
-    """Approximate `in_place`; `turn` turns the pairs of one frequency, and they alone, to the contact's axes.
+    """Compute the coupled modes of a body at these touches; without touches, its free modes.
+
+    `turn` turns the pairs of one frequency, and they alone, to the contact's axes.
 
     A mode takes the pole of the motion that most resembles its free one. Of a pair, the two motions that most resemble
     both: which two of all orthogonal ones the free modes are does not count. Transmission, at most ½ of each such
@@ -45,8 +46,8 @@ def first_order(
     """
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
-        return in_place(body, partners, touches)
-    x, row = touched_rows(body, partners, touches, squared=False)
+        return free_modes(body, partners, touches)
+    x, row = touched_rows(body, partners, touches)
     light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     yields = np.flatnonzero(x.other_lam > 0)
     modes = x.other[:, yields]
@@ -110,6 +111,16 @@ def alike_pairs(omega_rad_s: Array) -> Array:
         if apart[k] < PAIR_SPLIT and not found & {k - 1, k + 1}:
             found.add(k)
     return np.array(sorted(found), np.int64)
+
+
+def likest(share: Array) -> Array:
+    """Assign to each row of weights (m, n) a column, each once, with the largest sum; -1 (m,) where none is left."""
+    from scipy.optimize import linear_sum_assignment  # takes a fifth of a second to import
+
+    row, column = linear_sum_assignment(share, maximize=True)
+    chosen = np.full(len(share), -1)
+    chosen[row] = column
+    return chosen
 
 
 def _choose(vector: Array, pairs: Array, before: Array) -> tuple[Array, Array]:

@@ -19,10 +19,10 @@ from sonic_bullet.support import (
     Touch,
     contact_spring,
     first_order,
-    in_place,
 )
 from studies.in_place.lines import Line
 from tests.made.bars import AXES, bar, exact_poles, stood
+from tests.made.newton import in_place
 
 NOTHING = Moving(np.zeros(0), np.zeros(0))
 STRENGTHS = np.geomspace(1e1, 1e10, 19)

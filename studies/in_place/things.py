@@ -19,8 +19,9 @@ from sonic_bullet.modal import analyse, read_mesh
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel, Shape
 from sonic_bullet.render.resonator import Resonator, build_resonator
-from sonic_bullet.support import ContactSpring, InPlace, Moving, Place, Touch, first_order, in_place
+from sonic_bullet.support import ContactSpring, InPlace, Moving, Place, Touch, first_order
 from studies.thin_walls.blocks import cartesian, welded
+from tests.made.newton import in_place
 
 AXES = np.eye(3)[[2, 0, 1]]
 SR = 48_000

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet.records import Array
-from sonic_bullet.support import ContactSpring, Moving, Place, Touch, first_order, in_place
-from sonic_bullet.support.coupled_poles import likest
+from sonic_bullet.support import ContactSpring, Moving, Place, Touch, first_order
+from sonic_bullet.support.first_order import likest
+from tests.made.newton import in_place
 
 
 def body(rng: np.random.Generator, modes: int, mass_kg: float, lowest_hz: float) -> Moving:

@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import eigh, null_space
 
 from sonic_bullet.records import Array
-from sonic_bullet.support import ContactSpring, InPlace, Moving, Place, Touch, in_place
+from sonic_bullet.support import ContactSpring, InPlace, Moving, Place, Touch
 from tests.made.bars import AXES, Bar, bar, exact_poles, stood
+from tests.made.newton import in_place
 
 NOTHING = Moving(np.zeros(0), np.zeros(0))
 STRENGTHS = np.geomspace(1e1, 1e10, 10)  # N/m: from 1e-5 of the first mode's own stiffness to a wall

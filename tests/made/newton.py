@@ -1,4 +1,4 @@
-"""Poles of a body in contact: of T(s) q = 0, a body's modes and rigid motions with forces at its touches.
+"""Exact poles of a body in contact, by Newton: what `first_order` is proven against. T(s) q = 0 of modes and motions.
 
     T(s) = s² + 2Ds + Λ + s Φᵀ W(s) Φ,  W = (s/K + Y_p(s))⁻¹,  forces F = W Φ s q
         Φ (r, m + 6): the body's modes and rigid motions at r springs; Y_p: the partners' mobility (`moving`)
@@ -14,11 +14,16 @@ the touches. Where it does not converge, or finds one pole twice, the poles are 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.support import InPlace, Moving, Touch, first_order
+from sonic_bullet.support.first_order import likest
+from sonic_bullet.support.in_place import HELD, STOPPED, Touched, touched_rows
 
 STEPS = 12
 """Newton steps at most; three are usual, their order is cubic."""
@@ -32,31 +37,61 @@ OFF = 1e-6
 """Damping ratio of the start: without any, the partners' mobility might have its own pole just there."""
 TINY = 1e-14
 """Least |D| over |s|²: on a free pole itself D has no inverse."""
+LOST = 0.05
+"""Of a new mode's motion, in the lane it is given: below this nothing of it is transmitted."""
 
 
-class Touched(NamedTuple):
-    """Matrices of a body and its partners at r springs.
+def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
+    """Compute the coupled modes of a body at these touches. Without touches: its free modes."""
+    m = len(body.omega_rad_s)
+    if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
+        return first_order(body, partners, touches)
+    x, row = touched_rows(body, partners, touches)
+    found = _described(x, m, partners, *poles(x, *start(x, m)))
+    force = np.zeros((3 * len(touches), m))
+    force[row] = found.force_n_s
+    return replace(found, force_n_s=force[::3])
 
-    Attributes
-    ----------
-    own, other : Φ (r, N) of the body and (r, P) of all partners side by side
-    spring : K (r,)
-    lam, decay, other_lam, other_decay : λ, d of both
-    plate, half_space : y₀, y₂ (r,)
-    own_square, other_square : φφᵀ of both (`squares`)
-    """
 
-    own: Array
-    other: Array
-    spring: Array
-    lam: Array
-    decay: Array
-    other_lam: Array
-    other_decay: Array
-    plate: Array
-    half_space: Array
-    own_square: Array
-    other_square: Array
+def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Array, stands: Array) -> InPlace:
+    """Make the record of poles s (m,) and motions q (m, N)."""
+    modes = q[:, :m]
+    q = q / np.exp(0.5j * np.angle((modes * modes).sum(axis=1)))[:, None]  # rotated to be as real as possible
+    q *= np.where(np.diag(q.real) < 0, -1, 1)[:, None]
+    left, _, right = np.linalg.svd(q[:, :m].real.T)
+    turn = left @ right  # the orthogonal matrix nearest to them [Schönemann 1966]
+    along = (turn.T * q[:, :m]).sum(axis=1)
+    lost = np.where(np.abs(along) > LOST, along, np.inf)
+    v = q / lost[:, None]  # velocities where the lane's is 1
+    root = np.sqrt(x.lam[:m])
+    held = (s.imag > HELD * root.max()) | ~(-s.real < STOPPED * np.abs(s)) | (s.imag <= 0)
+    s = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), s)
+    v[held] = 0
+    decay = np.maximum(-s.real, 0.0)
+    force = np.linalg.solve(inverse_w(x, s)[0], (v @ x.own.T)[..., None])[..., 0]
+    at = s[:, None]
+    passed = at * (force @ x.other) / (at**2 + 2 * x.other_decay * at + x.other_lam)
+    passed /= 1 + (np.abs(passed) ** 2).sum(axis=1, keepdims=True)
+    ends = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
+    return InPlace(
+        s.imag,
+        decay,
+        turn,
+        tuple(passed[:, a : b - 6].T for a, b in pairwise(ends)),
+        np.abs(force).T,
+        _shares(x, m, s.imag, decay, v, force),
+        stands & ~held,
+    )
+
+
+def _shares(x: Touched, m: int, omega: Array, decay: Array, v: Array, force: Array) -> Array:
+    """Split the decays (m, 3) by the mean powers Σ d|v|², ½ F* Re(jω/K) F and ½ F* Re(Y_p) F."""
+    spring = 0.5 * (np.abs(force) ** 2 * (1j * omega[:, None] / x.spring).real).sum(axis=1)
+    both = 0.5 * np.einsum("ki,kij,kj->k", force.conj(), inverse_w(x, 1j * omega)[0].real, force).real
+    own = (np.abs(v[:, :m]) ** 2 * x.decay[:m]).sum(axis=1)
+    power = np.maximum(np.stack([own, spring, both - spring], axis=1), 0.0)
+    whole = power.sum(axis=1, keepdims=True)
+    return np.asarray(decay[:, None] * np.where(whole > 0, power / np.where(whole > 0, whole, 1), [1.0, 0.0, 0.0]))
 
 
 def start(x: Touched, m: int) -> tuple[Array, Array]:
@@ -70,25 +105,9 @@ def start(x: Touched, m: int) -> tuple[Array, Array]:
     return (1j - OFF) * np.sqrt(np.maximum(value[chosen], 0)), vector[: len(x.lam), chosen].T.astype(complex)
 
 
-def likest(share: Array) -> Array:
-    """Assign to each row of weights (m, n) a column, each once, with the largest sum; -1 (m,) where none is left."""
-    from scipy.optimize import linear_sum_assignment  # takes a fifth of a second to import
-
-    row, column = linear_sum_assignment(share, maximize=True)
-    chosen = np.full(len(share), -1)
-    chosen[row] = column
-    return chosen
-
-
-def _summed(weight: Array, square: Array) -> Array:
-    """Compute Σ_j w_j φ_j φ_jᵀ (k, r, r) of weights (k, N) and φ_j φ_jᵀ (N, r²)."""
-    size = round(np.sqrt(square.shape[1]))
-    return np.asarray((weight @ square).reshape(-1, size, size))
-
-
-def squares(moves: Array) -> Array:
-    """Compute φ_j φ_jᵀ (N, r²) of Φ (r, N)."""
-    return np.asarray((moves[:, None] * moves).reshape(-1, moves.shape[1]).T.astype(complex))
+def _summed(weight: Array, moves: Array) -> Array:
+    """Compute Σ_j w_j φ_j φ_jᵀ (k, r, r) of weights (k, N) and Φ (r, N)."""
+    return np.asarray((weight[:, None] * moves) @ moves.T)
 
 
 def _apart(square: Array, s: Array) -> Array:
@@ -101,8 +120,8 @@ def inverse_w(x: Touched, s: Array) -> tuple[Array, Array]:
     """Compute W⁻¹(s) and its derivative, (k, r, r) of s (k,)."""
     at = s[:, None]
     below = _apart(at**2 + 2 * x.other_decay * at + x.other_lam, at)
-    yields = _summed(at / below, x.other_square)
-    slope = _summed((x.other_lam - at**2) / below**2, x.other_square)
+    yields = _summed(at / below, x.other)
+    slope = _summed((x.other_lam - at**2) / below**2, x.other)
     i = np.arange(len(x.spring))
     yields[:, i, i] += at / x.spring + x.plate - x.half_space * at**2
     slope[:, i, i] += 1 / x.spring - 2 * x.half_space * at
@@ -122,7 +141,7 @@ def _step(x: Touched, s: Array, q: Array) -> tuple[Array, Array]:
     new = s - (q * (own * q + at * onto)).sum(axis=1) / (q * turned).sum(axis=1)
     own = _apart(own, at)
     lone = turned / own
-    whole = inverse + _summed(at / own, x.own_square)
+    whole = inverse + _summed(at / own, x.own)
     back = _solved(whole, (lone @ x.own.T)[..., None])[..., 0]
     q = lone - at * (back @ x.own) / own
     return new, q / np.linalg.norm(q, axis=1, keepdims=True)
