@@ -27,8 +27,9 @@ from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.render import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film
-from sonic_bullet.soundtrack.film_writer import samples_of, write_film
+from sonic_bullet.soundtrack.film_writer import samples_of
 from sonic_bullet.soundtrack.stems import render_stems, write_stems
+from tests.made.films import write_film
 
 FORMATS = ("mp4/aac", "mov/pcm", "mkv/flac", "mkv/opus", "mp4/mp3")
 RATES = (Fraction(24), Fraction(25), Fraction(30000, 1001), Fraction(30), Fraction(60), Fraction(240))

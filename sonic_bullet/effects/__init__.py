@@ -5,9 +5,6 @@ An effect from elsewhere is passed with these: `EFFECTS + (Mine,)`.
 
 from __future__ import annotations
 
-import warnings
-from typing import TYPE_CHECKING
-
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
@@ -40,17 +37,3 @@ EFFECTS: tuple[type[Effect], ...] = (
 )
 
 __all__ = ["EFFECTS", "Effect", "Evidence", "Impact", "ObjectEvidence", "Owner", "Ring", "Sound", "Stage"]
-
-FORMER_NAMES = {"Blow": Impact, "Heard": ObjectEvidence}
-"""Names of earlier versions, which others may still import."""
-
-if not TYPE_CHECKING:  # or a type checker would take any name for one of this module
-
-    def __getattr__(name: str) -> type:
-        """Return the class that had another name in earlier versions, with a DeprecationWarning."""
-        if name not in FORMER_NAMES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        warnings.warn(
-            f"sonic_bullet.effects.{name} is now {FORMER_NAMES[name].__name__}", DeprecationWarning, stacklevel=2
-        )
-        return FORMER_NAMES[name]

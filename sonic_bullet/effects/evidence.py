@@ -5,7 +5,6 @@ strikes of a case -> ObjectEvidence, one an object;  objects, material, effects 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -203,9 +202,3 @@ class Evidence:
     seed: int = 0
     known: Effect | None = None
     held_out: bool = False
-
-    @property
-    def on_trial(self) -> bool:
-        """Return `held_out` by its former name."""
-        warnings.warn("Evidence.on_trial is now held_out", DeprecationWarning, stacklevel=2)
-        return self.held_out

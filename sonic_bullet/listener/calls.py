@@ -83,13 +83,6 @@ class Call:
     own: Any = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Inserted:
-    """A call of the other scene, to be made before the scene's own."""
-
-    call: Call
-
-
 class Plan(Protocol):
     """Calls that substitute those of a scene."""
 

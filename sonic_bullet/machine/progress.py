@@ -27,8 +27,7 @@ P = ParamSpec("P")
 Made = TypeVar("Made")
 
 EVERY_S = 4.0
-"""Between lines of one stage: below the 5 s after which a user takes a program for dead, with room for a busy machine.
-Between lines of one stage: below the 5 s after which a user takes a program for dead, with room for a busy machine."""
+"""Between lines of one stage: below the 5 s after which a user takes a program for dead."""
 LEAST_S = 1.0
 """Between lines of stages that follow each other fast."""
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0

@@ -75,14 +75,6 @@ def magnitude_of(per_hz: Array, sr: int, window: int = WINDOW) -> Array:
     return np.asarray(np.sqrt(per_hz.T * (sr * float((hann(window).astype(float) ** 2).sum()))), np.float32)
 
 
-def inconsistency(magnitude: Array, sample: Array, window: int = WINDOW, overlap: int = OVERLAP) -> float:
-    """Compute ‖|T(x)| - A‖/‖A‖: how far samples are from the magnitudes asked for."""
-    return float(
-        np.linalg.norm(np.abs(transform(sample, window, overlap)) - magnitude)
-        / max(float(np.linalg.norm(magnitude)), 1e-300)
-    )
-
-
 @njit(nogil=True, fastmath={"contract", "nnan", "ninf"})
 def _phased(
     spectrum: Array, before: Array, magnitude: Array, momentum: np.float32

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -302,28 +301,3 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     if not all(16 <= side <= SIDE_MOST and side % 2 == 0 for side in (width, height)):
         raise FileError(f"pictures of {width}x{height}", f"give even numbers from 16 to {SIDE_MOST}, 1280x720 say")
     return width, height
-
-
-def write_film(
-    path: str | os.PathLike[str],
-    pictures: Any,
-    sound: KeptSound,
-    sr: int,
-    *,
-    fps: Fraction,
-    size: tuple[int, int],
-    codec: str | None = None,
-    gain_per_pa: float = 1.0,
-    each: Callable[[int], None] | None = None,
-) -> FilmWriter:
-    """Write a film of pictures (height, width, 3) uint8 with the sound (channels, n) in pascals, whole or not at all.
-
-    each: called with the number written. Raises FileError, AudioError; those, and KeyboardInterrupt, name the finished
-    film.
-    """
-    with FilmWriter(path, sound, sr, fps=fps, size=size, codec=codec, gain_per_pa=gain_per_pa) as film:
-        for picture in pictures:
-            film.write(picture)
-            if each is not None:
-                each(film.pictures)
-    return film

@@ -10,9 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet import effects
-from sonic_bullet.effects.protocol import Evidence
-
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if "__pycache__" not in path.parts)
 
@@ -153,21 +150,3 @@ def test_a_folder_is_seen_at_a_glance() -> None:
     assert {folder.relative_to(PACKAGE).as_posix(): n for folder, n in count.items() if n > MOST_FILES} == {}
     shown = [entry.name for entry in (PACKAGE / "effects").iterdir() if entry.name != "__pycache__"]
     assert len(shown) <= MOST_EFFECTS, sorted(shown)
-
-
-@pytest.mark.parametrize(
-    ("module", "former", "name"),
-    [(effects, "Heard", "ObjectEvidence"), (effects, "Blow", "Impact")],
-)
-def test_former_public_classes_are_still_found(module: object, former: str, name: str) -> None:
-    with pytest.warns(DeprecationWarning, match=name):
-        found = getattr(module, former)
-    assert found is getattr(module, name)
-    with pytest.raises(AttributeError, match="no attribute 'Nobody'"):
-        getattr(module, "Nobody")  # noqa: B009  as an importer asks
-
-
-def test_evidence_still_answers_to_its_former_field() -> None:
-    evidence = Evidence((), 1.0, 1e-8, 1.0, (), (20.0, 2e4), held_out=True)
-    with pytest.warns(DeprecationWarning, match="held_out"):
-        assert evidence.on_trial

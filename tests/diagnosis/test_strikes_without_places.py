@@ -15,8 +15,8 @@ from sonic_bullet.diagnosis.evidence.baseline import baseline
 from sonic_bullet.diagnosis.prediction.score import Take
 from sonic_bullet.estimator.fit.recorded import gather
 from sonic_bullet.files.cases import read_case
-from sonic_bullet.modal.closed_forms import bar_bending_hz
 from tests.estimator.test_held_out_takes import case_of
+from tests.made.closed_forms import bar_bending_hz
 
 
 def test_a_measured_list_without_places_keeps_its_mesh(tmp_path: Path) -> None:

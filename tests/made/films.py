@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.film_writer import samples_of, write_film
+from sonic_bullet.soundtrack.film_writer import FilmWriter, samples_of
 
 SIDE = 16
 PULSE = np.hanning(13)[1:-1]
@@ -32,6 +32,14 @@ def click_sound(frames: int, at: int, sr: int = SR) -> Array:
 def click_pictures(count: int, bright: int) -> Iterator[Array]:
     dark, light = np.zeros((SIDE, SIDE, 3), np.uint8), np.full((SIDE, SIDE, 3), 255, np.uint8)
     return (light if k == bright else dark for k in range(count))
+
+
+def write_film(path: Path, pictures: Iterable[Array], sound: KeptSound, sr: int, **options: Any) -> FilmWriter:
+    """A film of pictures (height, width, 3) uint8 with the sound (channels, n) in pascals."""
+    with FilmWriter(path, sound, sr, **options) as film:
+        for picture in pictures:
+            film.write(picture)
+    return film
 
 
 def click_film(path: Path, fps: Fraction, count: int, at: int, codec: str | None = None, sr: int = SR) -> None:

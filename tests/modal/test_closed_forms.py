@@ -9,9 +9,9 @@ import pytest
 import trimesh
 
 from sonic_bullet.modal import analyse
-from sonic_bullet.modal import closed_forms as exact
 from sonic_bullet.records import Material, Shape
 from tests.few_cases import parametrize_few
+from tests.made import closed_forms as exact
 
 E, NU, RHO = 200e9, 0.3, 7850.0
 LENGTH, SIDE = 0.4, 0.02

@@ -11,11 +11,11 @@ import pytest
 import trimesh
 
 from sonic_bullet.modal import analyse, polynomials
-from sonic_bullet.modal import closed_forms as exact
 from sonic_bullet.modal.reduced import family
 from sonic_bullet.modal.revolution import rings, section
 from sonic_bullet.records import Array, Material, Shape
 from tests.few_cases import parametrize_few
+from tests.made import closed_forms as exact
 
 GAMMA, NU = 2.5e7, 0.3
 

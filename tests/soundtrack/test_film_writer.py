@@ -19,10 +19,9 @@ from sonic_bullet.soundtrack.film_writer import (
     check_size,
     pictures_of,
     samples_of,
-    write_film,
 )
 from tests.made.disks import full_disk
-from tests.made.films import SIDE, SR, click_film, click_pictures, click_sound, decoded
+from tests.made.films import SIDE, SR, click_film, click_pictures, click_sound, decoded, write_film
 
 RATES = (24, 25, Fraction(30000, 1001), 30, 60, 240)
 FORMATS = (("mp4", "aac"), ("mov", "pcm"), ("mkv", "flac"), ("mkv", "opus"), ("mp4", "mp3"))

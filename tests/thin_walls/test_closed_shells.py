@@ -7,12 +7,12 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from sonic_bullet.modal import closed_forms
 from sonic_bullet.records import Array
 from studies.thin_walls import shell_formulas as shells
 from studies.thin_walls.bodies import BODIES, BRASS, PORCELAIN, STEEL
 from studies.thin_walls.reference import truth
 from tests.few_cases import parametrize_few
+from tests.made import closed_forms
 
 
 def known(name: str) -> Array:
