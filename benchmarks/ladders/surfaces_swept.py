@@ -7,24 +7,30 @@ from collections.abc import Mapping
 import numpy as np
 
 from benchmarks.ladders.observed import SR, Observed
-from benchmarks.ladders.verdicts import AGREES, DIFFERS, LACKING, PARTLY, Verdict, within
+from benchmarks.ladders.verdicts import AGREES, DIFFERS, ERRS, LACKING, PARTLY, Verdict, within
 from sonic_bullet.records import Array
+from sonic_bullet.records.roughness import WAVE_M
 
 Scenes = Mapping[str, Observed]
-FACES = (
-    "The draft: rough faces bear N = N₀ exp(δ/u₀), of stiffness N/u₀ with u₀ ∝ rms height [Persson 2007]. We take a "
-    "face for a blunt smooth cap"
+SHOCKS = (
+    "The draft lets a face ride on N = N₀ exp(δ/u₀), of stiffness N/u₀ with u₀ ∝ rms height [Persson 2007]. Then "
+    "force over load depends on speed and roughness by v√u₀ alone, and the level's exponent of speed is twice that of "
+    "roughness. Measured are 0.63 to 1.16 of roughness and 0.5 to 0.96 of speed [Ben Abdelounis et al. 2010, whom the "
+    "draft lists]: by shocks between asperities, of a deformation that is negligible against the roughness. So do "
+    "ours: it is flights and shocks that are counted, and they go by load, mass and the bulk's stiffness. The draft's "
+    "later text no longer takes the exponential for the force: a mean has no shocks in it"
 )
 
 
 def contact_pitch(scenes: Scenes) -> Verdict:
     """Find rates at three masses."""
-    rates = [scenes[key].contact_rate_hz() for key in "abc"]
+    rates, flight = [scenes[key].contact_rate_hz() for key in "abc"], [scenes[key].flight() for key in "abc"]
     return Verdict(
         "the contact's rate does not depend on mass",
-        f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} Hz at 5 g, 0.5, 50 kg",
-        AGREES if max(rates) < 1.2 * min(rates) else DIFFERS,
-        FACES,
+        f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} Hz at 5 g, 0.5, 50 kg, with {100 * flight[0]:.0f}, "
+        f"{100 * flight[1]:.0f}, {100 * flight[2]:.0f} % of the time in flight",
+        AGREES if max(rates) < 1.2 * min(rates) else ERRS if min(flight[:2]) > 0.5 else DIFFERS,
+        SHOCKS + ". At 50 kg ours rides: there its stiffness should be the draft's, and is that of one blunt cap",
     )
 
 
@@ -35,22 +41,38 @@ def finish_ladder(scenes: Scenes) -> Verdict:
     return Verdict(
         "the contact's rate goes as roughness^(-1/2)",
         f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} Hz: roughness^{power:.2f} over both rungs",
-        AGREES if within(power, -0.5, 0.1) else PARTLY if rates[0] > rates[1] > rates[2] else DIFFERS,
-        FACES + ": the rate falls because rougher faces fly longer",
+        AGREES if within(power, -0.5, 0.1) else ERRS if rates[0] > rates[1] > rates[2] else DIFFERS,
+        "As ContactPitch. Rougher faces strike at a lower rate because they fly longer; the polished one rides, at the "
+        "rate of its waves",
     )
 
 
 def shock_rate(scenes: Scenes) -> Verdict:
     """Find rates over three correlation lengths."""
-    rates, wanted = [scenes[key].contact_rate_hz() for key in "abc"], (100, 500, 2000)
-    off = [rate / want for rate, want in zip(rates, wanted, strict=True)]
+    rates, lengths = [scenes[key].contact_rate_hz() for key in "abc"], (1e-3, 2e-4, 5e-5)
+    crossings = [0.1 * crossings_per_m(one) for one in lengths]
+    off = [rate / one for rate, one in zip(rates, crossings, strict=True)]
+    listed = ", ".join(f"{rate:.0f}" for rate in rates)
     return Verdict(
         "shocks at v/ℓ: 100, 500, 2000 a second",
-        f"{rates[0]:.0f}, {rates[1]:.0f}, {rates[2]:.0f} contacts a second: {off[0]:.1f}, {off[1]:.1f}, {off[2]:.1f} x",
-        AGREES if max(off) < 1.3 else PARTLY if rates[0] < rates[1] < rates[2] else DIFFERS,
-        "A finish has waves from ℓ down to ℓ/16, and each may strike; v/ℓ counts the longest alone. Rates go by the "
-        "spectrum's moments [Rice 1944; Nayak 1971, whom the draft cites]: its figure is a lower bound",
+        f"{listed} contacts a second: {off[0]:.2f}, {off[1]:.2f}, {off[2]:.2f} of the upcrossings of the waves that we "
+        f"have, {crossings[0]:.0f}, {crossings[1]:.0f}, {crossings[2]:.0f}",
+        ERRS if max(abs(np.log(off))) < np.log(1.5) and rates[0] < rates[1] < rates[2] else DIFFERS,
+        "v/ℓ counts the longest waves alone. A profile crosses its mean √(m₂/m₀)/2π times a metre [Rice 1944; Nayak "
+        "1971, whom the draft cites for its densities]: of the draft's own spectrum, from ℓ down to ℓ/16, 2.1 times "
+        "an ℓ. Waves under 9 µm are left out here, which counts in the finest scene",
     )
+
+
+def crossings_per_m(correlation_m: float, slope: float = -2.4, finest_m: float = 1.0 / 16) -> float:
+    """Upcrossings of the mean a metre of a finish's octaves: √(m₂/m₀)/2π, m₂/m₀ the mean square of 2π/λ [Rice 1944].
+
+    finest_m: λs, as a share of ℓ; waves that the octaves leave out count neither.
+    """
+    top = min(1.0 / (finest_m * correlation_m), float(np.sqrt(2) / WAVE_M[-1]))
+    frequency = np.geomspace(1e-3 / correlation_m, top, 4000)
+    power = np.where(frequency * correlation_m < 1, 1.0, (frequency * correlation_m) ** slope)
+    return float(np.sqrt(np.trapezoid(power * frequency**2, frequency) / np.trapezoid(power, frequency)))
 
 
 def sliding_pair(scenes: Scenes) -> Verdict:
@@ -171,10 +193,11 @@ def pressed_ring(scenes: Scenes) -> Verdict:
     return Verdict(
         "decay shortens as grip grows, by micro-slip",
         "T60 " + ", ".join(f"{1e3 * x:.0f}" for x in decays) + " ms at 0, 0.3, 0.9",
-        AGREES if decays[0] > 1.05 * decays[1] > 1.1 * decays[2] else DIFFERS,
-        "Neither. Micro-slip takes nothing without friction, and T³/(μN) a cycle at a tangential force T below μN "
-        "[Mindlin & Deresiewicz 1953]: less with more grip. So there is a shortest decay. We damp by the normal "
-        "spring's loss alone",
+        AGREES if decays[0] > 1.05 * decays[1] > 1.1 * decays[2] else ERRS if decays[0] > max(decays[1:]) else DIFFERS,
+        "Without friction nothing is held sideways, and the ring lasts longest: so far both agree. Micro-slip takes "
+        "2/9 T³/(KμN) of a cycle at a tangential force T below μN: a loss factor of 2/(9π) T/(μN) [Mindlin & "
+        "Deresiewicz 1953, whom the draft lists; Johnson 1985, sec. 7.4]. From 0.3 to 0.9 of μ it falls to a third. "
+        "Ours has the sideways spring with its material's loss, and no micro-slip",
     )
 
 

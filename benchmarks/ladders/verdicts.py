@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-AGREES, PARTLY, DIFFERS, LACKING = "agrees", "in part", "differs", "not rendered"
+AGREES, ERRS, PARTLY, DIFFERS, LACKING = "agrees", "the draft errs", "in part", "differs", "not rendered"
+"""ERRS: what is rendered follows a source that contradicts the prediction; `right` cites it."""
 
 
 @dataclass(frozen=True, slots=True)

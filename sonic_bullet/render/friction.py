@@ -22,7 +22,13 @@ from sonic_bullet.render.contact_place import add_push, contact_modulus, effecti
 from sonic_bullet.render.strike_pulses import STEEPEST
 from sonic_bullet.synth.profile import given_octaves, height_octaves
 from sonic_bullet.synth.strikes import SPAN
-from sonic_bullet.synth.surface_kernel import FASTEST_M_S, contact_radius_m, damping_ratio, sound_voices
+from sonic_bullet.synth.surface_kernel import (
+    DAMPING_RATIO,
+    FASTEST_M_S,
+    contact_radius_m,
+    dissipation_s_m,
+    sound_voices,
+)
 
 FOLLOW_S = 0.02
 FRICTION_FLAT = 0.25
@@ -186,7 +192,8 @@ def _begin(pair, table, rows, begin, end, quaternion):
     (low, high), bodies = pair.body, table.bodies
     pair.modulus_pa = contact_modulus(bodies[low].modulus_pa, bodies[high].modulus_pa)
     restitution, other = bodies[low].restitution, bodies[high].restitution
-    pair.damping_ratio = damping_ratio(restitution if restitution < other else other)
+    pair.damping_ratio = DAMPING_RATIO
+    pair.dissipation_s_m = dissipation_s_m(restitution if restitution < other else other)
     total, mobility = 0.0, 0.0
     for side in range(2):
         body = bodies[high if side else low]

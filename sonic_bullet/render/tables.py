@@ -105,6 +105,7 @@ PAIR = np.dtype(
         ("modulus_pa", "f8"),
         ("radius_m", "f8"),
         ("damping_ratio", "f8"),
+        ("dissipation_s_m", "f8"),
         ("seed", "i8", (2,)),
         ("height_m", "f8", (2, OCTAVES)),
         ("depth", "f8"),  # from here: state of its voice

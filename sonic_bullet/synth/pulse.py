@@ -24,8 +24,8 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
-SHORTEST_S, LONGEST_S = 20e-6, 50e-3
-"""A pulse below 20 µs has its -3 dB point above 30 kHz and sounds like an impulse; above 50 ms nothing audible is
+SHORTEST_S, LONGEST_S = 1e-6, 50e-3
+"""A pulse of 1 µs has its -3 dB point at 600 kHz: no rate resolves a shorter one; above 50 ms nothing audible is
 struck."""
 
 _CELLS = 1024

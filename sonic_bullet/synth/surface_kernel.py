@@ -6,7 +6,7 @@
     δ = δ0(N) + z,   f = k δ^(3/2) (1 + c(dh/dt - u)),  never below 0
         [Hunt & Crossley 1975, eq. 12; clamped: micro-collisions]
     k = (4/3) E* √R*,   N = k δ0^(3/2),   a = (3 N R*/4E*)^(1/3)            [Johnson 1985, eq. 4.22-4.24]
-    c = 2ζ √(m* dN/dδ0)/N                                                   ζ: damping ratio of the resting contact
+    c = 2ζ √(m* dN/dδ0)/N,  at least 3/2 (1 - e) s/m      ζ = 0.25: waves into both bodies; e: restitution at 1 m/s
 
 The oscillator gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip.
 Rolling (both surfaces sweep), sliding (one does) and anything between differ in the two sweep speeds only: no switch. A
@@ -44,7 +44,9 @@ from sonic_bullet.synth.vector import F64, I32, LANES, VEC, At, Emit, Value, con
 
 MOST_SUBSTEPS = 8.0
 FASTEST_M_S = 50.0
-LEAST_DAMPING_RATIO = 0.25
+DAMPING_RATIO = 0.25
+"""ζ, a model's choice: a rough contact sends waves into both bodies. With less, the level laws of rough, stiff, fast
+pairs bend (studies/surface_law.py)."""
 _STILL = 1e-9
 """Below this fraction of the resting penetration, on surfaces that do not sweep, the contact is at rest."""
 
@@ -71,17 +73,12 @@ _ROWS = 12
 
 
 @njit(nogil=True, error_model="numpy")
-def damping_ratio(restitution):
-    """Compute ζ of the linear oscillator that rebounds with this restitution, within 0.25 … 1.
+def dissipation_s_m(restitution):
+    """Compute c in s/m by the restitution of an impact at 1 m/s: c = 3/2 α, e = 1 - αv [Hunt & Crossley 1975, eq. 20].
 
-    -ln e/√(π² + ln² e). The floor is a model's choice: a rolling contact also sends waves into both bodies, which the
-    restitution of whole-body impacts (e = 0.95 would ring ten times) does not include. Below it the level laws of
-    rough, stiff, fast pairs bend (studies/surface_law.py).
+    At the mm/s at which rough surfaces meet it leaves e near 1, whatever the impact's is.
     """
-    log = np.log(restitution if restitution > 1e-9 else 1e-9)
-    log = 0.0 if log > 0.0 else log
-    ratio = -log / np.sqrt(np.pi * np.pi + log * log)
-    return ratio if ratio > LEAST_DAMPING_RATIO else LEAST_DAMPING_RATIO
+    return 1.5 * (1.0 - restitution) if restitution < 1.0 else 0.0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -115,6 +112,7 @@ def _law(pair, voice, sr, constants, at):
         depth = (load / k) ** (2.0 / 3.0) if load <= at_limit else limit + (load - at_limit) * (h * h) / mass
         least = 1e-3 * 9.81 * mass
         loss = 2.0 * pair.damping_ratio * np.sqrt(mass * soft) * (load if load > least else least) ** (-5.0 / 6.0)
+        loss = pair.dissipation_s_m if pair.dissipation_s_m > loss else loss
         constants[at + _REST + end] = depth / limit
         constants[at + _DAMPING + end] = loss * limit / h
         constants[at + _PATCH + end] = (0.75 * load * radius / modulus) ** (1.0 / 3.0)

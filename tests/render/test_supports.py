@@ -15,6 +15,7 @@ from sonic_bullet.files import ContactLog, read_log
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.render import render_log
+from sonic_bullet.render.apart import render_apart
 from sonic_bullet.render.standing import supports
 from sonic_bullet.synth.bank.passing import STEADY
 from tests.made.models import STEEL, WOOD, box_body, box_model, row, step
@@ -33,13 +34,20 @@ def board(client: Any) -> int:
 
 
 def landed(
-    client: Any, seconds: float = 1.0, turn: Any = (0.02, 0.01, 0.0), material: Material = STEEL, **options: Any
+    client: Any,
+    seconds: float = 1.0,
+    turn: Any = (0.02, 0.01, 0.0),
+    material: Material = STEEL,
+    friction: float = 0.5,
+    **options: Any,
 ) -> sb.Listener:
     """A steel plate that falls flat on a wooden board."""
     client.setGravity(0, 0, -9.81)
     listener = sb.attach(client, seed=2, **options)
     listener.add(board(client), material=WOOD, model=box_model((0.8, 0.6, 0.024), (90.0, 210.0, 480.0), WOOD))
-    listener.add(box(client, (0, 0, 0.03), turn=turn), material=material, model=plate_model())
+    plate = box(client, (0, 0, 0.03), turn=turn)
+    client.changeDynamics(plate, -1, lateralFriction=friction)
+    listener.add(plate, material=material, model=plate_model())
     for _ in range(round(seconds / DT)):
         client.stepSimulation()
     return listener
@@ -56,6 +64,29 @@ def test_live_is_replayed_to_the_bit_whatever_stands_on_what(client: Any, tmp_pa
     hung = render_log(replace(log, supports=False))
     late = slice(-9600, None)
     assert np.mean(sound[:, late] ** 2) < 0.5 * np.mean(hung[:, late] ** 2), "it rings as if it hung in the air"
+
+
+def test_without_friction_nothing_is_held_sideways(client: Any) -> None:
+    """A plate that stands: its normal spring is the same, sideways a billionth of it is left, as μ is a product."""
+    client.setGravity(0, 0, -9.81)
+    springs = {}
+    for friction in (0.0, 0.5):
+        log = landed(client, seconds=0.4, friction=friction).contacts
+        held: list[Any] = []
+
+        def look(state: Any, *_: Any, found: list[Any] = held) -> None:
+            if state.stand["points"].any():
+                found[:] = [one.spring for one in supports._touches(state, 1, state.window.quaternion_xyzw[0])[1]]
+
+        for _ in render_apart(log, witness=look):
+            pass
+        springs[friction] = held
+        client.resetSimulation()
+        client.setGravity(0, 0, -9.81)
+    assert springs[0.0] and len(springs[0.0]) == len(springs[0.5])
+    ratio = [abs(one.tangential_n_m / one.normal_n_m) for one in springs[0.0] + springs[0.5]]
+    loose, gripped = ratio[: len(springs[0.0])], ratio[len(springs[0.0]) :]
+    assert max(loose) < 1e-8 and min(gripped) > 0.7  # 2(1 - ν)/(2 - ν)
 
 
 def test_who_does_not_ask_for_supports_hears_bodies_that_hang(client: Any) -> None:

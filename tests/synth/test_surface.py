@@ -283,8 +283,7 @@ def test_gains_fall_with_contact_and_alias_and_slowness() -> None:
 
 
 def test_helpers_at_their_edges() -> None:
-    damping_ratio, contact_radius_m = surface_kernel.damping_ratio.py_func, surface_kernel.contact_radius_m.py_func
-    assert [damping_ratio(0.0), damping_ratio(1.0)] == pytest.approx([1.0, 0.25], rel=0.02)
-    assert damping_ratio(np.exp(-np.pi)) == pytest.approx(np.sqrt(0.5))
+    dissipation_s_m, contact_radius_m = surface_kernel.dissipation_s_m.py_func, surface_kernel.contact_radius_m.py_func
+    assert [dissipation_s_m(e) for e in (0.0, 0.6, 1.0, np.inf)] == pytest.approx([1.5, 0.6, 0.0, 0.0])
     radii = [contact_radius_m(*pair) for pair in ((100.0, 0.0), (0.0, np.pi * 0.04), (-5.0, 0.0), (0.0, 0.0))]
     assert radii == pytest.approx([0.01, 0.2, 1.0, 1.0])

@@ -13,6 +13,7 @@ its partners as they are free.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -48,6 +49,8 @@ LEAST_PASSED = 0.3
 """Of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out."""
 FAINTEST = 1e-3
 """Of a body's loudest mode: 60 dB below, it is what is left when all else has decayed."""
+SLIPPERY = 1e-9
+"""Of its normal spring: what holds two bodies sideways that have no friction."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the contacts have made a mode too fast to play, and its decay a sample then."""
 
@@ -226,8 +229,9 @@ def _springs(
     size = min(sizes, default=SIZELESS_M)
     region = _one_region(held["point_m"][: held["count"], 0], float(curvature.mean()), off_m, size)
     whole = float(load.sum())
+    slips = any(state.resonators[one].body.dynamics.get("lateralFriction") == 0 for one in both)  # μ is their product
     if region is not None:
-        spring = contact_spring(region, sides, whole)
+        spring = _gripped(contact_spring(region, sides, whole), slips=slips)
         yield from (spring.share(float(n) / whole) for n in load)
         return
     for n, bent in zip(load.tolist(), curvature.tolist(), strict=True):
@@ -235,7 +239,12 @@ def _springs(
         point = (
             Region((small, small), (0.0, 0.0)) if bent * size <= FLAT_CURVATURE else Region((0.0, 0.0), (bent, bent))
         )
-        yield contact_spring(point, sides, n)
+        yield _gripped(contact_spring(point, sides, n), slips=slips)
+
+
+def _gripped(spring: ContactSpring, *, slips: bool) -> ContactSpring:
+    """Return a spring as friction holds it: without any, nothing is held sideways [Mindlin 1949: what sticks is]."""
+    return replace(spring, tangential_n_m=SLIPPERY * spring.normal_n_m) if slips else spring
 
 
 def _one_region(point_m: Array, curvature_per_m: float, off_m: float, size_m: float) -> Region | None:
