@@ -30,10 +30,6 @@ from sonic_bullet.machine.worker import end_with
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
-ROOM_BYTES = 1 << 20
-"""Size of the pipe for results: what Linux allows every user."""
-HELD, AHEAD = 2, 4
-"""Arrays requested of the other process at once, and how far this process works ahead of the one it waits for."""
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
 _OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
 
@@ -92,13 +88,15 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
     Each is yielded as soon as all before it are; few are stored at a time. ``make`` must not depend on earlier calls.
     Raises whatever it raises.
     """
+    # Arrays requested of the other process at once, and how far this process works ahead of the one it waits for
+    held, ahead = 2, 4
     import numpy as np
 
     if count < 2 or _INSIDE.get() or not _can_fork():
         yield from map(make, range(count))
         return
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    room = np.frombuffer(mmap.mmap(-1, HELD * size), dtype).reshape(HELD, *shape)  # both processes' own
+    room = np.frombuffer(mmap.mmap(-1, held * size), dtype).reshape(held, *shape)  # both processes' own
     context: Any = get_context("fork")
     ours, theirs = context.Pipe()
     other = context.Process(target=_make_asked, args=(make, room, ours, theirs, os.getpid()), daemon=True)
@@ -117,11 +115,11 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
     try:
         for number in range(count):
             while number not in made:
-                while alive and len(asked) < HELD and begun < count:
-                    asked[begun] = next(place for place in range(HELD) if place not in asked.values())
+                while alive and len(asked) < held and begun < count:
+                    asked[begun] = next(place for place in range(held) if place not in asked.values())
                     alive = _sent(ours, (begun, asked[begun]))
                     begun += 1
-                if alive and asked and ((number in asked and begun - number > AHEAD) or begun == count or ours.poll()):
+                if alive and asked and ((number in asked and begun - number > ahead) or begun == count or ours.poll()):
                     answer = _received(ours)
                     alive = answer is not None and answer[0] is not None
                     if answer is not None and answer[0] is not None:
@@ -185,13 +183,14 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
 
 def _started(do: Callable[[Any], Any], items: list[Any]) -> tuple[Any, Connection, Any]:
     """Start the other process; return it, the pipe of its results, and the count of items taken; raises OSError."""
+    room_bytes = 1 << 20  # Size of the pipe for results: what Linux allows every user
     import fcntl
 
     context: Any = get_context("fork")
     taken = context.Value("i", 0)
     ours, theirs = context.Pipe(duplex=False)
     with suppress(OSError):  # else the other process blocks on its first large result while this one works
-        fcntl.fcntl(theirs.fileno(), fcntl.F_SETPIPE_SZ, ROOM_BYTES)
+        fcntl.fcntl(theirs.fileno(), fcntl.F_SETPIPE_SZ, room_bytes)
     other = context.Process(target=_help, args=(do, items, taken, ours, theirs, os.getpid()), daemon=True)
     try:
         with _nobody_compiles():

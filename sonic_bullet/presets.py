@@ -47,7 +47,6 @@ FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
 RECORDED_FOLDER = FOLDER / "recorded"
 MADE_FOLDER = FOLDER / "made"
-BYTES_MAX = 1 << 20
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
 """First words of a provenance's line on the damping that was taken from a table, without radiation, where recordings
@@ -203,16 +202,17 @@ def _folder_of(name: str) -> Path:
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:
     """Read the typed content of a preset file. Raises MaterialError naming file and field."""
+    bytes_max = 1 << 20
     remedy = "mend that field; docs/reference/preset.md describes the file"
     with reading(path, "preset", MaterialError, remedy):
         try:
             with open(path, "rb") as file:
-                content = file.read(BYTES_MAX + 1)
+                content = file.read(bytes_max + 1)
         except (OSError, ValueError) as error:
             raise MaterialError(
                 f"cannot read preset {path}: {getattr(error, 'strerror', None) or error}", "check the path"
             ) from error
-        if len(content) > BYTES_MAX:
+        if len(content) > bytes_max:
             raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
         preset = decode_json(content, Preset, f"preset {path}", MaterialError, remedy)
         if preset.format != FORMAT:

@@ -25,11 +25,6 @@ from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
 
-HIGHEST_RATE_HZ = 384_000
-"""Modes up to half of it are baked; a player leaves out those above half its own rate."""
-COARSE = 0.1
-"""Relative rms error of shapes interpolated between points above which a note is given. A tenth is 1 dB."""
-
 
 @dataclass(frozen=True, slots=True)
 class PruningOptions:
@@ -145,13 +140,14 @@ def bake_body(
     ModalError
         Where the body has no mode to bake.
     """
+    highest_rate_hz = 384_000  # Modes up to half of it are baked; a player leaves out those above half its own rate
     from sonic_bullet.render.resonator import build_resonator
 
     model, material, pruning = body.model, body.material, pruning or PruningOptions()
     if model is None or material is None or not model.mode_count:
         why = model.note if model is not None and model.note else "nobody gave it a material"
         raise ModalError(f"{body.name} has no modes to bake: {why}", "bake what rings below 20 kHz")
-    resonator = build_resonator(body, (), HIGHEST_RATE_HZ, Air())
+    resonator = build_resonator(body, (), highest_rate_hz, Air())
     if resonator.index is None or not resonator.mode_count:
         raise ModalError(f"{body.name} has no modes that ring", "give a material with less damping")
     freq, pressure = resonator.omega_rad_s / (2 * np.pi), resonator.weight[0]
@@ -198,13 +194,15 @@ def _coarse(
 
     At the triangles' middles, against the solved shapes, mean of the modes by energy.
     """
+    # Relative rms error of shapes interpolated between points above which a note is given. A tenth is 1 dB.
+    coarse = 0.1
     if not len(face):
         return ""
     between = shape[face].mean(axis=1)
     true = _shape_at(point[face].mean(axis=1), index, solved, model)
     wrong = ((between - true) ** 2).sum(axis=(0, 1)) / np.maximum((true**2).sum(axis=(0, 1)), 1e-30)
     rms = float(np.sqrt(np.average(np.minimum(wrong, 1.0), weights=energy + 1e-300)))
-    if rms < COARSE:
+    if rms < coarse:
         return ""
     return (
         f"between its {len(point)} points shapes are off by {100 * rms:.0f} %: strikes at points are right, others are "

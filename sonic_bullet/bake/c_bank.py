@@ -23,7 +23,6 @@ from sonic_bullet.files.atomic import replacing
 from sonic_bullet.records import Array
 from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST
 
-A_LINE = 8
 RESERVED = frozenset(
     re.findall(
         r"\w+",
@@ -140,8 +139,9 @@ def identifier(name: str) -> str:
 
 def _table(kind: str, name: str, values: Array) -> str:
     """Write an array in C, in digits that give the same number back."""
+    a_line = 8
     flat = values.ravel()
     digits = 17 if kind == "double" else 9
     words = [f"{value:.{digits}g}" for value in flat.tolist()]
-    rows = [", ".join(words[i : i + A_LINE]) for i in range(0, len(words), A_LINE)]
+    rows = [", ".join(words[i : i + a_line]) for i in range(0, len(words), a_line)]
     return f"static const {kind} {name}[{len(flat)}] = {{\n" + ",\n".join(rows) + "\n};"

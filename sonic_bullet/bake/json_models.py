@@ -17,7 +17,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
 REMEDY = "bake it again, or mend that field; docs/reference/baked.md describes the file"
-LARGEST_BYTES = 1 << 30
 
 
 def write_json_models(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> None:
@@ -43,8 +42,9 @@ def _shortest(values: Array) -> Array:
 
 def read_json_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     """Read the models that `write_json_models` wrote. Raises FileError, RecordError."""
+    largest_bytes = 1 << 30
     place = Path(path)
-    if place.stat().st_size > LARGEST_BYTES:
+    if place.stat().st_size > largest_bytes:
         raise FileError(f"{path} is larger than a gigabyte", "bake fewer modes or points")
     form = decode_json(place.read_bytes(), BakedFile, f"baked model {path}", FileError, REMEDY)
     if form.format != FORMAT:

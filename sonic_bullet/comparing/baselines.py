@@ -41,7 +41,6 @@ from sonic_bullet.session.scene_file import defines_build
 
 FOLDER = "sonic_baselines"
 FORMAT = "sonic_bullet baseline 1"
-MOST_BYTES = 4 << 20
 Tell = Callable[[str], None]
 
 
@@ -154,10 +153,11 @@ def write_baseline(path: str | Path, baseline: SceneBaseline) -> None:
 
 def read_baseline(path: str | Path) -> SceneBaseline:
     """Read a baseline; raises FileError, and CompareError for one of another version."""
+    most_bytes = 4 << 20
     remedy = "make it anew: sonic-bullet baseline"
     with reading(str(path), "baseline", FileError, remedy):
         data = Path(path).read_bytes()
-    if len(data) > MOST_BYTES:
+    if len(data) > most_bytes:
         raise FileError(f"{path} is no baseline: it is too large", remedy)
     version = decode_json(data, dict[str, Any], f"{path} is no baseline", FileError, remedy).get("format")
     if version != FORMAT:

@@ -31,12 +31,9 @@ RUNS = 99
 """Fewest runs in which a rank can be at the 1 % level."""
 LEVEL = 0.01
 SHIFT_M = 1e-4
-SLICES = 12
 FLOOR_DB = -90.0
 REST_M = 1e-5
 """Largest motion of a resting body in the last tenth of a second."""
-LONGEST = 4
-"""Longest run to reach rest, as a multiple of the scene's own length."""
 Tell = Callable[[str], None]
 
 
@@ -141,14 +138,15 @@ def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
 
 def until_rest(scene: SceneSide) -> tuple[float, bool]:
     """Find how long to run a scene until all is at rest, and whether that is reached."""
+    longest = 4  # Longest run to reach rest, as a multiple of the scene's own length
     side = run(scene, "a")
     assert side.log is not None
     first = seconds = side.log.duration_s
-    for times in range(1, LONGEST + 1):
+    for times in range(1, longest + 1):
         assert side.log is not None
         if at_rest(side.log):
             return seconds, True
-        if times < LONGEST:
+        if times < longest:
             seconds = first * (times + 1)
             side = run(replace(scene, seconds=seconds), "a")
     return seconds, False
@@ -189,8 +187,9 @@ def _contacts(log: ContactLog) -> tuple[float, float]:
 
 def _band_spectra(x: Array, sr: int) -> Array:
     """Return mean squares (slices, bands) in octave bands, dB, with a floor FLOOR_DB below the largest."""
-    n = x.shape[1] // SLICES
-    frames = x[:, : n * SLICES].reshape(len(x), SLICES, n)
+    slices = 12
+    n = x.shape[1] // slices
+    frames = x[:, : n * slices].reshape(len(x), slices, n)
     power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
     freq = np.fft.rfftfreq(n, 1 / sr)
     bands = [power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in OCTAVES_HZ if f < sr / 2**1.5]

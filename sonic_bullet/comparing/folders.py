@@ -15,9 +15,6 @@ from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS, GLTF_ENDINGS
 from sonic_bullet.session.scene_file import defines_build
 
-AT_ONCE = 4
-"""Pairs given to two processes at a time; finished ones are kept when the run is stopped."""
-
 
 @dataclass(frozen=True, slots=True)
 class Paired:
@@ -63,6 +60,7 @@ def compare_folders(
 
     both: compares two files, on two cores side by side; "stopped" in its result ends all.
     """
+    at_once = 4  # Pairs given to two processes at a time; finished ones are kept when the run is stopped
     listed = pairs_of(a, b)
     reached: list[Paired] = []
 
@@ -81,9 +79,9 @@ def compare_folders(
 
     done: list[Paired] = []
     try:
-        for start in range(0, len(listed), AT_ONCE):
+        for start in range(0, len(listed), at_once):
             say(f"{start} of {len(listed)}")
-            done += parallel_map(do, listed[start : start + AT_ONCE], say)
+            done += parallel_map(do, listed[start : start + at_once], say)
     except KeyboardInterrupt:
         known = {one.name for one in done}
         return [*done, *(one for one in reached if one.name not in known)], True

@@ -32,7 +32,6 @@ from sonic_bullet.session.wanted_bodies import WantedBody
 Say = Callable[[str], None]
 OF_WHOM = ("body", "links", "parts", "own_shapes")
 """Fields of a `WantedBody` that identify it and its shape; all others are inputs."""
-REMEDY = "give a scene (.py .gltf .glb), a contact log (.npz), a recording, or a folder of them"
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,16 +210,17 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
     CompareError
         It is not a scene, log or recording; and what running and reading raise.
     """
+    remedy = "give a scene (.py .gltf .glb), a contact log (.npz), a recording, or a folder of them"
     if isinstance(given, Side):
         return given
     if isinstance(given, SceneSide):
         return run(given, side, say=say)
     if isinstance(given, ContactLog):
         return of_log(given, f"log {side}")
-    name = as_path(given, side, REMEDY, error=CompareError)
+    name = as_path(given, side, remedy, error=CompareError)
     place = Path(name)
     if not place.is_file():
-        raise CompareError(f"no file {shown(name)}", REMEDY)
+        raise CompareError(f"no file {shown(name)}", remedy)
     if place.suffix.lower() in SCENE_ENDINGS:
         return run(SceneSide(name), side, say=say)
     if place.suffix.lower() == ".npz":

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from sonic_bullet.comparing.ensemble import Audibility
     from sonic_bullet.comparing.sides import Side
 
-MOST_NAMES = 6
-
 
 @dataclass(frozen=True, slots=True)
 class SoundMeasures:
@@ -101,11 +99,12 @@ def sameness_words(within: Closeness | None) -> str:
 
 def compared_words(side: Side, same: bool, within: Closeness | None) -> str:
     """Describe what was compared in one line: bodies, events, seconds, tolerance."""
+    most_names = 6
     tolerance_db = None if same or within is None else within.tolerance_db
     x = side.sound.samples()
     names: Sequence[str] = [] if side.log is None else [one.name for one in side.log.bodies if one.material is not None]
-    rest = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    who = f"{format_count(len(names), 'body', 'bodies')} ({', '.join(names[:MOST_NAMES])}{rest}), " if names else ""
+    rest = f" and {len(names) - most_names} more" if len(names) > most_names else ""
+    who = f"{format_count(len(names), 'body', 'bodies')} ({', '.join(names[:most_names])}{rest}), " if names else ""
     events = format_count(len(onsets_s(x, side.sr)), "event")
     how = "to the bit" if tolerance_db is None else f"tolerance {tolerance_db:g} dB"
     return f"{who}{events}, {x.shape[1] / side.sr:.4g} s, {how}"

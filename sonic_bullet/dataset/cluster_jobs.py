@@ -28,8 +28,6 @@ from sonic_bullet.session.keeping import package_versions
 Made = TypeVar("Made")
 ANSWER_S = 10.0
 """Of a scheduler, when it is called and while it works."""
-LOOK_S = 0.5
-"""Between two looks at the scheduler and its workers."""
 
 
 @contextmanager
@@ -86,6 +84,7 @@ def run_on_cluster(
     FileError
         The scheduler went away, or its workers have more than one thread each.
     """
+    look_s = 0.5  # between two looks at the scheduler and its workers
     versions = package_versions()
     todo, again = iter(numbers), deque[tuple[int, int]]()
     done: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -94,7 +93,7 @@ def run_on_cluster(
         workers, looked_s, answered_s = 0, 0.0, time.monotonic()
         while True:
             now_s = time.monotonic()
-            if now_s - looked_s >= LOOK_S:
+            if now_s - looked_s >= look_s:
                 looked_s = now_s
                 if (found := _count_workers(client)) is not None:
                     workers, answered_s = found, now_s
@@ -113,7 +112,7 @@ def run_on_cluster(
             if not running and workers:
                 return
             try:
-                task = done.get(timeout=LOOK_S)
+                task = done.get(timeout=look_s)
             except queue.Empty:
                 continue
             number, nth, _ = running.pop(task.key)

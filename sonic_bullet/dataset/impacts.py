@@ -20,7 +20,6 @@ MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "pla
 SLOW = ("plastic",)
 FLOOR = "concrete"
 SIZES = (0.6, 1.4)
-HEIGHTS_M = (0.05, 0.5)
 
 
 def box(*size_m: float) -> Shape:
@@ -75,12 +74,13 @@ OBJECTS = {
 
 def sample(rng: np.random.Generator) -> DatasetScene:
     """Draw a scene."""
+    heights_m = (0.05, 0.5)
     name = str(rng.choice(list(OBJECTS)))
     drawn = {
         "object": name,
         "size": float(np.exp(rng.uniform(*np.log(SIZES)))),
         "material": str(rng.choice(MATERIALS)),
-        "height_m": float(rng.uniform(*HEIGHTS_M)),
+        "height_m": float(rng.uniform(*heights_m)),
         "quaternion_xyzw": rng.normal(size=4).tolist(),
         "spin_rad_s": rng.normal(0, 3, 3).tolist(),
     }

@@ -15,7 +15,6 @@ from sonic_bullet.records import Array
 
 PART = 0.1  # of the peak: what exceeds it is contact; two such stretches further apart than GAP_S are two hits
 GAP_S = 2e-4
-ABOVE_NOISE = 8.0  # times its rms, which noise alone does not reach in 10¹⁴ samples
 FLAT, FLAT_PART = 3, 0.05  # samples at the ceiling; of the contact: 0.02 of a half-sine in 16 bits is its flat top
 
 
@@ -40,14 +39,15 @@ class HammerPulse:
 
 def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
     """Measure the pulse in a take's force (n,); None where none stands above its noise."""
+    above_noise = 8.0  # times its rms, which noise alone does not reach in 10¹⁴ samples
     rest = force - np.median(force)
     turned = -rest.min() > rest.max()
     rest = -rest if turned else rest
     # of the half that is nearest, whatever the other half holds: 1/Φ⁻¹(3/4)
     noise, peak = 1.4826 * float(np.median(np.abs(rest))), float(rest.max())
-    if not peak > ABOVE_NOISE * noise:
+    if not peak > above_noise * noise:
         return None
-    touching = np.flatnonzero(rest > max(PART * peak, ABOVE_NOISE * noise / 2))
+    touching = np.flatnonzero(rest > max(PART * peak, above_noise * noise / 2))
     parts = np.split(touching, np.flatnonzero(np.diff(touching) > max(1, round(GAP_S * sr))) + 1)
     at = int(np.argmax(rest))
     hit = next(part for part in parts if part[0] <= at <= part[-1])

@@ -41,7 +41,6 @@ from sonic_bullet.records.file_endings import AUDIO_FORMATS
 SAMPLE_BYTES = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, "PCM_S8": 1, "PCM_U8": 1}
 CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
 BLOCK_FRAMES = 1 << 18
-SMALLEST_NORMAL = 2.0**-126  # of float32
 
 
 def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None) -> tuple[Path, str, str]:
@@ -145,6 +144,7 @@ class AudioWriter:
 
         Raises AudioError (not finite, shape, over 4 GiB) and FileError (disk).
         """
+        smallest_normal = 2.0**-126  # of float32
         import soundfile
 
         block = np.asarray(samples, float)
@@ -167,7 +167,7 @@ class AudioWriter:
             self.clipped += beyond
             scaled = np.clip(scaled, -1, 1)
         if self.subtype != "DOUBLE":
-            scaled[np.abs(scaled) < SMALLEST_NORMAL] = 0
+            scaled[np.abs(scaled) < smallest_normal] = 0
             scaled = scaled.astype(np.float32) if self.subtype == "FLOAT" else scaled
         else:
             scaled[np.abs(scaled) < np.finfo(float).tiny] = 0

@@ -52,9 +52,6 @@ __all__ = [
 ]
 
 FORMAT = "sonic-bullet-case/1"
-_REMEDY = "mend that field; docs/reference/case.md describes the file"
-BYTES_MAX = 1 << 24
-NAME_BYTES, PATH_BYTES = 255, 4095  # of POSIX file systems
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none", "unknown")
@@ -144,21 +141,23 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
     FileError
         Names the file and its fault.
     """
+    remedy = "mend that field; docs/reference/case.md describes the file"
+    bytes_max = 1 << 24
     path = Path(folder)
-    with reading(path, "case", FileError, _REMEDY):
+    with reading(path, "case", FileError, remedy):
         if path.is_dir():
             path = path / "case.json"
         try:
             with path.open("rb") as file:
-                content = file.read(BYTES_MAX + 1)
+                content = file.read(bytes_max + 1)
         except (OSError, ValueError) as error:
             raise FileError(
                 f"cannot read case {path}: {getattr(error, 'strerror', None) or error}",
                 "give a folder with a case.json",
             ) from error
-        if len(content) > BYTES_MAX:
+        if len(content) > bytes_max:
             raise FileError(f"case {path} is over 16 MiB", "give a case.json")
-        raw = decode_json(content, CaseFields, f"case {path}", FileError, _REMEDY)
+        raw = decode_json(content, CaseFields, f"case {path}", FileError, remedy)
         unread = unread_fields(msgspec.json.decode(content), CaseFields, f"case {path}")
         if raw.format != FORMAT:
             raise FileError(
@@ -288,11 +287,12 @@ def inside(folder: Path, name: str) -> Path:
     FileError
         It is outside the folder, by name or by link.
     """
+    name_bytes, path_bytes = 255, 4095  # of POSIX file systems
     if not name or "\0" in name or os.path.isabs(name) or "\\" in name:
         raise FileError(f"case names the file {name!r}", "name files inside the case's folder")
     if (
-        max(len(part) for part in os.fsencode(name).split(b"/")) > NAME_BYTES
-        or len(os.fsencode(folder / name)) > PATH_BYTES
+        max(len(part) for part in os.fsencode(name).split(b"/")) > name_bytes
+        or len(os.fsencode(folder / name)) > path_bytes
     ):
         raise FileError(
             f"case names the file '{excerpt(name, 80)}' of {len(name)} characters",

@@ -35,7 +35,6 @@ HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"
 Header = TypeVar("Header", bound=msgspec.Struct)
 
-LOCAL_BYTES = 30  # of an entry's own header, without its name and extra field [PKWARE APPNOTE 6.3.10, 4.3.7]
 LOADED_BYTES, HEAD_BYTES = 1 << 20, 1 << 16  # entries that may stay in the file are larger; an npy header is shorter
 
 
@@ -194,6 +193,7 @@ def _entries(archive: zipfile.ZipFile) -> Iterator[tuple[str, zipfile.ZipInfo]]:
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, lazy: bool) -> Any:
     """Read the array of an entry, or its rows in the file; zipfile compares checksums at an entry's end."""
+    local_bytes = 30  # of an entry's own header, without its name and extra field [PKWARE APPNOTE 6.3.10, 4.3.7]
     where = f"entry '{info.filename}'"
     with archive.open(info) as entry:
         head = entry.read(HEAD_BYTES)
@@ -204,8 +204,8 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, lazy
             return numbers.reshape(shape, order="F" if fortran else "C")
         while entry.read(LOADED_BYTES):
             pass
-    file.seek(info.header_offset + LOCAL_BYTES - 4)
-    start = info.header_offset + LOCAL_BYTES + sum(struct.unpack("<2H", file.read(4))) + at
+    file.seek(info.header_offset + local_bytes - 4)
+    start = info.header_offset + local_bytes + sum(struct.unpack("<2H", file.read(4))) + at
     own = os.fdopen(os.dup(file.fileno()), "rb", buffering=0)  # for as long as the rows are
     return RowsOfEntry(own, start, dtype, shape, f"{file.name}, {where}")
 

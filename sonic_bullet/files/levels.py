@@ -21,11 +21,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_whole, shown
 from sonic_bullet.records.errors import AudioError
 
-SR_MIN_HZ, SR_MAX_HZ = 8000, 384_000
-
-
-TRUE_PEAK_DBTP = -1.0
-"""Maximum true peak of a programme [EBU R 128, rec. h]."""
 RISE_DB, MOST_RISE_DB = 6.0, 36.0
 """Rise of g above the gain without a limiter: a step, and the limit beyond which a sound gets no flatter."""
 LUFS_WITHIN = 0.01
@@ -64,6 +59,7 @@ def find_level(
     AudioError
         The level cannot be reached.
     """
+    true_peak_dbtp = -1.0  # Maximum true peak of a programme [EBU R 128, rec. h].
     if sound.shape[0] == 0:
         raise AudioError(f"samples of shape {sound.shape}", "pass (channels, n)")
     if peak_dbfs is None and lufs is None:
@@ -82,7 +78,7 @@ def find_level(
     if lufs is None:
         assert peak_dbfs is not None
         return FileLevel(float(10 ** (peak_dbfs / 20)) / peak, sound.curve)
-    return _loudness_level(sound, sr, peak, lufs, TRUE_PEAK_DBTP if peak_dbfs is None else peak_dbfs)
+    return _loudness_level(sound, sr, peak, lufs, true_peak_dbtp if peak_dbfs is None else peak_dbfs)
 
 
 def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceiling_dbtp: float) -> FileLevel:
@@ -174,9 +170,10 @@ def check_sr(sr: object) -> int:
     AudioError
         It is anything else.
     """
-    remedy = f"give a whole number of Hz between {SR_MIN_HZ} and {SR_MAX_HZ}, 48000 say"
+    sr_min_hz, sr_max_hz = 8000, 384_000
+    remedy = f"give a whole number of Hz between {sr_min_hz} and {sr_max_hz}, 48000 say"
     try:
-        return as_whole(sr, "sr", remedy, least=SR_MIN_HZ, most=SR_MAX_HZ, error=AudioError)
+        return as_whole(sr, "sr", remedy, least=sr_min_hz, most=sr_max_hz, error=AudioError)
     except AudioError:
         said = f"{sr:g} Hz" if isinstance(sr, float) else f"{shown(sr)} Hz"
         raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None

@@ -18,7 +18,6 @@ from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 
 # most characters from a file: in all; in the fault and in the remedy, where it would be more
 QUOTED, WHAT, REMEDY = 200, 120, 80
-LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # how every pointer begins, by Git LFS's specification
 
 
 @contextmanager
@@ -44,14 +43,15 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
 
 def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:
     """Raise ``kind`` where a file is the pointer that Git LFS leaves in place of a large one."""
+    lfs_pointer = b"version https://git-lfs.github.com/spec/"  # how every pointer begins, by Git LFS's specification
     try:
         if not os.path.isfile(path):  # a pipe would be read empty
             return
         with open(path, "rb") as file:
-            first = file.read(len(LFS_POINTER))
+            first = file.read(len(lfs_pointer))
     except (OSError, ValueError):  # the reader reports it
         return
-    if first == LFS_POINTER:
+    if first == lfs_pointer:
         raise kind(f"{path} is a Git LFS pointer, not the file itself", "run git lfs pull where it came from")
 
 

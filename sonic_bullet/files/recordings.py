@@ -25,8 +25,6 @@ from sonic_bullet.records.errors import AudioError, FileError
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
 # half a gibibyte as float64; or samples a byte of the file, which only packed silence exceeds
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
-UNKNOWN_LENGTH = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
-BLOCK_SAMPLES = 1 << 18
 DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
 # a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
 SILENT, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
@@ -97,13 +95,15 @@ def _forward() -> Any:
 
 def _samples(sound: Any, path: object, file_bytes: int) -> Array:
     """Read all samples (channels, n) of an open file; raises FileError."""
+    unknown_length = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
+    block_samples = 1 << 18
     if not READ_MIN_HZ <= sound.samplerate <= READ_MAX_HZ:
         raise FileError(
             f"cannot read {path}: sampled at {sound.samplerate} Hz",
             f"give a recording of {READ_MIN_HZ} to {READ_MAX_HZ} Hz",
         )
     most = max(MOST_SAMPLES, UNPACKED * file_bytes)
-    size = max(1, BLOCK_SAMPLES // sound.channels)
+    size = max(1, block_samples // sound.channels)
     blocks, frames = [], 0
     while True:
         block = sound.read(size, dtype="float64", always_2d=True)
@@ -115,7 +115,7 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
         blocks.append(block)
         if len(block) < size:
             break
-    if sound.frames < UNKNOWN_LENGTH and frames < sound.frames:
+    if sound.frames < unknown_length and frames < sound.frames:
         raise FileError(f"cannot read {path}: it claims {sound.frames} frames and holds {frames}", UNBROKEN)
     samples = np.empty((sound.channels, frames))
     at = 0

@@ -33,7 +33,6 @@ NAMES = {
     "null": "null",
 }
 BOUNDS = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
-QUOTED = 30  # characters of a value from the file
 
 
 def decode_json(content: bytes, form: type[T], where: str, error: type[SonicBulletError], remedy: str) -> T:
@@ -142,6 +141,7 @@ def _value(tree: Any, keys: list[Key]) -> Any:
 
 def _there(tree: Any, keys: list[Key]) -> str:
     """Describe the value at a place."""
+    quoted = 30  # characters of a value from the file
     try:
         value = _value(tree, keys)
     except (LookupError, TypeError):
@@ -151,7 +151,7 @@ def _there(tree: Any, keys: list[Key]) -> str:
     if isinstance(value, dict):
         return f"an object of {format_count(len(value), 'field')}"
     text = json_bytes(value).decode()
-    return text if len(text) <= QUOTED else f"{text[:QUOTED]}…"
+    return text if len(text) <= quoted else f"{text[:quoted]}…"
 
 
 def _wanted(said: str) -> str:

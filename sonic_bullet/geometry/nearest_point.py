@@ -30,7 +30,6 @@ FACE = np.dtype(
 NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
 """A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
 
-LEAF = 4
 # A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A,
 # at most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near
 # both).
@@ -116,6 +115,7 @@ def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
     Returns the order (f,) of the faces and NODE (k,). Each node's faces are split at the median of their longest axis,
     in their present order.
     """
+    leaf = 4
     order = np.arange(len(low))
     start, end = np.zeros(1, np.int64), np.array([len(low)])
     levels, made = [], 1
@@ -127,13 +127,13 @@ def _grown(low: Array, high: Array, centre: Array) -> tuple[Array, Array]:
         nodes = np.zeros(len(start), NODE)
         nodes["low_m"], nodes["high_m"] = np.minimum.reduceat(low[here], at), np.maximum.reduceat(high[here], at)
         nodes["child"] = np.stack([-start - 1, end], axis=1)
-        inner = np.flatnonzero(count > LEAF)
+        inner = np.flatnonzero(count > leaf)
         nodes["child"][inner] = made + 2 * np.arange(len(inner))[:, None] + [0, 1]
         made += 2 * len(inner)
         levels.append(nodes)
         width = np.maximum.reduceat(centre[here], at) - np.minimum.reduceat(centre[here], at)
         node = np.repeat(np.arange(len(start)), count)
-        along = np.where(count > LEAF, np.argmax(width, axis=1), -1)[node]  # a leaf's faces stay as they are
+        along = np.where(count > leaf, np.argmax(width, axis=1), -1)[node]  # a leaf's faces stay as they are
         order[place] = here[np.lexsort((np.where(along < 0, 0.0, centre[here, along]), node))]
         start, middle, end = start[inner], (start[inner] + end[inner]) // 2, end[inner]
         start, end = np.stack([start, middle], axis=1).ravel(), np.stack([middle, end], axis=1).ravel()

@@ -8,12 +8,10 @@ import numpy as np
 
 from sonic_bullet.records import Array, Shape
 
-PLANE_M = 100.0
-"""Side of the square that stands for a plane."""
-
 
 def shape_triangles(shape: Shape) -> tuple[Array, Array]:
     """Return vertices (v, 3) and faces (f, 3) of a shape in its own frame."""
+    plane_m = 100.0  # Side of the square that stands for a plane
     from trimesh import creation
 
     x, y, _ = shape.size_m.tolist()
@@ -26,7 +24,7 @@ def shape_triangles(shape: Shape) -> tuple[Array, Array]:
     elif shape.kind == "capsule":
         made = creation.capsule(radius=x, height=y)
     else:
-        made = creation.box(extents=shape.size_m if shape.kind == "box" else (PLANE_M, PLANE_M, 1e-3))
+        made = creation.box(extents=shape.size_m if shape.kind == "box" else (plane_m, plane_m, 1e-3))
     vertex = np.array(made.vertices, float)
     # a capsule starts at its lower cap's centre in some releases
     return vertex - (np.ptp(vertex, axis=0) / 2 + vertex.min(axis=0)), np.asarray(made.faces)

@@ -43,7 +43,6 @@ AHEAD_S = 0.018
 """Delay of a step before sound stops. With three steps of 1/240 s, a block of 5 ms and a card that holds 12 ms a
 step sounds after 48 ms.
 """
-LONGEST_AHEAD_S = 2.0
 QUEUE_S = 3.0  # room for that and a step of a second
 STALLED_S = 2.0
 """Time without a call after which a card is gone: Bluetooth takes up to a second to wake."""
@@ -264,9 +263,10 @@ def start_playback(
     AudioError
         There is no such card, or it does not take that rate or so many channels.
     """
+    longest_ahead_s = 2.0
     scale = as_number(full_scale_pa, "full_scale_pa", "give a pressure in Pa, above 0", above=0, error=AudioError)
     ahead = as_number(
-        ahead_s, "ahead_s", f"give 0 … {LONGEST_AHEAD_S:g} s", least=0, most=LONGEST_AHEAD_S, error=AudioError
+        ahead_s, "ahead_s", f"give 0 … {longest_ahead_s:g} s", least=0, most=longest_ahead_s, error=AudioError
     )
     if not channels:
         raise AudioError("there is no microphone, so there is no sound to play", "attach with microphone=(x, y, z)")

@@ -18,11 +18,8 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AudioError
 
-CARD_S = 0.012
-"""Latency requested of the card: a callback may be that late. Half of what PortAudio calls a high latency."""
 CLOSE_S = 1.0
 """Longest time to close a stream: a hundred times what it plays then."""
-INSTALL = "pip install 'sonic_bullet[live]'"
 
 
 class SoundCard:
@@ -33,6 +30,8 @@ class SoundCard:
     """
 
     def __init__(self, device: str | int | None, sr: int, channels: int) -> None:
+        # Latency requested of the card: a callback may be that late. Half of what PortAudio calls a high latency.
+        card_s = 0.012
         self._library = library = portaudio()
         known = found_card(library, device)
         self.name = str(known["name"])
@@ -50,7 +49,7 @@ class SoundCard:
                 f"{self.name} does not take {sr} Hz on {self.channels} channels: {error}",
                 f"attach with sr={own}, its own rate, or name another card",
             ) from error
-        self._asked = {**asked, "latency": CARD_S, "clip_off": True, "dither_off": True}
+        self._asked = {**asked, "latency": card_s, "clip_off": True, "dither_off": True}
         self._stream: Any = None
 
     def start(self, fill: Fill, ended: Callable[[], None]) -> None:
@@ -90,10 +89,11 @@ class SoundCard:
 
 def portaudio() -> Any:
     """Import the library sounddevice; AudioError where it, or PortAudio under it, is not installed."""
+    install = "pip install 'sonic_bullet[live]'"
     try:
         import sounddevice
     except ImportError as error:
-        raise AudioError("sound cards need the library sounddevice", f"{INSTALL}; or play to 'null'") from error
+        raise AudioError("sound cards need the library sounddevice", f"{install}; or play to 'null'") from error
     except OSError as error:  # its wheel brings PortAudio on Windows and macOS alone
         remedy = "install the package libportaudio2 (Debian, Ubuntu) or portaudio; or play to 'null'"
         raise AudioError("sound cards need PortAudio, which is not installed", remedy) from error

@@ -18,7 +18,6 @@ from typing import NamedTuple
 from sonic_bullet.records.errors import FileError
 
 LIMIT = "SONIC_BULLET_CACHE_LIMIT"
-DEFAULT_LIMIT_BYTES = 2 * 10**9  # of modes: 5 to 10 MB for a body; hundreds of bodies
 NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
 CODE = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
 SIZE = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
@@ -47,8 +46,9 @@ def as_bytes(size: str, name: str) -> int:
 
 def limit_bytes() -> int:
     """Return how much may be cached: SONIC_BULLET_CACHE_LIMIT, else 2 GB. Raises FileError."""
+    default_limit_bytes = 2 * 10**9  # of modes: 5 to 10 MB for a body; hundreds of bodies
     given = os.environ.get(LIMIT)
-    return as_bytes(given, LIMIT) if given else DEFAULT_LIMIT_BYTES
+    return as_bytes(given, LIMIT) if given else default_limit_bytes
 
 
 def computed(folder: Path) -> list[KeptFile]:

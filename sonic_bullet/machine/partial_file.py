@@ -26,7 +26,6 @@ except ImportError:  # Windows: nothing is locked there, and nothing swept
     fcntl = None  # type: ignore[assignment]
 
 NAME = re.compile(r"sonic-bullet-[0-9a-f]{16}\.partial")
-PROBE_BYTES = 1 << 20  # more than any writer here writes at once
 OPEN_FLAGS = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -59,9 +58,10 @@ class PartialFile:
 
         It writes more at the end and removes it again.
         """
+        probe_bytes = 1 << 20  # more than any writer here writes at once
         size = os.lseek(self.fd, 0, os.SEEK_END)
         try:
-            left = bytes(PROBE_BYTES)
+            left = bytes(probe_bytes)
             while left:
                 left = left[os.write(self.fd, left) :]
             os.fsync(self.fd)

@@ -47,21 +47,16 @@ from sonic_bullet.records.errors import SceneError
 
 IDLE_S = 10.0
 """Wall time without a physics step after which a scene is taken for a viewer's loop."""
-ASK_S = 1.0
-"""How often a scene that does not step is asked for its line."""
 END_S = 0.5
 """For an interrupted command to end by itself; it must be gone within 1 s."""
 CLOSE_S = 20.0
 """For what was made before the interrupt to be written."""
-LEAVE_S = 0.2
-"""For the interpreter of an interrupted command to end after its last message."""
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
 STAND_INS = f"{PACKAGE}/listener/pybullet/"
 """Functions that a script calls in place of PyBullet's: their time is the script's own."""
 LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
 _FORKS_EARLY_ONLY = sys.platform != "linux"
 """Whether libraries forbid a fork once they are loaded (macOS)."""
-SUBREAPER = 36  # prctl(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +142,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
     caller goes on, and an interrupt of it ends the worker. command: heads lines of progress; "": no line before a first
     stage.
     """
+    subreaper = 36  # prctl(2)
     if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
         if alone:
             catch_stops()
@@ -154,7 +150,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
     said, traces, clock = os.pipe(), os.pipe(), mmap.mmap(-1, 8)
     sys.stdout.flush(), sys.stderr.flush()
     signal.pthread_sigmask(signal.SIG_BLOCK, STOPS)  # neither process misses one between fork and handler
-    tied, before = process_control(SUBREAPER, 1), set() if alone else set(_children())
+    tied, before = process_control(subreaper, 1), set() if alone else set(_children())
     here = os.getpid()
     process = os.fork()
     if not process:
@@ -178,7 +174,7 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
         _clean_up(child, tied, before)
         _close(child.said, child.traces)
         if not alone:
-            process_control(SUBREAPER, 0)
+            process_control(subreaper, 0)
 
 
 def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool, parent: int) -> None:
@@ -218,6 +214,7 @@ def _idle_words(name: str, line: int) -> tuple[str, str]:
 
 
 def _wait(child: _Worker, stops: list[int]) -> Ending:
+    ask_s = 1.0  # how often a scene that does not step is asked for its line
     poll_s = 0.05
     sent, stopped_at, seen_at = 0, 0.0, time.monotonic()
     own_since = asked_at = seen_at
@@ -240,7 +237,7 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
         if now - seen_at > 2.0 or not stepped:  # stopped by a terminal or a debugger, or no scene runs
             own_since = now
         own_since, seen_at = max(own_since, stepped), now
-        if now - max(own_since, asked_at) > ASK_S or (now - own_since > IDLE_S and now - asked_at > ASK_S):
+        if now - max(own_since, asked_at) > ask_s or (now - own_since > IDLE_S and now - asked_at > ask_s):
             asked_at = now
             found = _judgement(child.where(), child.scene)
             if found != "own":  # a long call into C does not answer
@@ -255,7 +252,8 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
 
 
 def _ending(child: _Worker, stops: list[int], ended_idle: tuple[str, str] | None) -> Ending:
-    end = time.monotonic() + (LEAVE_S if stops else 4 * END_S)
+    leave_s = 0.2  # for the interpreter of an interrupted command to end after its last message
+    end = time.monotonic() + (leave_s if stops else 4 * END_S)
     while not child.has_ended() and child.code is not None and time.monotonic() < end:
         child.listen(0.005)
     running = not child.has_ended()

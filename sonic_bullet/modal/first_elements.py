@@ -27,9 +27,6 @@ from sonic_bullet.records import Array, Shape
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
-PER_WAVE = 0.2
-"""First edge over the shortest wave."""
-
 
 def filled(
     shapes: tuple[Shape, ...],
@@ -91,6 +88,7 @@ def _first(
     The edge follows the shortest wave of a plate as thick as the body, at the highest λ wanted or at the wave number of
     as many modes as are wanted, with no more unknowns than their work allows.
     """
+    per_wave = 0.2  # First edge over the shortest wave
     largest = 0.2  # edge over the diagonal, at most
     skin = prepared(*soup(shapes), thickness_m)
     area = float(geometry.face_areas_m2(skin.vertex_m, skin.face).sum()) / length_m**2
@@ -99,7 +97,7 @@ def _first(
     bulk = (3 * np.pi**2 * (wanted.most + 8) / (area * wall / 2)) ** (1 / 3)  # two shear waves fill a lump
     number = float(polynomials.wave_number(wanted.beyond * wanted.limit, wall, tensor))
     modes = cost.modes_below(number, area, wall, wanted)
-    edge = min(PER_WAVE * 2 * np.pi / min(number, max(flat, bulk)), largest)
+    edge = min(per_wave * 2 * np.pi / min(number, max(flat, bulk)), largest)
     thin = edge > wall
     most = min(MOST_UNKNOWNS[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin))))
     least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_PER_TET[3])

@@ -12,8 +12,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-SOLVERS = ("numpy", "scipy", "scikit-fem", "netgen-mesher", "manifold3d")
-
 
 @lru_cache(maxsize=4)
 def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
@@ -29,8 +27,9 @@ def code_digest(files: tuple[Path, ...], packages: tuple[str, ...]) -> bytes:
 
 def _code() -> bytes:
     """Digest all that turns a surface into modes: this package, `geometry`, and the solvers' versions."""
+    solvers = ("numpy", "scipy", "scikit-fem", "netgen-mesher", "manifold3d")
     here = Path(__file__).resolve().parent
-    return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), SOLVERS)
+    return code_digest((*sorted(here.rglob("*.py")), *sorted((here.parent / "geometry").glob("*.py"))), solvers)
 
 
 def key(kind: str, *parts: Array | str | float | int | None, code: bytes | None = None) -> str:

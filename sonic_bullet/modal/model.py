@@ -28,8 +28,6 @@ from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 
-LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distinguished
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
@@ -270,7 +268,8 @@ def _solve(
 
 
 def _percent(error: float) -> str:
-    return f"about {100 * error:.2g} %" if error >= LEAST_ERROR else f"under {100 * LEAST_ERROR:g} %"
+    least_error = 1e-4  # relative, of a frequency: smaller errors are not distinguished
+    return f"about {100 * error:.2g} %" if error >= least_error else f"under {100 * least_error:g} %"
 
 
 def _arrays(unit: _Unit) -> dict[str, Array]:

@@ -18,14 +18,12 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.records.mode_shapes import rounded
 
-ISOTROPIC = 1e-9
-"""Relative deviation from an isotropic tensor that rounding explains."""
-
 
 def check_isotropic(material: Material) -> None:
     """Raise ModalError where a material is stiffer in some directions than in others."""
+    isotropic = 1e-9  # relative deviation from an isotropic tensor that rounding explains
     even = isotropic_stiffness_pa(material.youngs_pa, material.poisson)
-    if np.abs(even - material.stiffness_pa).max() > ISOTROPIC * np.abs(even).max():
+    if np.abs(even - material.stiffness_pa).max() > isotropic * np.abs(even).max():
         raise ModalError(
             f"material {material.name} is not isotropic", "its bodies are solved anew: give `Listener.add` the mesh"
         )

@@ -18,11 +18,10 @@ from sonic_bullet.records.errors import FileError
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.spectrogram import Power, power
 
-WINDOW = 1024
-
 
 def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> None:
     """Draw the first strike to .png, .pdf or .svg. Raises FileError."""
+    window = 1024
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -36,8 +35,8 @@ def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> No
         "synthesised": damped(strikes.mode_hz, strikes.mode_decay_per_s, strikes.mode_amplitude[0], n, sr),
         "represented": damped(strikes.freq_hz, strikes.decay_per_s, features * share, n, sr),
     }
-    shown = {"recorded": power(sound, sr, WINDOW)} | {name: power(x, sr, WINDOW) for name, x in parts.items()}
-    shown["residual"] = clip_residual(sound, parts["represented"], sr, window=WINDOW)[0]
+    shown = {"recorded": power(sound, sr, window)} | {name: power(x, sr, window) for name, x in parts.items()}
+    shown["residual"] = clip_residual(sound, parts["represented"], sr, window=window)[0]
     top = 10 * float(np.log10(shown["recorded"].per_hz.max()))
     figure = Figure(figsize=(15, 8), layout="constrained")
     FigureCanvasAgg(figure)

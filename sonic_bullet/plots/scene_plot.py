@@ -27,7 +27,6 @@ from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, SoundEvent, find_sound_events
 
-EXTENSIONS = (".png", ".pdf", ".svg")
 BARS = {SUPPORT: "rests", ROLL: "rolls", SLIDE: "slides"}
 LANES_MAX = 24
 
@@ -107,9 +106,10 @@ def check_picture_output(path: str | os.PathLike[str]) -> Path:
 
     Raises FileError where the extension is not .png, .pdf or .svg or the place cannot be written.
     """
-    if Path(path).suffix.lower() not in EXTENSIONS:
+    extensions = (".png", ".pdf", ".svg")
+    if Path(path).suffix.lower() not in extensions:
         raise FileError(
-            f"cannot draw {path}: unknown picture format", f"end the name with one of {' '.join(EXTENSIONS)}"
+            f"cannot draw {path}: unknown picture format", f"end the name with one of {' '.join(extensions)}"
         )
     return check_output(path)
 

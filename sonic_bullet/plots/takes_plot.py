@@ -11,7 +11,6 @@ from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
 COLUMNS = 2000  # of an envelope: more than a picture is wide
-LOWEST_DB = -80.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +25,7 @@ class DrawnRecording:
 
 def write_takes_picture(path: Path, recordings: list[DrawnRecording]) -> None:
     """Draw recordings and their takes to .png, .pdf or .svg. Raises FileError."""
+    lowest_db = -80.0
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -35,13 +35,13 @@ def write_takes_picture(path: Path, recordings: list[DrawnRecording]) -> None:
         step = max(1, len(one.signal) // COLUMNS)
         block = np.abs(one.signal[: len(one.signal) // step * step]).reshape(-1, step).max(axis=1)
         time = np.arange(len(block)) * step / one.sr
-        axes.plot(time, 20 * np.log10(np.maximum(block, 10 ** (LOWEST_DB / 20))), linewidth=0.7, color="k")
+        axes.plot(time, 20 * np.log10(np.maximum(block, 10 ** (lowest_db / 20))), linewidth=0.7, color="k")
         for k, (strike, start, stop) in enumerate(one.bounds, 1):
             axes.axvspan(start / one.sr, stop / one.sr, color=f"C{k % 2}", alpha=0.2, linewidth=0)
             axes.axvline(strike / one.sr, color="C3", linewidth=1)
             axes.annotate(
                 str(k), (strike / one.sr, 1), (3, -11), ("data", "axes fraction"), "offset points", fontsize=8
             )
-        axes.set(title=one.name, xlabel="time in s", ylabel="peak in dBFS", ylim=(LOWEST_DB, 3), xlim=(0, time[-1]))
+        axes.set(title=one.name, xlabel="time in s", ylabel="peak in dBFS", ylim=(lowest_db, 3), xlim=(0, time[-1]))
     with replacing(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=110)

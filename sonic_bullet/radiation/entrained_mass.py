@@ -41,18 +41,16 @@ class Moved:
     vector: Array
 
 
-MOST_UNEVEN, MOST_NEGATIVE = 0.4, 0.01
-"""Limits on the solution: its antisymmetric part over the whole, and its least eigenvalue over its greatest. Good
-panels have 0.03 to 0.33, thin discs most, and -0.005 at least; those that cross, touch or lie twice 0.4 and more, or
--0.04."""
-
-
 def moved_air(corner_m: Array) -> Moved | None:
     """Solve the module's equations for triangles corner_m (f, 3, 3) of a closed surface, outward.
 
     Sphere moving as harmonic l: φ = a v/(l + 1). The map is symmetric by reciprocity and positive, as the energy of the
     air is; discretised, nearly so. Where it is not, triangles cross, touch or lie twice, and None is returned.
     """
+    # Limits on the solution: its antisymmetric part over the whole, and its least eigenvalue over its greatest. Good
+    # panels have 0.03 to 0.33, thin discs most, and -0.005 at least; those that cross, touch or lie twice 0.4 and more,
+    # or -0.04.
+    most_uneven, most_negative = 0.4, 0.01
     twice = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     length = np.linalg.norm(twice, axis=1)
     normal = twice / length[:, None]
@@ -68,8 +66,8 @@ def moved_air(corner_m: Array) -> Moved | None:
         value, vector = np.linalg.eigh((found + found.T) / 2)
     except (ZeroDivisionError, np.linalg.LinAlgError):
         return None
-    uneven = np.linalg.norm(found - found.T) > MOST_UNEVEN * np.linalg.norm(found)
-    if uneven or value[0] < -MOST_NEGATIVE * value[-1]:
+    uneven = np.linalg.norm(found - found.T) > most_uneven * np.linalg.norm(found)
+    if uneven or value[0] < -most_negative * value[-1]:
         return None
     return Moved(corner_m, area, np.maximum(value, 1e-2 * root.min()), vector)
 

@@ -54,11 +54,8 @@ class SurfaceTerms(NamedTuple):
     turn: Array
 
 
-LEAST_RINGS, MOST_RINGS = 6, 12  # of directions between the poles
 EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
-LOUDER = 16  # power of |p| by which directions count: half of a plate's modes are within 2° of the loudest one's phase
 UNEVEN = np.array([0.8, 0.6, 0.4])  # a: along no axis and in no plane between axes, so even bodies' modes do not cancel
-SPREAD = 256  # directions, and their negatives, where even the most rings are too few
 
 
 def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
@@ -75,6 +72,10 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
 
     near_field: takes the place of `surface_air`.
     """
+    least_rings, most_rings = 6, 12  # of directions between the poles
+    # power of |p| by which directions count: half of a plate's modes are within 2° of the loudest one's phase
+    louder = 16
+    spread = 256  # directions, and their negatives, where even the most rings are too few
     m = model.mode_count
     face = sound_faces(model)[1]
     if m == 0 or len(face) == 0:
@@ -84,16 +85,16 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
         weight = compact_weight(model, face, *terms, air)
         return weight, _damping(weight, air), COMPACT
     k = terms.k
-    rings = np.clip(np.ceil(k * np.linalg.norm(terms.point, axis=1).max()) + 4, LEAST_RINGS, MOST_RINGS + 1).astype(int)
+    rings = np.clip(np.ceil(k * np.linalg.norm(terms.point, axis=1).max()) + 4, least_rings, most_rings + 1).astype(int)
     weight = np.zeros(m, complex)
     for count in np.unique(rings):
         now = np.flatnonzero(rings == count)
-        direction, share = directions(int(count)) if count <= MOST_RINGS else spread_directions(SPREAD)
+        direction, share = directions(int(count)) if count <= most_rings else spread_directions(spread)
         pressure, reach = surface_pressure(terms, air, direction, now)
         every, both = np.concatenate([share, share]), np.concatenate([direction, -direction])
         mean = np.abs(pressure) ** 2 @ every
         left = pressure * np.exp(-1j * k[now, None] * reach)
-        loud = (np.abs(left) / np.maximum(np.abs(left).max(axis=1, keepdims=True), 1e-300)) ** LOUDER
+        loud = (np.abs(left) / np.maximum(np.abs(left).max(axis=1, keepdims=True), 1e-300)) ** louder
         phase = _unit(np.sqrt((loud * left**2) @ every))
         sense = ((loud * left) @ (every * np.exp(both @ UNEVEN)) * phase.conj()).real
         weight[now] = np.sqrt(mean) * np.where(sense < 0, -phase, phase)

@@ -14,7 +14,6 @@ from sonic_bullet.records import Array
 MOST_TRIANGLES = (700, 850, 950, 1200, 1400)
 """Sizes of the near field's mesh, tried until one has a near field: both sides of a wall thinner than the deviation of
 its triangles' chords would cross. The last takes 2 s of processor, and some 0.1 s a mode."""
-FINEST = 950  # triangles with which the search begins at most, whatever the waves
 
 
 def least_triangles(modes: int) -> int:
@@ -23,7 +22,8 @@ def least_triangles(modes: int) -> int:
     Three edges a wave, as `RESOLVED` has it for sound: m modes of a wall with both sides' area S reach κ = √(8πm/S)
     [Courant & Hilbert 1924, ch. VI.4], an edge is √(4S/√3f).
     """
-    wanted = min(32 * np.pi / np.sqrt(3) * modes / RESOLVED**2, FINEST)
+    finest = 950  # triangles with which the search begins at most, whatever the waves
+    wanted = min(32 * np.pi / np.sqrt(3) * modes / RESOLVED**2, finest)
     return next(most for most in MOST_TRIANGLES if most >= wanted)
 
 

@@ -9,8 +9,6 @@ from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_number, as_rows, as_whole
 from sonic_bullet.records.errors import MeshError, ModalError
 
-MOST_ASKED = 2000
-
 
 @dataclass(frozen=True, slots=True)
 class ModalOptions:
@@ -43,6 +41,7 @@ class ModalOptions:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        most_asked = 2000
         thickest_m = 1e4
         highest_hz = 1e9
         remedy = "give clamps as [(x, y, z, radius), …] in metres, body frame"
@@ -68,7 +67,7 @@ class ModalOptions:
             store(
                 self,
                 count=as_whole(
-                    self.count, "count", f"ask for 1 to {MOST_ASKED} modes", least=1, most=MOST_ASKED, error=ModalError
+                    self.count, "count", f"ask for 1 to {most_asked} modes", least=1, most=most_asked, error=ModalError
                 ),
             )
         if self.thickness_m is not None:

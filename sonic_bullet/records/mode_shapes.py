@@ -18,7 +18,6 @@ import numpy as np
 from sonic_bullet.records.arrays import Array
 
 BITS = 11  # B; 10 would do for three of the six scenes
-MOST_BITS = 15  # of whole numbers in a file, int16 with its sign
 TINIEST = -126  # exponent of the smallest normal float32
 
 
@@ -34,9 +33,10 @@ def whole_multiples(shape: Array) -> tuple[Array, Array] | None:
 
     None where they are not such multiples; else `from_multiples` restores the same bytes.
     """
-    exponent = np.maximum(_exponent(shape) - MOST_BITS, TINIEST)
+    most_bits = 15  # of whole numbers in a file, int16 with its sign
+    exponent = np.maximum(_exponent(shape) - most_bits, TINIEST)
     scaled = np.ldexp(shape, -exponent)
-    if not (np.abs(scaled) < 2**MOST_BITS).all():
+    if not (np.abs(scaled) < 2**most_bits).all():
         return None
     whole = scaled.astype(np.int16)
     bits = np.bitwise_or.reduce(whole, axis=(0, 1), initial=0).astype(int)

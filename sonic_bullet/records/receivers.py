@@ -9,12 +9,6 @@ import numpy as np
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_text, as_whole
 
-LEAST_ROOM_M, MOST_ROOM_M = 0.1, 200.0
-"""A box for shoes, and the nave of a cathedral."""
-MOST_OCTAVES = 8
-"""125 Hz to 16 kHz."""
-LONGEST_RESPONSE_S = 30.0
-"""A mausoleum's."""
 AHEAD_XYZW = np.array([0.0, 0.0, 0.0, 1.0])
 """Turned nowhere: x is ahead, y left, z up, in the world as in ambiX and in SOFA files."""
 
@@ -105,12 +99,14 @@ class ShoeboxRoom:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        least_room_m, most_room_m = 0.1, 200.0  # A box for shoes, and the nave of a cathedral
+        most_octaves = 8  # 125 Hz to 16 kHz
         size = frozen_array(self.size_m, float, (3,), "room: size_m")
         remedy = "give metres along x, y and z, such as 6, 4, 3"
-        require(bool((size >= LEAST_ROOM_M).all() and (size <= MOST_ROOM_M).all()), "room: size_m is no room's", remedy)
+        require(bool((size >= least_room_m).all() and (size <= most_room_m).all()), "room: size_m is no room's", remedy)
         alpha = frozen_array(_numbers(self.absorption), float, (None,), "room: absorption")
-        octaves = f"give one number above 0 and at most 1, or up to {MOST_OCTAVES}, one an octave from 125 Hz on"
-        require(0 < len(alpha) <= MOST_OCTAVES, f"room: absorption has {len(alpha)} numbers", octaves)
+        octaves = f"give one number above 0 and at most 1, or up to {most_octaves}, one an octave from 125 Hz on"
+        require(0 < len(alpha) <= most_octaves, f"room: absorption has {len(alpha)} numbers", octaves)
         require(bool(((alpha > 0) & (alpha <= 1)).all()), "room: absorption is not above 0 and at most 1", octaves)
         store(self, size_m=size, absorption=alpha)
         if self.corner_m is not None:
@@ -131,14 +127,15 @@ class RoomResponse:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        longest_response_s = 30.0  # A mausoleum's
         name = as_text(self.name, "room response: name", "give a text")
         sr = as_whole(self.sr, "room response: sr", "give the rate in Hz", least=1000, most=1_000_000)
         response = frozen_array(self.response, float, (None, None), "room response: response")
         require(response.shape[0] > 0, "room response: response has no channel", "give at least one channel")
         silent = not response.shape[1] or not np.abs(response).max(axis=1).all()
         require(not silent, "room response: response is silent", "give the room's impulse response")
-        short = response.shape[1] <= LONGEST_RESPONSE_S * sr
-        require(short, f"room response: response lasts over {LONGEST_RESPONSE_S:g} s", "give an impulse response alone")
+        short = response.shape[1] <= longest_response_s * sr
+        require(short, f"room response: response lasts over {longest_response_s:g} s", "give an impulse response alone")
         store(self, response=response, sr=sr, name=name)
 
 

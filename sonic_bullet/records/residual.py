@@ -13,7 +13,6 @@ MOST = {"freq_hz": 1e6, "decay_per_s": 1e6, "amplitude": 1e6, "time_s": 1e4, "po
 SLOWEST_HZ = 0.01
 LOUDER = 1.1
 """A preset's levels are kept to a quarter of a decibel."""
-FAINTEST = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +56,7 @@ class Residual:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        faintest = 1e-6
         m, count = len(np.atleast_1d(self.mode_freq_hz)), len(np.atleast_1d(self.line_freq_hz))
         b, n = len(np.atleast_1d(self.freq_hz)), len(np.atleast_1d(self.time_s))
         shapes: dict[str, tuple[int, ...]] = {"freq_hz": (b,), "time_s": (n,), "power_per_hz": (b, n)}
@@ -108,7 +108,7 @@ class Residual:
             "take it anew: what is left of a sound is less",
         )
         require(
-            modal >= FAINTEST * energy and modal > FAINTEST**2,
+            modal >= faintest * energy and modal > faintest**2,
             "a residual beside modes too faint to follow",
             "take it from a strike that excites them",
         )

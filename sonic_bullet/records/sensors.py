@@ -12,9 +12,6 @@ from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_whole
 from sonic_bullet.records.receivers import AHEAD_XYZW, Head, MicrophonePath, unit_quaternions
 from sonic_bullet.records.touching.sensor_response import SensorResponse
 
-MOST_ORDER = 3
-"""Of ambisonics: the microphone arrays that are sold, and most players, end there."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Microphone:
@@ -76,9 +73,10 @@ class Ambisonics(Microphone):
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        most_order = 3  # of ambisonics: the microphone arrays that are sold, and most players, end there
         Microphone.__post_init__(self)
-        remedy = f"give 1, 2 or {MOST_ORDER}"
-        store(self, order=as_whole(self.order, "ambisonics: order", remedy, least=1, most=MOST_ORDER))
+        remedy = f"give 1, 2 or {most_order}"
+        store(self, order=as_whole(self.order, "ambisonics: order", remedy, least=1, most=most_order))
 
     @property
     def channels(self) -> int:

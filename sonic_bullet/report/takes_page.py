@@ -20,8 +20,6 @@ import numpy as np
 from sonic_bullet.files import replacing
 from sonic_bullet.files.rows.spool import KeptSound
 
-PLAYED_S = 30.0
-"""Of each sound at most: 3 MB a channel."""
 STYLE = """
 :root{color-scheme:light dark;--line:#8886}
 body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:1.5rem auto;padding:0 1rem}
@@ -36,16 +34,17 @@ def take_entry(
     name: str, sound: KeptSound, sr: int, gain_per_pa: float, loudness: str, drawn: Mapping[str, Mapping[str, float]]
 ) -> dict[str, Any]:
     """Collect the page's content for one take."""
+    played_s = 30.0  # of each sound at most: 3 MB a channel
     import soundfile
 
-    frames = min(sound.shape[1], round(PLAYED_S * sr))
+    frames = min(sound.shape[1], round(played_s * sr))
     held = io.BytesIO()
     clipped = np.clip(sound.read(0, frames)[:2] * gain_per_pa, -1.0, 1.0)
     soundfile.write(held, clipped.T, sr, format="FLAC", subtype="PCM_16")
     return {
         "name": Path(name).name,
         "seconds": round(sound.shape[1] / sr, 3),
-        "played_s": PLAYED_S if frames < sound.shape[1] else None,
+        "played_s": played_s if frames < sound.shape[1] else None,
         "loudness": loudness,
         "data": base64.b64encode(held.getvalue()).decode(),
         "drawn": [(who, key, f"{factor:.4g}") for who, of in drawn.items() for key, factor in of.items()],

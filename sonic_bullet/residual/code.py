@@ -21,7 +21,6 @@ from sonic_bullet.records.errors import MaterialError, RecordError
 
 STEP_DB = 0.5
 MOST = 4096
-MOST_CELLS = 1 << 17
 
 Numbers = Annotated[tuple[float, ...], msgspec.Meta(max_length=MOST)]
 
@@ -67,12 +66,13 @@ def form_of(residual: Residual) -> ResidualForm:
 
 def residual_of(form: ResidualForm, where: str = "preset") -> Residual:
     """Decode a residual. Raises MaterialError naming the preset and what is wrong."""
+    most_cells = 1 << 17
     shape = (len(form.freq_hz), len(form.time_s))
     try:
         content = base64.b64decode(form.levels, validate=True)
     except (binascii.Error, ValueError) as error:
         raise MaterialError(f"{where}: residual levels are not base64", "take the residual anew") from error
-    if len(content) != shape[0] * shape[1] or len(content) > MOST_CELLS:
+    if len(content) != shape[0] * shape[1] or len(content) > most_cells:
         raise MaterialError(
             f"{where}: residual holds {len(content)} levels for {shape[0]} bands and {shape[1]} times",
             "take the residual anew",

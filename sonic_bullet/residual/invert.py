@@ -24,7 +24,6 @@ MOMENTUM = 0.99
 OVERLAP = 2
 """With frames half a window apart four iterations leave 10 % inconsistent, where a quarter apart ten leave 20 % (noise
 with a decay, momentum 0.99)."""
-LONGEST_NOISE = 1 << 18
 
 
 def invert(
@@ -58,8 +57,9 @@ def noise_phases(n: int, seed: int, window: int = WINDOW, overlap: int = OVERLAP
 
     A longer grain's are the same, as far as both go.
     """
+    longest_noise = 1 << 18
     frames = frame_count(n, window, overlap)
-    longest = max(LONGEST_NOISE, 1 << int(np.ceil(np.log2(n + window))))
+    longest = max(longest_noise, 1 << int(np.ceil(np.log2(n + window))))
     return _noise(longest, seed, window, overlap)[:frames]
 
 

@@ -20,9 +20,6 @@ from sonic_bullet.residual.invert import MOST_ITERATIONS, invert, magnitude_of
 from sonic_bullet.residual.spectrogram import WINDOW, axes
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
 
-LOOKING = 4
-"""Frames a quarter of a window apart, as in `clip_residual`."""
-
 
 def transferred_clip(
     recorded: Array,
@@ -38,19 +35,20 @@ def transferred_clip(
     represented (k,): what ``source`` represents of the recording. As long as the recording, or ``seconds``. Raises
     AudioError as `clip_residual` and `StruckModes`.
     """
+    looking = 4  # frames a quarter of a window apart, as in `clip_residual`
     left, start = clip_residual(recorded, represented, sr)
     pairs = pair(source, target)
     n = len(recorded) if seconds is None else max(1, round(seconds * sr))
     freq, time = axes(n, sr)
     here, _, rate = come_from(pairs, freq)
     there_s = np.minimum(rate * time[:, None], left.time_s[-1])
-    row = np.round(there_s * sr * LOOKING / WINDOW).astype(np.int64)
+    row = np.round(there_s * sr * looking / WINDOW).astype(np.int64)
     column = np.clip(np.round(here * WINDOW / sr).astype(np.int64), 0, WINDOW // 2)
     # phases are counted from a frame's beginning, half a window before its time
     flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)
     turned = np.exp(2j * np.pi * (freq * time[:, None] - here * there_s)) * flip
     magnitude = magnitude_of(transfer(left, source, target, freq, time, pairs=pairs), sr)
-    return invert(magnitude, start[row, column] * turned, n, iterations=MOST_ITERATIONS, overlap=LOOKING)
+    return invert(magnitude, start[row, column] * turned, n, iterations=MOST_ITERATIONS, overlap=looking)
 
 
 def residual_sound(

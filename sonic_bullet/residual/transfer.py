@@ -29,14 +29,10 @@ from sonic_bullet.residual.spectrogram import Power
 
 DOMINANT = 24
 """Most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1."""
-ALIKE = 0.02
-"""Frequencies that agree so well after scaling are of the same mode of a scaled body."""
 ONE_MODE = 1e-3
 """Modes closer than this, relative, count as one: an analysis finds one line."""
-SKIRT = 0.07
 FAINT = 1e-6
 LEAST_DECAY_PER_S = 0.1
-FASTEST_TIME = 1e3
 TINY = 1e-300
 
 
@@ -124,6 +120,7 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> 
     Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides,
     from low to high.
     """
+    fastest_time = 1e3
     a, _ = merged(source)
     b, group = merged(target)
     i, j = _natural(a, b)
@@ -133,8 +130,8 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> 
         i, j = (np.sort(np.argsort(-x.energy, kind="stable")[: max(count, 1)]) for x in (a, b))
     rate = np.clip(
         np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S),
-        1 / FASTEST_TIME,
-        FASTEST_TIME,
+        1 / fastest_time,
+        fastest_time,
     )
     of_pair = np.full(len(b.freq_hz), -1)
     of_pair[j] = np.arange(len(j))
@@ -146,6 +143,7 @@ def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
 
     The scale is searched among ratios of the lowest.
     """
+    alike = 0.02  # Frequencies that agree so well after scaling are of the same mode of a scaled body
     alike_count = 12
     count = min(alike_count, len(a.freq_hz), len(b.freq_hz))
     none = np.zeros(0, np.int64)
@@ -156,12 +154,12 @@ def _natural(a: StruckModes, b: StruckModes) -> tuple[Array, Array]:
     wanted = ratio[:, None] * low
     off = np.sort(np.abs(_nearest(b.freq_hz, wanted)[1] / wanted - 1), axis=1)[:, max(0, int(0.8 * count) - 1)]
     at = int(np.argmin(off))
-    if off[at] > ALIKE:
+    if off[at] > alike:
         return none, none
     scale = ratio[at]
     near, there = _nearest(b.freq_hz, scale * a.freq_hz)
     back, _ = _nearest(scale * a.freq_hz, b.freq_hz)
-    good = (np.abs(there / (scale * a.freq_hz) - 1) < 2 * ALIKE) & (back[near] == np.arange(len(near)))
+    good = (np.abs(there / (scale * a.freq_hz) - 1) < 2 * alike) & (back[near] == np.arange(len(near)))
     return np.flatnonzero(good), near[good]
 
 
@@ -198,13 +196,14 @@ def come_from(pairs: ModePairs, freq_hz: Array) -> tuple[Array, Array, Array]:
 
 def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: Array) -> Array:
     """Compute A (k,) at source frequencies (k,), from a² (p,) of both sides of the pairs."""
+    skirt = 0.07
     edge = np.concatenate([[0.0], (pairs.source_hz[1:] + pairs.source_hz[:-1]) / 2])
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
     out = np.empty(len(freq_hz))
     _scale(
         np.asarray(freq_hz, float),
         pairs.source_hz,
-        SKIRT * width,
+        skirt * width,
         source_power + FAINT * float(source_power.max()) + TINY,
         target_power,
         out,

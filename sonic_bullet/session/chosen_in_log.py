@@ -17,8 +17,6 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.material_choice import MaterialChoice
 
-AS_RECORDED = "motion, masses and contact forces stay as the log recorded them"
-
 
 def with_choice(
     log: ContactLog, choice: MaterialChoice, where: str, say: Callable[[str], None] | None = None
@@ -41,6 +39,7 @@ def with_choice(
     MeshError, ModalError
         As `modal.analyse` does, naming the body.
     """
+    as_recorded = "motion, masses and contact forces stay as the log recorded them"
     if not choice:
         return log, ()
     choice.check_names([body.name for body in log.bodies], where)
@@ -56,7 +55,7 @@ def with_choice(
             bodies.append(replace(body, silent=silent))
     idle = choice.silent_notes(body for body in log.bodies if not body.silent)
     said = ", ".join(f"{name} is {of}" for name, of in changed.items())
-    return replace(log, bodies=tuple(bodies)), (*((f"{said}: {AS_RECORDED}",) if changed else ()), *idle)
+    return replace(log, bodies=tuple(bodies)), (*((f"{said}: {as_recorded}",) if changed else ()), *idle)
 
 
 def _made_of(

@@ -25,8 +25,6 @@ from sonic_bullet.session.variation import draw_factors, vary_body
 Range = tuple[float, float]
 OCTAVES_HZ = 62.5 * 2.0 ** np.arange(9)
 """Where a drawn response has its levels: octaves from 62.5 Hz to 16 kHz."""
-KNOT_S = 0.02
-"""Time between two values of the jitter, linear between them: buffers of that length arrive early or late."""
 MOST_JITTER = 3.0
 """Standard deviations of the jitter at most."""
 
@@ -181,6 +179,8 @@ def _delayed(late: Array, ahead: int, first: int, n: int, sr: int, chain: Record
 
     Where it is no whole number of samples, all is one sample later: the fourth must be known.
     """
+    # Time between two values of the jitter, linear between them: buffers of that length arrive early or late
+    knot_s = 0.02
     number = np.arange(first, first + n)
     if chain.jitter_s == 0:
         if float(chain.latency_s * sr).is_integer():
@@ -188,7 +188,7 @@ def _delayed(late: Array, ahead: int, first: int, n: int, sr: int, chain: Record
             return np.array(late[:, start : start + n])
         delay = np.full(n, chain.latency_s * sr)
     else:
-        knot = number / (sr * KNOT_S)
+        knot = number / (sr * knot_s)
         low = np.floor(knot).astype(np.int64)
         begin = int(knot[0]) if n else 0
         value = np.array([_knot(chain, k) for k in range(begin, int(low.max(initial=begin)) + 2)])

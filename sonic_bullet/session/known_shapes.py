@@ -31,12 +31,8 @@ from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 from sonic_bullet.session.arguments import as_material
 
-POISSON = 0.3
-"""About which families are solved: 0.2 to 0.4 holds every solid but rubber."""
 MARGIN = 1.02
 """Of to_hz: a mode above it at one of the family's Poisson's ratios may lie below it at another."""
-MOST_SHIFT = 0.03
-"""Of a damped mode's ka from one size to another, for which radiation is not evaluated anew: 0.5 dB of a dipole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,12 +77,14 @@ class KnownShape:
 
     def _put_radiation(self, model: ModalModel, mine: Array, material: Material, size: float, air: Air) -> None:
         """Scale the radiation of the largest size, unless damping moves the modes' ka between the sizes."""
+        # of a damped mode's ka from one size to another, for which radiation is not evaluated anew: 0.5 dB of a dipole
+        most_shift = 0.03
         large, of = model_of_size(self.family, material, self.largest, self.to_hz)
         ratio = size / self.largest
         at = np.full(max(self.family.count, 1), -1)
         at[of] = np.arange(len(of))
         at = at[mine]
-        if (at < 0).any() or (np.abs(model.freq_hz * ratio / large.freq_hz[at] - 1) > MOST_SHIFT).any():
+        if (at < 0).any() or (np.abs(model.freq_hz * ratio / large.freq_hz[at] - 1) > most_shift).any():
             return
         weight, damping, note = radiation_and_note(large, air, keep_surface=True)
         radiation_and_note.put(model, (weight[at] / np.sqrt(ratio), damping[at] / ratio, note), air, "default")
@@ -120,6 +118,7 @@ def known_shape(
     MeshError, ModalError, MaterialError
         As of `Listener.add`.
     """
+    poisson = 0.3  # About which families are solved: 0.2 to 0.4 holds every solid but rubber
     largest = as_number(largest, "largest", "give a size above 0", above=0, error=ModalError)
     made = [with_material(as_material(one)) for one in materials]
     for one in made:
@@ -129,6 +128,6 @@ def known_shape(
     gamma = min(one.youngs_pa / one.density_kg_m3 for one in made)
     shape = mesh if isinstance(mesh, Shape) else read_mesh(mesh)
     found = family(
-        shape, gamma_m2_s2=gamma, poisson=POISSON, to_hz=to_hz * largest * MARGIN, progress=progress or (lambda _: None)
+        shape, gamma_m2_s2=gamma, poisson=poisson, to_hz=to_hz * largest * MARGIN, progress=progress or (lambda _: None)
     )
     return KnownShape(found, largest, gamma, to_hz)

@@ -21,9 +21,6 @@ from sonic_bullet.session.material_choice import MaterialChoice, current_choice
 
 GROUND_M = 5.0
 """Length above which a static, flat body is ground: no board that is struck to sound is as long."""
-FLATTEST = 0.5
-"""Largest thickness of a flat body over its second side: pybullet_data's planes are 200 x 200 x 10 m."""
-HOW_IT_SOUNDS = "it sounds where the script attaches a listener and adds it with mesh="
 
 
 def add_links(
@@ -73,9 +70,10 @@ def named_links(world: World, choice: MaterialChoice) -> dict[tuple[int, int], M
 
 
 def _silent(listener: Listener, who: tuple[int, int], error: SonicBulletError) -> str:
+    how_it_sounds = "it sounds where the script attaches a listener and adds it with mesh="
     name = listener.world.name_of(*who)
     what = error.what.removeprefix(f"{name}: ")
-    return f"{name} is a silent partner: {what}; {HOW_IT_SOUNDS}"
+    return f"{name} is a silent partner: {what}; {how_it_sounds}"
 
 
 def _chosen_by_name(listener: Listener, who: tuple[int, int]) -> Material | None:
@@ -85,10 +83,11 @@ def _chosen_by_name(listener: Listener, who: tuple[int, int]) -> Material | None
 
 def is_ground(shapes: tuple[Shape, ...]) -> bool:
     """Tell whether a static body is ground: a plane, flat and longer than GROUND_M, or larger than any struck body."""
+    flattest = 0.5  # largest thickness of a flat body over its second side: pybullet_data's planes are 200 x 200 x 10 m
     if any(shape.kind == "plane" for shape in shapes):
         return True
     thin, middle, long = sorted(_sides_m(shapes))
-    return bool((long > GROUND_M and thin <= FLATTEST * middle) or long > LARGEST_M)
+    return bool((long > GROUND_M and thin <= flattest * middle) or long > LARGEST_M)
 
 
 def _long(shapes: tuple[Shape, ...]) -> str:

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from sonic_bullet.listener.world import World
     from sonic_bullet.session.wanted_bodies import WantedBody
 
-LISTED_NAMES = 40
-"""Most names in a line."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialChoice:
@@ -67,11 +64,12 @@ class MaterialChoice:
 
     def check_names(self, names: Collection[str], where: str) -> None:
         """Raise SceneError where a chosen name is of no link and no body; it lists the names there are."""
+        listed_names = 40  # most names in a line
         for one in (*self.named, *sorted(self.silent)):
             if not any(matched(name, (one,)) for name in names):
                 known = list(dict.fromkeys(names))
-                more = f" and {len(known) - LISTED_NAMES} more" if len(known) > LISTED_NAMES else ""
-                listed = ", ".join(known[:LISTED_NAMES]) + more
+                more = f" and {len(known) - listed_names} more" if len(known) > listed_names else ""
+                listed = ", ".join(known[:listed_names]) + more
                 remedy = f"its bodies are: {listed or 'none'}{self._quoted(one, known)}"
                 raise SceneError(f"no body of {where} is called {shown(one)}", remedy)
 

@@ -29,7 +29,6 @@ from sonic_bullet.session.material_choice import MaterialChoice
 from sonic_bullet.session.scene_file import scene_module, user_code, uses_sonic_bullet
 
 DEFAULT_SECONDS = 4.0
-DEFAULT_MATERIAL = "plastic"
 Progress = Callable[[float], None]
 
 
@@ -102,6 +101,7 @@ def run_built(stage: SceneStage, seconds: float | None, progress: Progress | Non
 
 def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
     """Run a script for so many seconds of physics time; notes a user should read."""
+    default_material = "plastic"
     total = seconds if seconds is not None else DEFAULT_SECONDS
     if uses_sonic_bullet(stage.path):
         names: dict[str, Any] = {}
@@ -122,7 +122,7 @@ def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | Non
             what = f"scene '{stage.path.name}' imports sonic_bullet but keeps no listener in a top-level name"
             raise SceneError(what, "write listener = sonic_bullet.attach(...)")
         return ()
-    material = stage.choice.everyone or as_material(DEFAULT_MATERIAL)
+    material = stage.choice.everyone or as_material(default_material)
     places = stage.microphones if stage.microphones is not None else (0.0, -1.0, 0.5)
     stage.microphones = None
     known: set[int] = set()

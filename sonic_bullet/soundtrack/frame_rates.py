@@ -9,7 +9,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LONGEST = 20
 USUAL_FPS = 30.0
 UNEVEN = 4e-4
 """Relative error allowed in the median distance of keys: less than half of what is between n and n·1000/1001."""
@@ -22,7 +21,8 @@ def fraction_of(text: str) -> Fraction:
 
     Powers of ten are refused, as ten digits of one would take all memory.
     """
-    if len(text) > LONGEST or "e" in text.lower():
+    longest = 20
+    if len(text) > longest or "e" in text.lower():
         raise ValueError(text)
     return Fraction(text)
 

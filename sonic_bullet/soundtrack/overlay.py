@@ -26,8 +26,6 @@ COLOURS = {
 }
 SHOWN_S = 0.25
 """How long an impact is shown: one of a millisecond would be in no picture."""
-LINES, SILENT_LINES = 7, 4
-QUIETEST_DB, PIXELS_A_DB = 40.0, 0.5
 
 
 def pixel(place_m: Array, camera: Camera, size: tuple[int, int]) -> tuple[float, float] | None:
@@ -81,17 +79,19 @@ def shown_at(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
 
 def _worded(events: Sequence[SoundEvent]) -> list[SoundEvent]:
     """Choose the events that are described in words: what lasts, the latest impacts, and then what is silent."""
+    lines, silent_lines = 7, 4
     sounds = sorted((x for x in events if not x.reason), key=lambda x: (x.kind == IMPACT, -x.start_s))
     silent = sorted((x for x in events if x.reason), key=lambda x: (x.kind == SUPPORT, -x.start_s))
-    return sounds[:LINES] + silent[:SILENT_LINES]
+    return sounds[:lines] + silent[:silent_lines]
 
 
 def _mark(draw: Any, event: SoundEvent, at: tuple[float, float], unit: float, time_s: float) -> None:
     """Draw a mark: a ring that opens for an impact, larger if louder; a dot for friction; cross or square if silent."""
+    quietest_db, pixels_a_db = 40.0, 0.5
     colour, (x, y) = COLOURS[event.kind], at
-    loud = max((event.level_db or QUIETEST_DB) - QUIETEST_DB, 4.0)
+    loud = max((event.level_db or quietest_db) - quietest_db, 4.0)
     if event.kind == IMPACT:
-        radius = unit * (3 + PIXELS_A_DB * loud * (0.4 + 0.6 * min((time_s - event.start_s) / SHOWN_S, 1.0)))
+        radius = unit * (3 + pixels_a_db * loud * (0.4 + 0.6 * min((time_s - event.start_s) / SHOWN_S, 1.0)))
         draw.ellipse((x - radius, y - radius, x + radius, y + radius), outline=colour, width=max(round(3 * unit), 1))
     elif event.kind in (ROLL, SLIDE):
         radius = unit * (3 + 0.15 * loud)

@@ -19,9 +19,6 @@ from sonic_bullet.render.synthesis_state import State
 from sonic_bullet.synth.pulse import SPECTRUM_CELLS_PER_F_TAU, cumulated, pulse_table, spectrum_table
 from sonic_bullet.synth.strikes import SPAN
 
-GROUP = 64
-"""Samples whose powers of the poles are computed once."""
-
 
 class _Voice(NamedTuple):
     """A body as a row of modes, its motion towards the microphone the last.
@@ -126,9 +123,10 @@ def _spectrum(f_tau: Array, flat: int) -> Array:
 
 def _free(pole: Array, amplitude: Array, frames: int) -> Array:
     """Compute Re Σ amplitude · poleⁿ (frames,)."""
+    group = 64  # Samples whose powers of the poles are computed once
     if frames <= 0 or not len(pole):
         return np.zeros(max(frames, 0))
-    near, far = np.arange(GROUP), np.arange(-(-frames // GROUP))
+    near, far = np.arange(group), np.arange(-(-frames // group))
     with np.errstate(under="ignore"):
-        steps: Any = (amplitude[:, None] * (pole[:, None] ** GROUP) ** far).T @ pole[:, None] ** near
+        steps: Any = (amplitude[:, None] * (pole[:, None] ** group) ** far).T @ pole[:, None] ** near
     return np.asarray(steps.real.ravel()[:frames])

@@ -34,7 +34,6 @@ COLOURS = {
     "plastic": (0.85, 0.40, 0.35),
     "rubber": (0.25, 0.25, 0.27),
 }
-OTHER_COLOUR = (0.75, 0.72, 0.66)
 HOW_IT_IS_DRAWN = "film the scene, or, of an animation that was scored, give it a material in the table of score"
 WIDE_M = 20.0
 """A figure wider than this is ground, which need not be in view."""
@@ -114,10 +113,11 @@ def _stack(rows: Sequence[Array], size: int) -> Array:
 
 def _figure(body: Body) -> Figure | None:
     """Make a figure of a body's model; None where it has no surface."""
+    other_colour = (0.75, 0.72, 0.66)
     if body.model is None or not len(body.model.face):
         return None
     name = body.material.name.lower() if body.material is not None else ""
-    colour = next((rgb for word, rgb in COLOURS.items() if word in name), OTHER_COLOUR)
+    colour = next((rgb for word, rgb in COLOURS.items() if word in name), other_colour)
     return Figure(body.model.vertex_m, body.model.face, colour)
 
 

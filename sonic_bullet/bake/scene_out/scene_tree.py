@@ -28,8 +28,6 @@ from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
 from sonic_bullet.session.gltf_in.own_words import EXTRAS
 from sonic_bullet.session.gltf_in.physics import PHYSICS, SHAPES
 
-STANDARD_M_S2 = 9.81
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodySound:
@@ -120,10 +118,11 @@ class _Document:
         return made, (self.audio.add_mesh(body.name, vertex, face), vertex, face)
 
     def _motion(self, body: RigidBody) -> dict[str, Any]:
+        standard_m_s2 = 9.81
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_quat(np.array(body.quaternion_xyzw)).as_matrix()
-        factor = -float(self.scene.gravity_m_s2[2]) / STANDARD_M_S2 * body.gravity_factor
+        factor = -float(self.scene.gravity_m_s2[2]) / standard_m_s2 * body.gravity_factor
         found: dict[str, Any] = {"mass": body.mass_kg}
         if (body.inertia_kg_m2 > 0).all():
             found["inertiaDiagonal"] = body.inertia_kg_m2.tolist()

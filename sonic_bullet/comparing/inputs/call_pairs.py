@@ -21,8 +21,6 @@ from sonic_bullet.listener.calls import ABSENT, Call, Who, leaves, mapped, same
 One = TypeVar("One")
 GAP = 0.6
 """Cost of a body without a partner; two that share nothing cost 1, less than two without partners."""
-MOST_CELLS = 4_000_000
-"""Most pairs of calls that are aligned; beyond, calls that differ are paired by position alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +77,10 @@ def aligned(
 def _middle(
     a: Sequence[One], b: Sequence[One], unlike: Callable[[One, One], float], gap: Callable[[One], float]
 ) -> list[tuple[One | None, One | None]]:
+    # most pairs of calls that are aligned; beyond, calls that differ are paired by position alone
+    most_cells = 4_000_000
     n, m = len(a), len(b)
-    if n * m > MOST_CELLS:
+    if n * m > most_cells:
         half = min(n, m)
         return [*zip(a[:half], b[:half], strict=True), *((x, None) for x in a[half:]), *((None, y) for y in b[half:])]
     cost = np.zeros((n + 1, m + 1))

@@ -24,8 +24,6 @@ from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 
-MOST_SHARED = 4
-"""Most causes whose shares are determined: 2^4 runs."""
 WINDOW, FLOOR_DB = 1024, -100.0
 """Log spectra: samples of a frame, and floor re the loudest value of A."""
 
@@ -88,8 +86,9 @@ def shapley_shares(
     found: Sequence[int], a: KeptSound, b: KeptSound, put_back: Callable[[Sequence[int]], KeptSound]
 ) -> dict[int, float]:
     """Compute the share of each cause; none for too many causes, or sounds of different lengths."""
+    most_shared = 4  # most causes whose shares are determined: 2^4 runs
     n = len(found)
-    if not 1 < n <= MOST_SHARED or a.shape != b.shape:
+    if not 1 < n <= most_shared or a.shape != b.shape:
         return {}
     reference = a.samples()
     whole = log_distance(reference, b.samples())

@@ -56,10 +56,6 @@ ONE_QUANTITY = {
     "beta_s": "damping",
 }
 """Quantity of an argument; several arguments may mean one."""
-BY_ARGUMENT = ("changeDynamics", "setPhysicsEngineParameter", "changeConstraint")
-"""Functions whose arguments can be substituted one by one; others are called whole or not at all."""
-DRIVES = ("apply", "setJointMotor")
-"""Functions that act anew each step: all their calls are one input; others set a lasting value."""
 
 
 @dataclass(slots=True, eq=False)
@@ -92,6 +88,8 @@ class Asked:
 
 def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
     """Pair the calls of both runs; return the pairs and the inputs that differ, in the order of calls."""
+    # Functions whose arguments can be substituted one by one; others are called whole or not at all
+    by_argument = ("changeDynamics", "setPhysicsEngineParameter", "changeConstraint")
     pairs, match = side_by_side(a.calls, b.calls)
     lone = {one for call in a.calls for one in call.made} - set(match)
     lone |= {one for call in b.calls for one in call.made} - set(match.values())
@@ -106,7 +104,7 @@ def asked_differences(a: Side, b: Side) -> tuple[list[CallPair], list[Asked]]:
             if value is not None:
                 one.a, one.b = (value, None) if pair.a is not None else (None, value)
             continue
-        if (pair.a is None or pair.b is None) and name_of(pair) not in BY_ARGUMENT:
+        if (pair.a is None or pair.b is None) and name_of(pair) not in by_argument:
             _note_whole(found, pair, number)
             continue
         for path, (old, new) in differing(pair.a, pair.b).items():
@@ -187,9 +185,11 @@ def _note_whole(found: dict[Any, Asked], pair: CallPair, number: int) -> None:
 
 
 def _entry(found: dict[Any, Asked], call: Call, what: str) -> Asked:
+    # Functions that act anew each step: all their calls are one input; others set a lasting value
+    drives = ("apply", "setJointMotor")
     who, link, later = call.who or next(iter(call.made), None), _link(call), call.step > 0
     return found.setdefault(
-        (who, link, what, later and not call.name.startswith(DRIVES)), Asked(who, link, what, later=later)
+        (who, link, what, later and not call.name.startswith(drives)), Asked(who, link, what, later=later)
     )
 
 

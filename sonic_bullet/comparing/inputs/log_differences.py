@@ -19,10 +19,6 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
 from sonic_bullet.records import Array, Body
 
-OF_RUN = ("bodies", "steps", "events", "changes", "untouched", "versions", "engine")
-"""Fields of a log that are not settings of its sound."""
-OF_MODES = ("density_kg_m3", "stiffness_pa", "alpha_per_s", "beta_s", "effects", "includes_radiation", "name")
-"""Fields of a material on which modes depend."""
 ONE_BODY = {
     ("mass_kg",): "mass",
     ("dynamics", "mass"): "mass",
@@ -32,7 +28,6 @@ ONE_BODY = {
 }
 SHAPE_SHARE = 2e-3
 """Relative tolerance of a volume: two meshes of one shape differ by less at this project's element sizes."""
-AS_POSES_TELL = "as first poses tell: a force or a joint, which a log does not hold, would look the same"
 
 Exchange = Callable[[ContactLog, ContactLog], ContactLog]
 
@@ -60,6 +55,8 @@ class Logged:
 
 def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Logged]:
     """List the inputs that differ: of the engine, each body, sensors, rendering, versions."""
+    # Fields of a log that are not settings of its sound
+    of_run = ("bodies", "steps", "events", "changes", "untouched", "versions", "engine")
     found = [*_engine(a, b)]
     for i, j in pairs:
         if i is None or j is None:
@@ -68,7 +65,7 @@ def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | Non
             found += _body(a, b, i, j)
     found += _changes(a, b, pairs)
     for one in fields(a):
-        if one.name not in OF_RUN:
+        if one.name not in of_run:
             old, new = dict(leaves(getattr(a, one.name), (one.name,))), dict(leaves(getattr(b, one.name), (one.name,)))
             for path in {**old, **new}:
                 if not same(old.get(path), new.get(path)):
@@ -108,6 +105,8 @@ def _lone(a: ContactLog, b: ContactLog, i: int | None, j: int | None) -> list[Lo
 
 
 def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
+    # Fields of a material on which modes depend
+    of_modes = ("density_kg_m3", "stiffness_pa", "alpha_per_s", "beta_s", "effects", "includes_radiation", "name")
     one, other = a.bodies[i], b.bodies[j]
     old, new = body_leaves(one), body_leaves(other)
     changed = [path for path in {**old, **new} if not same(old.get(path), new.get(path))]
@@ -124,7 +123,7 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
             what, value = "sounding", (one.material and one.material.name, other.material and other.material.name)
         if what not in found:
             exchange = _of_modes(i, j) if path[0] in ("material", "options") and modes_differ else _leaf(path, i, j)
-            if path[0] == "material" and path[-1] not in OF_MODES and what not in ("material", "sounding"):
+            if path[0] == "material" and path[-1] not in of_modes and what not in ("material", "sounding"):
                 exchange = _leaf(path, i, j)
             found[what] = Logged(one.name, what, *value, exchange, acts)
     if modes_differ and not any(path[0] in ("material", "options") and path[-1] != "source" for path in changed):
@@ -179,6 +178,7 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> lis
 
     explained: another difference explains a different motion.
     """
+    as_poses_tell = "as first poses tell: a force or a joint, which a log does not hold, would look the same"
     one, name = a.bodies[i], a.bodies[i].name
     first = [_pose(log, index, 0) for log, index in ((a, i), (b, j))]
     if first[0] is None or first[1] is None:
@@ -198,9 +198,9 @@ def _start(a: ContactLog, b: ContactLog, i: int, j: int, explained: bool) -> lis
             speed = [(s[0] - f[0]) / a.steps[0].dt_s for s, f in zip(second, first, strict=True) if s and f]
             if not np.allclose(speed[0], speed[1], rtol=1e-9, atol=1e-9):
                 old, new = (tuple(np.round(x, 6).tolist()) for x in speed)
-                found.append(Logged(name, "start velocity", old, new, note=AS_POSES_TELL))
+                found.append(Logged(name, "start velocity", old, new, note=as_poses_tell))
             elif not same(second[0][1], second[1][1]):
-                found.append(Logged(name, "start spin", "of A", "of B", note=AS_POSES_TELL))
+                found.append(Logged(name, "start spin", "of A", "of B", note=as_poses_tell))
     return found
 
 

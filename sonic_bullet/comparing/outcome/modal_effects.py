@@ -13,9 +13,6 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import ModalModel
 from sonic_bullet.records.counts import format_count
 
-ASSURED = 32
-"""Number of modes whose shapes are compared."""
-
 
 def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> list[Consequence]:
     """Return one effect for each body whose modes differ."""
@@ -29,6 +26,7 @@ def modal_effects(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, in
 
 
 def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
+    assured = 32  # number of modes whose shapes are compared
     n = min(a.mode_count, b.mode_count)
     cents = 1200 * np.log2(b.freq_hz[:n] / a.freq_hz[:n])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -42,7 +40,7 @@ def _changed(name: str, a: ModalModel, b: ModalModel) -> Consequence:
     if a.mode_count != b.mode_count:
         words.append(f"{a.mode_count} → {format_count(b.mode_count, 'mode')}")
     if np.array_equal(a.vertex_m, b.vertex_m):
-        k = min(n, ASSURED)
+        k = min(n, assured)
         x, y = (model.shape[:, :, :k].reshape(-1, k).astype(float) for model in (a, b))
         mac = (x * y).sum(axis=0) ** 2 / ((x * x).sum(axis=0) * (y * y).sum(axis=0))
         values["mac_least"] = round(float(mac.min()), 4)

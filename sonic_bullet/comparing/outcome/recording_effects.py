@@ -20,22 +20,13 @@ from sonic_bullet.comparing.outcome.sound_effects import level_words
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-GROUP_DELAY = 16
-"""Largest group delay of a filter in samples."""
-FILTER_DB = 0.1
-"""A flatter response is a gain."""
-LEFT_DB = -90.0
-"""A residual below this, re the recording, is rounding of 16 bits."""
-CLIPPED_RUN = 4
-"""Samples in a row at one extreme value: a sine at 1 kHz has two at 48 kHz."""
 CHANCE, COMMON_SHARE = 0.01, 0.25
 """α; and the fraction of B's power that A explains beyond chance in any case: a tone correlates with any other."""
-OFFSET_ERRORS = 4
-"""Standard errors of a mean that noise exceeds in 6 of 100 000 cases."""
 
 
 def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     """Find the changes between two recordings (channels, n) at one rate."""
+    group_delay = 16  # largest group delay of a filter in samples
     if a.shape[0] != b.shape[0] or not a.size or not b.size:
         return []
     if not a.any() or not b.any():
@@ -49,7 +40,7 @@ def recording_effects(a: Array, b: Array, sr: int) -> list[Consequence]:
     if share < min(chance, COMMON_SHARE):
         words = f"nothing in common: A explains {share:.1e} of B's power, no more than chance does ({chance:.1e})"
         return [Consequence("unrelated", words, None, {"share": share, "chance": chance})]
-    if 0 < abs(delay) <= GROUP_DELAY and not _only_delayed(a, b, delay):
+    if 0 < abs(delay) <= group_delay and not _only_delayed(a, b, delay):
         delay = 0
     found += _offset(a * sign, b)
     if delay:
@@ -87,9 +78,10 @@ def _order(a: Array, b: Array) -> tuple[int, ...]:
 
 
 def _offset(a: Array, b: Array) -> list[Consequence]:
+    offset_errors = 4  # Standard errors of a mean that noise exceeds in 6 of 100 000 cases
     change = float(b.mean() - a.mean())
     rms = float(np.sqrt(np.square(b).mean()))
-    if abs(change) < max(0.01, OFFSET_ERRORS / b.size**0.5) * rms:
+    if abs(change) < max(0.01, offset_errors / b.size**0.5) * rms:
         return []
     return [Consequence("offset", f"a constant of {change:.3g} is added", None, {"offset": change})]
 
@@ -140,13 +132,14 @@ def _clipping(a: Array, b: Array) -> list[Consequence]:
 
 def _flat_tops(x: Array) -> tuple[int, float]:
     """Count the samples at an extreme value in runs, and return that value."""
+    clipped_run = 4  # Samples in a row at one extreme value: a sine at 1 kHz has two at 48 kHz
     top = float(np.abs(x).max())
     at = np.abs(x) >= top * (1 - 1e-6)
     count = 0
     for channel in at:
         edges = np.flatnonzero(np.diff(np.concatenate([[0], channel.astype(np.int8), [0]])))
         runs = edges[1::2] - edges[::2]
-        count += int(runs[runs >= CLIPPED_RUN].sum())
+        count += int(runs[runs >= clipped_run].sum())
     return count, top
 
 
@@ -165,16 +158,18 @@ def _gaps(x: Array, y: Array, sr: int) -> list[Consequence]:
 
 def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
     """Find a gain or filter, and the residual of both."""
+    filter_db = 0.1  # A flatter response is a gain
+    left_db = -90.0  # A residual below this, re the recording, is rounding of 16 bits
     gain_db = 0.005
     gain = float((x * y).sum() / np.square(x).sum())
     left = y - gain * x
     level = _db(left, y)
     found: list[Consequence] = []
     response = None
-    if level > LEFT_DB and clean:
+    if level > left_db and clean:
         freq, response, explained = _response(x, y, sr)
         bend = np.ptp(response) if len(response) else 0.0
-        if bend > FILTER_DB and explained > 0.9:
+        if bend > filter_db and explained > 0.9:
             k, m = int(np.argmin(response)), int(np.argmax(response))
             words = (
                 f"a filter: {response[k]:+.2g} dB at {freq[k]:.0f} Hz, {response[m]:+.2g} dB at {freq[m]:.0f} Hz "
@@ -185,9 +180,9 @@ def _transfer(x: Array, y: Array, sr: int, clean: bool) -> list[Consequence]:
     if abs(20 * np.log10(max(abs(gain), 1e-12))) > gain_db and level < -20:
         words = f"B is A, {level_words(float(20 * np.log10(abs(gain))), digits=3)}"
         found.append(Consequence("gain", words, None, {"gain_db": float(20 * np.log10(abs(gain)))}))
-    if level > LEFT_DB and clean:
+    if level > left_db and clean:
         found.append(_left(left, level, sr))
-    elif level > LEFT_DB - 60 and not found and clean:
+    elif level > left_db - 60 and not found and clean:
         words = f"samples differ by rounding: the difference is {abs(level):.0f} dB below A"
         found.append(Consequence("rounding", words, None, {"left_db": level}))
     return found

@@ -20,8 +20,6 @@ QUIET_DB = -80.0
 """Level re the loudest band below which bands are not compared."""
 FRAME_S, RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
 """Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one."""
-FLOOR_DB = -50.0
-"""Lowest level of an onset re the loudest moment."""
 
 
 def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Array, int]:
@@ -98,6 +96,7 @@ def level_words(change_db: float, unit: str = "dB", digits: int = 2) -> str:
 
 def onsets_s(x: Array, sr: int) -> list[float]:
     """Return the times of onsets, in s."""
+    floor_db = -50.0  # Lowest level of an onset re the loudest moment
     hop = max(1, round(FRAME_S * sr / 2))
     square = np.square(x).sum(axis=0)
     count = len(square) // hop
@@ -110,7 +109,7 @@ def onsets_s(x: Array, sr: int) -> list[float]:
     last = -back
     for i in range(count):
         before = level[max(0, i - back) : i].max(initial=-3000.0)
-        if level[i] > level.max() + FLOOR_DB and level[i] > before + RISE_DB and i - last >= back:
+        if level[i] > level.max() + floor_db and level[i] > before + RISE_DB and i - last >= back:
             found.append(i * hop / sr)
             last = i
     return found

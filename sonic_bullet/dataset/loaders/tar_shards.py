@@ -12,12 +12,10 @@ from typing import Any
 from sonic_bullet.dataset.sample_folder import LabelledSounds
 from sonic_bullet.machine.json_text import json_bytes
 
-A_SHARD = 1000
-"""Samples: at 1.5 s of two channels 0.6 GB, of the size that webdataset's pages advise."""
-
 
 def write_tar_shards(samples: LabelledSounds, to: Path) -> None:
     """Write all samples."""
+    a_shard = 1000  # Samples: at 1.5 s of two channels 0.6 GB, of the size that webdataset's pages advise
     from webdataset import ShardWriter
 
     with ExitStack() as stack:
@@ -27,7 +25,7 @@ def write_tar_shards(samples: LabelledSounds, to: Path) -> None:
             if split not in writers:
                 pattern = str(to / split).replace("%", "%%") + "-%06d.tar"
                 # mtime: else it is the time of writing; encoder: the values are bytes already
-                writer = ShardWriter(pattern, maxcount=A_SHARD, encoder=False, mtime=0, verbose=0)
+                writer = ShardWriter(pattern, maxcount=a_shard, encoder=False, mtime=0, verbose=0)
                 writers[split] = stack.enter_context(writer)
             rest = {key: value for key, value in labels.items() if key != "audio"}
             writers[split].write({"__key__": sound.stem, "json": json_bytes(rest), "wav": sound.read_bytes()})

@@ -23,7 +23,6 @@ from sonic_bullet.records import Array
 
 STRONG = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of the strong lines that are to be modes
-UNKNOWNS = 2
 DRAWS = 8
 MOVED = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
 CLUSTER = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
@@ -38,8 +37,9 @@ def strong_lines(lines: Lines) -> Array:
 
 def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], place: Placing) -> bool:
     """Whether lines moved at random find as many modes as those recorded. place: how a search pairs objects' lines."""
+    unknowns = 2
     found, strong = _strong_paired(shaped, pairs), sum(int(strong_lines(e.lines).sum()) for e in shaped)
-    if found >= PAIRED * strong or strong <= UNKNOWNS:
+    if found >= PAIRED * strong or strong <= unknowns:
         return False
     random = np.random.default_rng(0)
     for _ in range(DRAWS):

@@ -21,11 +21,6 @@ from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-DAMPING_MISFIT = 0.03  # relative scatter of decays about the law beyond their spreads
-AMPLITUDE_MISFIT = 0.25
-GAMMA_MOVES = 0.01  # by elements: what is worth a warning
-FREQUENCY_MISFIT = 0.01
-
 
 def finished(
     case: Case,
@@ -107,7 +102,8 @@ def finished(
 
 def _mesh_warning(family: Family) -> list[str]:
     """Warn where elements may bend γ by over 1 %, or where that is not known; none without elements."""
-    if not family.meshed or 2 * family.error <= GAMMA_MOVES:
+    gamma_moves = 0.01  # by elements: what is worth a warning
+    if not family.meshed or 2 * family.error <= gamma_moves:
         return []
     if np.isnan(family.error):
         return ["the mesh's error is not known: no coarser mesh could be made"]
@@ -161,6 +157,9 @@ def _amiss(
     share: float,
     by_chance: bool,
 ) -> list[str]:
+    damping_misfit = 0.03  # relative scatter of decays about the law beyond their spreads
+    amplitude_misfit = 0.25
+    frequency_misfit = 0.01
     amiss = []
     if objects and len(foreign):
         shown = ", ".join(f"{f:.0f}" for f in foreign[:6]) + (" …" if len(foreign) > 6 else "")
@@ -171,11 +170,11 @@ def _amiss(
         )
     elif np.isfinite(share) and share < PAIRED:
         amiss.append(f"only {share:.0%} of the strong lines are modes of this mesh")
-    if np.isfinite(scatter) and scatter > FREQUENCY_MISFIT:
+    if np.isfinite(scatter) and scatter > frequency_misfit:
         amiss.append(f"frequencies scatter by {scatter:.1%} about an isotropic body's")
-    if np.isfinite(damping.scatter) and damping.scatter > DAMPING_MISFIT:
+    if np.isfinite(damping.scatter) and damping.scatter > damping_misfit:
         amiss.append(f"decays scatter by {damping.scatter:.0%} about Rayleigh's law")
-    if np.isfinite(amplitude) and amplitude > AMPLITUDE_MISFIT:
+    if np.isfinite(amplitude) and amplitude > amplitude_misfit:
         amiss.append(f"amplitudes scatter by {amplitude:.0%} about the model's")
     return amiss
 

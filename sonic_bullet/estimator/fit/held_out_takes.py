@@ -36,14 +36,13 @@ from sonic_bullet.residual.offline import residual_sound
 if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.case_fit import CaseFit
 
-WORSE_THAN_SILENCE = "worse-than-silence"
-
 
 def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
     """Return the fit with its distances from the takes held out, and with the verdict of one worse than silence.
 
     Where none is held out they are those of its own takes. Raises SonicBulletError.
     """
+    worse_than_silence = "worse-than-silence"
     takes = predicted_takes(found, progress=progress)
     judged = replace(found, takes=takes)
     if not judged.worse_than_silence:
@@ -52,7 +51,7 @@ def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = Non
     silent = float(np.nanmean([t.silence_db for t in takes]))
     lost = all(t.gain == 0 for t in takes)
     why = f"what is fitted is {predicted:.1f} dB from the takes, silence {silent:.1f} dB"
-    verdict = f"{WORSE_THAN_SILENCE}: {NO_GAIN if lost else why}; {found.fit.verdict}"
+    verdict = f"{worse_than_silence}: {NO_GAIN if lost else why}; {found.fit.verdict}"
     return replace(judged, fit=replace(found.fit, verdict=verdict))
 
 

@@ -18,9 +18,6 @@ from sonic_bullet.files.uff.writer import Mobility, ModalShapes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-STEP_HZ = 1.0
-ALONG = 1e-3  # of a direction: how far off an axis it still is one
-
 
 def modal_shapes(found: CaseFit) -> ModalShapes:
     """Return the modes of a fit's first object at points: on its surface where E/ρ is known, else at its strikes.
@@ -72,6 +69,7 @@ def mobilities(found: CaseFit, shapes: ModalShapes) -> tuple[Mobility, ...]:
 
     None where a place, an impulse or the gain is not known, or a direction lies along no axis.
     """
+    step_hz = 1.0
     if not found.objects or not found.plays_modes(found.objects[0].evidence) or found.case.sensor != "velocity":
         return ()
     o = found.objects[0]
@@ -81,9 +79,9 @@ def mobilities(found: CaseFit, shapes: ModalShapes) -> tuple[Mobility, ...]:
         return ()
     first = len(shapes.point_m) + 1
     sensor = Freedom(first, axis, place)
-    at_hz = STEP_HZ * np.arange(int(found.case.band_hz[1] / BAND / STEP_HZ) + 2)
+    at_hz = step_hz * np.arange(int(found.case.band_hz[1] / BAND / step_hz) + 2)
     return tuple(
-        Mobility(_mobility(found, o, s, r, at_hz), STEP_HZ, Freedom(first + 1 + s, struck, r.position_m), sensor)
+        Mobility(_mobility(found, o, s, r, at_hz), step_hz, Freedom(first + 1 + s, struck, r.position_m), sensor)
         for s, r in enumerate(o.evidence.recordings)
         if r.position_m is not None
         and r.impulse_n_s is not None
@@ -106,6 +104,7 @@ def _mobility(found: CaseFit, o: ObjectFit, s: int, recording: CaseRecording, at
 
 def _axis(direction: Point) -> int | None:
     """±1, ±2 or ±3 of a direction along an axis, else None."""
+    along = 1e-3  # of a direction: how far off an axis it still is one
     unit = np.array(direction) / np.linalg.norm(direction)
     k = int(np.argmax(np.abs(unit)))
-    return (k + 1) * int(np.sign(unit[k])) if abs(abs(unit[k]) - 1) < ALONG else None
+    return (k + 1) * int(np.sign(unit[k])) if abs(abs(unit[k]) - 1) < along else None

@@ -26,12 +26,8 @@ from sonic_bullet.records import Array
 DEGENERATE = 6e-4
 MESHED = 2.5  # times as far apart where elements have split them
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
-LOWEST = 0.2  # of that, in the lowest modes
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
-POISSON_REACH = 0.05
-CANDIDATES = 8
 MISSED = 0.3
-NEVER = 0.02
 HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
 # times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first
 # milliseconds are made of such lines, bodies' modes seldom
@@ -121,6 +117,7 @@ def _rings(lines: Lines) -> Array:
     Lines at the fastest decay there is come in heaps that cancel one another, so their strengths say nothing; no more
     do those of other heaps.
     """
+    never = 0.02
     decay, energy = np.nan_to_num(lines.decay_per_s), np.nan_to_num(lines.energy)
     piled = heaped(lines)
     energy = np.where((decay > PINNED * FASTEST_PER_S) | piled, 0.0, energy)
@@ -131,8 +128,8 @@ def _rings(lines: Lines) -> Array:
     middle = order[np.searchsorted(share, share[-1] / 2)]
     # what loses as much a cycle ends sooner
     typical = max(float(decay[middle]), 1.0) * np.maximum(lines.freq_hz / lines.freq_hz[middle], 1.0)
-    rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), NEVER, 1.0)
-    return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, NEVER), rings)))
+    rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), never, 1.0)
+    return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, never), rings)))
 
 
 def heaped(lines: Lines) -> Array:
@@ -163,11 +160,13 @@ def best_pairs(
     reach: float,
 ) -> list[tuple[float, float]]:
     """Return the best few (ln γ, ν) of the grid, best first."""
+    poisson_reach = 0.05
+    candidates = 8
     width = 0.006
     grid = log_gamma + np.arange(-reach, reach + 1e-9, 0.004)
     observed, rings = np.log(lines.freq_hz), _rings(lines)
     found: list[tuple[float, float, float]] = []
-    for nu in np.clip(poisson + np.linspace(-POISSON_REACH, POISSON_REACH, 9), -0.4, 0.48):
+    for nu in np.clip(poisson + np.linspace(-poisson_reach, poisson_reach, 9), -0.4, 0.48):
         group = grouped(family, seen, 0.0, float(nu))
         size, strength, alike = _patterns(lines, seen, group.pattern)
         root, force = np.sqrt(size) * rings, np.sqrt(strength)
@@ -191,7 +190,7 @@ def best_pairs(
     for _, g, nu in found:
         if all(abs(g - h) > 0.006 or abs(nu - mu) > 0.02 for h, mu in chosen):
             chosen.append((g, nu))
-        if len(chosen) == CANDIDATES:
+        if len(chosen) == candidates:
             break
     return chosen
 
@@ -248,10 +247,11 @@ def solve(
 
     poisson_sd: of the guess.
     """
+    lowest = 0.2  # of that, in the lowest modes
     freq, decay = lines.freq_hz[line], lines.decay_per_s[line]
     off = np.log((2 * np.pi * freq) ** 2 + np.nan_to_num(decay) ** 2) - 2 * np.log(2 * np.pi * group.freq_hz[mode])
     # a mesh's error grows with the modes: the low ones tell γ and ν best
-    rough = np.hypot(LOWEST, freq / freq.max(initial=1e-9))
+    rough = np.hypot(lowest, freq / freq.max(initial=1e-9))
     sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd * rough)
     slope = np.stack([np.ones(len(line)), group.slope[mode]], axis=1)
     weight = np.ones(len(line))

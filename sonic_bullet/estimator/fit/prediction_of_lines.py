@@ -17,16 +17,15 @@ if TYPE_CHECKING:
     from sonic_bullet.estimator.lines.joint_lines import Lines
     from sonic_bullet.files.cases import CaseRecording
 
-MOST_NEPERS = 40.0
-
 
 def damped_sum(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
     """Re Σ A e^{(−d + iω)t} (n,) of modes (m,), A complex at t = 0."""
+    most_nepers = 40.0
     sound = np.zeros(n)
     for f, d, a in zip(freq_hz, decay_per_s, amplitude, strict=True):
         if a == 0:
             continue
-        length = n if d <= 0 else min(n, int(MOST_NEPERS / d * sr) + 1)
+        length = n if d <= 0 else min(n, int(most_nepers / d * sr) + 1)
         sound[:length] += np.real(a * np.exp((-d + 2j * np.pi * f) / sr * np.arange(length)))
     return sound
 

@@ -23,7 +23,6 @@ from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel
 
 KNOWN = 0.02  # relative: what radiation theory and mesh leave open of a mode's Δd
-BEYOND = 1.03  # of a band's end: modes that a line within it may be paired with
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,13 +56,14 @@ def in_air(e: RecordedObject, log_gamma: float, poisson: float, to_hz: float, ap
 
     None where neither its sensor nor the fit asks for the air. apart: radiation is no part of the material's damping.
     """
+    beyond = 1.03  # of a band's end: modes that a line within it may be paired with
     assert e.family is not None and e.seen is not None
     if not apart and e.seen.kind != "pressure":
         return None
     group = grouped(e.family, e.seen, log_gamma, poisson)
     value, vector = e.family.modes(float(np.exp(log_gamma)), poisson)
     freq = np.sqrt(value) / (2 * np.pi)
-    m = int((freq < BEYOND * to_hz).sum())
+    m = int((freq < beyond * to_hz).sum())
     weight, extra = np.full(len(freq), np.nan), np.full(len(freq), np.nan)
     weight[:m], extra[:m] = into_air(e.family, e.guess.density_kg_m3, freq[:m], vector[:, :m])
     observed = np.nan_to_num((e.seen.transfer(vector) ** 2).sum(axis=0))

@@ -17,12 +17,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LEAST_MANY = 8  # lines of which a majority can be identified
-HALF = 0.4549  # median of χ² with one degree of freedom
-NEARER = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
-MET = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
-STANDARD_ERRORS = 0.5  # a parameter whose logarithm is surer than this is identified by the lines
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RayleighFit:
@@ -53,6 +47,7 @@ def rayleigh(
     that, or what is hardly there would be sure. What is left may then be below zero: leaving that out would bend the
     law upwards.
     """
+    standard_errors = 0.5  # a parameter whose logarithm is surer than this is identified by the lines
     good = (
         np.isfinite(decay_per_s)
         & ((decay_per_s if whole_per_s is None else whole_per_s) > 0)
@@ -74,7 +69,7 @@ def rayleigh(
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.linalg.inv(information) / np.outer(value, value)
         for i, name in enumerate(("alpha", "beta")):
-            if not (value[i] > 0 and 0 <= covariance[i, i] < STANDARD_ERRORS**2):
+            if not (value[i] > 0 and 0 <= covariance[i, i] < standard_errors**2):
                 said.append(name)
                 covariance[i, :] = covariance[:, i] = np.nan
     return RayleighFit(float(value[0]), float(value[1]), covariance, scatter, tuple(said))
@@ -82,6 +77,7 @@ def rayleigh(
 
 def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Array, Array, float]:
     """Values, information, τ, which is relative to size (k,)."""
+    least_many = 8  # lines of which a majority can be identified
     freedom = max(len(lam) - 2, 1)
 
     def at(tau: float) -> tuple[Array, Array, float]:
@@ -96,7 +92,7 @@ def _scattered(lam: Array, decay: Array, spread: Array, size: Array) -> tuple[Ar
         middle = (low + high) / 2
         best = at(middle)
         low, high = (middle, high) if best[2] > 0 else (low, middle)
-    if len(lam) < LEAST_MANY:
+    if len(lam) < least_many:
         return best[0], best[1], high
     return *_by_most(lam, decay, spread, size, freedom), high
 
@@ -106,11 +102,13 @@ def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int)
 
     Where a law through two of them leaves far less of that, those it leads to.
     """
+    nearer = 0.5  # of what most lines are off by: a law through two of them that leaves less is where to start from
+    met = 0.01  # relative: a law that lines obey is met by most of them so well, or they obey another
     best = _descended(lam, decay, spread, size, freedom, 1.0, np.ones(len(lam)))
     law, off = _through_two(lam, decay, size)
-    if off > MET or off > NEARER * _middle_off(best[0], lam, decay, size):
+    if off > met or off > nearer * _middle_off(best[0], lam, decay, size):
         return best
-    tau = MET
+    tau = met
     residual = (decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, tau * size)
     return _descended(lam, decay, spread, size, freedom, tau, 1 / (1 + (residual / 3.0) ** 2))
 
@@ -144,11 +142,12 @@ def _descended(
 
     From a relative scatter τ and weights (k,) on downwards.
     """
+    half = 0.4549  # median of χ² with one degree of freedom
     value, information, _, weight, _ = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
     while tau > 1e-5:
         tau *= 0.8
         trial = _weighted(lam, decay, np.hypot(spread, tau * size), weight)
-        if np.median(trial[4]) > HALF * freedom / len(lam):
+        if np.median(trial[4]) > half * freedom / len(lam):
             break
         value, information, _, weight, _ = trial
     return value, information

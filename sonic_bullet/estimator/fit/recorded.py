@@ -31,11 +31,6 @@ from sonic_bullet.records import Array, Material
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
 
-MARGIN = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
-MESH_M = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
-SHORTER = 0.5  # of the usual length: that much shorter is worth a word
-SHUT_S, SHUT = 0.01, 1e-3  # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedObject:
@@ -171,9 +166,11 @@ def _modes_observed(body: Family, guess: Material, band_hz: tuple[float, float])
 
 def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, say: Callable[[str], None]) -> Family:
     """Return the family of a case's object. Raises FileError, MeshError."""
+    margin = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
+    mesh_m = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
     shape = read_mesh(thing.mesh or "", thing.scale)
     across = float(np.linalg.norm(np.ptp(shape.vertex_m, axis=0)))
-    if not MESH_M[0] < across < MESH_M[1]:
+    if not mesh_m[0] < across < mesh_m[1]:
         raise MeshError(
             f"object '{thing.name}' is {across:.3g} m across",
             "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)"
@@ -189,7 +186,7 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
         shape,
         gamma_m2_s2=gamma,
         poisson=guess.poisson,
-        to_hz=high * MARGIN,
+        to_hz=high * margin,
         fixed=thing.fixed,
         cache=cache,
         progress=say,
@@ -226,6 +223,7 @@ def recorded_signals(case: Case, thing: CaseObject, recordings: tuple[CaseRecord
 
 def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...], clipped: bool) -> Sounds:
     """Read what is heard of an object's strikes. Raises FileError, AudioError."""
+    shorter = 0.5  # of the usual length: that much shorter is worth a word
     sounds, limited, rates, remarks, hums, begun = [], [], [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
@@ -271,7 +269,7 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
     length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
     refuse_short(length, sr, which)
-    if length < SHORTER * np.median(lengths):
+    if length < shorter * np.median(lengths):
         remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
     signals = np.stack([(x - hum)[start : start + length] for x, hum, start in zip(sounds, hums, starts, strict=True)])
     before = [
@@ -286,10 +284,12 @@ def until_it_breaks_off(sound: Array, sr: int) -> Array:
 
     A decay ends in its last bit or in noise, not far above.
     """
+    # of a gate: what lies before it, and behind it at least; of the peak (16 bits end at 3e-5)
+    shut_s, shut = 0.01, 1e-3
     observed = np.flatnonzero(sound)
-    last, short = int(observed[-1]) + 1 if len(observed) else 0, max(1, round(SHUT_S * sr))
+    last, short = int(observed[-1]) + 1 if len(observed) else 0, max(1, round(shut_s * sr))
     end = sound[max(0, last - short) : last]
-    return sound[:last] if 0 < last < len(sound) - short and np.abs(end).max() > SHUT * np.abs(sound).max() else sound
+    return sound[:last] if 0 < last < len(sound) - short and np.abs(end).max() > shut * np.abs(sound).max() else sound
 
 
 def onset_sample(sound: Array, sr: int) -> int:

@@ -25,15 +25,11 @@ from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-ATTACK_S = 0.005  # and a band's filter, 16 ms: together twice what it lasts in real takes
 SECONDS = 2.0
 BAND_HZ, PASSED, STOPPED, OVERSAMPLED = 400.0, 0.5, 1.5, 2.0  # of a band's width from its centre; rate over width
-STOP_DB = 100.0
 ROWS, COLUMNS, MOST = 240, 800, 40  # of a band's data matrix; poles looked for
 OWN = 0.5
 AROUND = 7  # widths, from two on, above and below a line
-FALSE_ALARMS = 0.05  # of a recording of noise alone
-FEWEST_CYCLES = 3.0  # in which it falls by e
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +47,13 @@ class _Band:
 
 def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, signed: bool) -> Lines:
     """Lines of signals (s, n) that start at the onset; none where nothing rings."""
+    attack_s = 0.005  # and a band's filter, 16 ms: together twice what it lasts in real takes
+    false_alarms = 0.05  # of a recording of noise alone
     from scipy.special import chdtri
 
-    late = round(ATTACK_S * sr)
+    late = round(attack_s * sr)
     rest = signals[:, late : late + int(SECONDS * sr)]
-    least = float(chdtri(2 * len(signals), FALSE_ALARMS / (1.5 * rest.shape[1])) / 2)
+    least = float(chdtri(2 * len(signals), false_alarms / (1.5 * rest.shape[1])) / 2)
     found = parallel_map(lambda band: _lines_of(band, sr, least), _bands(rest, sr, band_hz))
     pole, amplitude, spread, amplitude_sd, energy = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
     back = np.exp(-pole * late / sr)
@@ -81,10 +79,11 @@ def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, sign
 
 def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]:
     """Cut the bands of signals (s, n), each from the sample on at which its filter is full."""
+    stop_db = 100.0
     from scipy.fft import fft, ifft, next_fast_len
 
     step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
-    taps = low_pass(PASSED * BAND_HZ / sr, STOPPED * BAND_HZ / sr, STOP_DB)
+    taps = low_pass(PASSED * BAND_HZ / sr, STOPPED * BAND_HZ / sr, stop_db)
     count = max(0, -(-(signals.shape[1] - len(taps) + 1) // step))
     points = next_fast_len(-(-(signals.shape[1] + len(taps)) // step))
     whole = points * step
@@ -106,6 +105,7 @@ def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]
 
 def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, Array, Array]:
     """Poles (k,) in 1/s, amplitudes (s, k) and their spreads, spreads (k,), energies (k,) of a band's lines."""
+    fewest_cycles = 3.0  # in which it falls by e
     y, pole = band.series, _candidates(band.series)
     pole = pole[pole.real < 0]
     pole = pole[_selected(y, pole, least)]  # about the band, per sample; its neighbours' too
@@ -129,7 +129,7 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
     gain = np.exp(np.outer(pole / band.step, len(lag) - 1 - lag)) @ band.taps / 2
     exact = pole / band.step * sr + 2j * np.pi * band.centre_hz
     freq, decay = exact.imag / (2 * np.pi), -exact.real
-    inside = (freq >= band.low_hz) & (freq < band.high_hz) & (freq > FEWEST_CYCLES * decay)
+    inside = (freq >= band.low_hz) & (freq < band.high_hz) & (freq > fewest_cycles * decay)
     scale = band.noise[:, None] / gain
     return (
         exact[inside],

@@ -10,9 +10,7 @@ import numpy as np
 from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
-FALL = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
 LOWEST_HZ = 20.0  # of what is heard
-DRIFTS = 3.16  # times the rms of all that is heard, most of the time: wind, a warming amplifier
 PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
@@ -33,6 +31,7 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     (n,) array
         The filtered samples, at the same times.
     """
+    fall = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
     from scipy.fft import irfft, next_fast_len, rfft
 
     low, high = band_hz
@@ -43,9 +42,9 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     whole = np.concatenate([ends[0][::-1], signal, ends[1]])
     size = next_fast_len(2 * len(whole))
     freq = np.arange(size // 2 + 1) * sr / size
-    gain = _raised(freq, FALL[0] * low, low)
-    if high * FALL[1] < sr / 2:
-        gain *= 1 - _raised(freq, high, FALL[1] * high)
+    gain = _raised(freq, fall[0] * low, low)
+    if high * fall[1] < sr / 2:
+        gain *= 1 - _raised(freq, high, fall[1] * high)
     return np.asarray(irfft(rfft(whole, size) * gain, size)[reach : reach + len(signal)])
 
 
@@ -71,10 +70,11 @@ def without_drift(signal: Array, sr: int) -> tuple[Array, str]:
     str
         What to say of it, or nothing.
     """
+    drifts = 3.16  # times the rms of all that is heard, most of the time: wind, a warming amplifier
     edge = np.arange(0, len(signal), max(round(sr / LOWEST_HZ / 2), 1))
     mean = np.add.reduceat(signal, edge) / np.diff(edge, append=len(signal))  # a drift's samples over half a period
     power = np.add.reduceat(signal**2, edge) / np.diff(edge, append=len(signal))
-    if not np.median(mean**2 - DRIFTS**2 * (power - mean**2)) > 0:
+    if not np.median(mean**2 - drifts**2 * (power - mean**2)) > 0:
         return signal, ""
     above = limit_band(signal, sr, (LOWEST_HZ, np.inf))
     return above, f"a drift below {LOWEST_HZ:.0f} Hz, louder than all above it, is taken off"

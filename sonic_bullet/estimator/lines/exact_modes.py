@@ -21,17 +21,17 @@ from sonic_bullet.estimator.lines import likelihood
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.records import Array
 
-SIZES = ((64, 256), (500, 1000), (700, 2000))  # rows, columns
 EDGE, FALL = 1e-7, 5.0
-LEFT_MOST = 5e-7  # rms of what may be left of the whole, of the recording's
-ROUNDED = 1e-10  # left more than this: noise, though little, and more samples average it
 POLISHED, POLISHED_ROUNDED, STEPS = 3000, 10_000, 5
 
 
 def modes(signal: Array, sr: int) -> Sinusoids | None:
     """All modes of a signal (n,) that starts with or after its onset; None where it has noise or is not modal."""
+    sizes = ((64, 256), (500, 1000), (700, 2000))  # rows, columns
+    left_most = 5e-7  # rms of what may be left of the whole, of the recording's
+    rounded = 1e-10  # left more than this: noise, though little, and more samples average it
     rms = float(np.sqrt((signal**2).mean()))
-    for rows, columns in SIZES:
+    for rows, columns in sizes:
         if rows + columns - 1 > len(signal):
             break
         pole = _poles(signal[: rows + columns - 1], rows)
@@ -39,9 +39,9 @@ def modes(signal: Array, sr: int) -> Sinusoids | None:
             continue
         sound = signal[:POLISHED]
         found = _polished(sound, _amplitudes(sound, pole * sr, sr), sr)
-        if ROUNDED * rms < _left(signal, found, sr) < 100 * LEFT_MOST * rms:
+        if rounded * rms < _left(signal, found, sr) < 100 * left_most * rms:
             found = _polished(signal[:POLISHED_ROUNDED], found, sr)
-        if _left(signal, found, sr) < LEFT_MOST * rms:
+        if _left(signal, found, sr) < left_most * rms:
             return found
     return None
 

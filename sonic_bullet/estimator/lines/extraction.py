@@ -38,26 +38,19 @@ from sonic_bullet.records.errors import AudioError
 FASTEST_PER_S = 3000.0
 FALSE_ALARMS = 0.05
 BAND_HZ = 500.0
-EARLY_PER_S = 150.0  # modes faster than this are largely over when a band's filter is full
-ROUNDS = 6
 ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
 FEW, MANY = 3, 40
-RESTORED = 3  # times that modes get back what a limit above took of them
 MOST_MODES = 140
-SECONDS_MAX = 8.0
-LEAST_SAMPLES = 512
 LEAST_SAMPLES_A_MODE = 24
 FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
 # shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
 EXPLAINED, TRUSTED = 0.8, 0.5
 FRONT, FRONT_SHARE = 0.3, 0.75
 PINNED = 0.999  # of the fastest decay looked for
-CANCELLING = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
 # after which a real take is judged; noise over the signal there, at least; over that noise, what is no sum of lines
 ATTACK_S, QUIETEST, OVER_NOISE = 0.02, 10**-2.6, 10.0
 NEAR = 4.0  # decays within which one mode can do another's work
-STEADY = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
 
 
 @one_thread()
@@ -68,6 +61,9 @@ def extract(
 
     What makes the numbers doubtful stands in the note. Raises AudioError: silence, NaN, fewer than 512 samples.
     """
+    restored = 3  # times that modes get back what a limit above took of them
+    seconds_max = 8.0
+    least_samples = 512
     signal = np.ascontiguousarray(signal, np.float64)
     if signal.ndim != 1:
         raise AudioError(f"recording has shape {signal.shape}", "pass one channel")
@@ -93,9 +89,9 @@ def extract(
     steady_above = len(quiet) > 0 and _rms(signal[: part.start] - quiet) > _rms(quiet)
     if steady_above:
         signal = limited  # what is above was there before; else it belongs to the impact, which a limit would smear
-    x = signal[part.start : min(part.stop, part.start + int(SECONDS_MAX * sr))]
-    if len(x) < LEAST_SAMPLES:
-        raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {LEAST_SAMPLES} at least")
+    x = signal[part.start : min(part.stop, part.start + int(seconds_max * sr))]
+    if len(x) < least_samples:
+        raise AudioError(f"{len(x)} samples follow the onset", f"an impact needs {least_samples} at least")
     doubts, hopeless = onset.describe_doubts(x, sr)
     if hits := part.describe_hits(sr):
         hits += f": only what comes before the second, {len(x) / sr:.3g} s, is used"
@@ -108,7 +104,7 @@ def extract(
     if isinstance(found, Lines):
         return _ringing(x, limited[part.start : part.start + len(x)], found, sr, part.start, notes)
     (modes, noise), start = found, part.start
-    for _ in range(RESTORED if steady_above and len(modes.pole) else 0):
+    for _ in range(restored if steady_above and len(modes.pole) else 0):
         # what the limit took of the modes' beginning is theirs again: cut off at the onset it would be in every band
         model = np.zeros(len(limited))
         model[start : start + len(x)] = -likelihood.residual(np.zeros(len(x)), modes, sr)
@@ -139,6 +135,7 @@ def _fit(
 
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:
     """Find the significant modes of a signal and the noise they leave; of a real take what rings after its attack."""
+    rounds = 6
     floor = FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
@@ -151,7 +148,7 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
     most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         more = matched(likelihood.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), FASTEST_PER_S)
         more = more[: max(0, min(MANY, most - len(modes.pole)))]
         if not len(more):
@@ -197,11 +194,12 @@ def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
 
 def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sinusoids:
     """Return the bands' poles and their amplitudes; the strongest alone where there are more than can be identified."""
+    early_per_s = 150.0  # modes faster than this are largely over when a band's filter is full
     density = np.maximum(noise_density(x, sr, band_hz, tail=True), floor)
     slow = subspace.poles(x, sr, density, band_hz, BAND_HZ, FASTEST_PER_S)
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
-    pole = np.concatenate([slow, fast[~seen & (fast.real < -EARLY_PER_S)]])
+    pole = np.concatenate([slow, fast[~seen & (fast.real < -early_per_s)]])
     most = min(2 * MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     if len(pole) > most:
         pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
@@ -229,6 +227,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
 
     The weakest go first.
     """
+    cancelling = 4.0  # of the recording's peak: modes that large cancel one another, and model what is no mode
     while len(modes.pole):
         met = noise.rms(modes.pole.imag / (2 * np.pi), -modes.pole.real)
         spread, energy = likelihood.spreads(modes, noise.sr, len(x))
@@ -238,7 +237,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
             | (modes.pole.imag < 2 * np.pi * band_hz[0])
             | (modes.pole.imag > 2 * np.pi * band_hz[1])
         )
-        energy[outside | (np.abs(modes.amplitude) > CANCELLING * np.abs(x).max())] *= 1e-9
+        energy[outside | (np.abs(modes.amplitude) > cancelling * np.abs(x).max())] *= 1e-9
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
         near = far < NEAR * np.maximum(fade[:, None], fade)
         vague = (fade < DECAY_IDENTIFIED * spread[1] * met) & (near.sum(axis=1) > 1)
@@ -280,12 +279,13 @@ def _features(
     banded (n,): what the band alone holds of it. whole: no band was asked for, whose edge makes lines at the onset
     that are none.
     """
+    steady = 0.02  # a decay of less than this over the whole recording, or within two of its spreads of none, is a tone
     k, sr = len(modes.pole), noise.sr
     left = banded - (x - likelihood.residual(x, modes, sr))
     explained = 1 - float(left @ left) / float(banded @ banded)
     freq, decay = modes.pole.imag / (2 * np.pi), -modes.pole.real
     sd = likelihood.spreads(modes, sr, len(x))[0] * noise.rms(freq, decay) if k else np.zeros((4, 0))
-    tone, vague = decay * len(x) / sr < STEADY, decay < DECAY_IDENTIFIED * sd[1]
+    tone, vague = decay * len(x) / sr < steady, decay < DECAY_IDENTIFIED * sd[1]
     for which, said in ((tone, "without decay"), (vague & ~tone & whole, "without a decay that can be told")):
         if which.any():
             shown = ", ".join(f"{f:.1f}" for f in np.sort(freq[which])[:8])

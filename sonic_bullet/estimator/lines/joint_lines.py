@@ -27,12 +27,9 @@ __all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 
 SIGNIFICANT = 60.0  # energy of a line over the noise's density, all recordings: a²·sr/(4dσ²) summed
 MOST_LINES = 160
-SECONDS_MAX = 8.0
 HIGHEST = 0.485  # of the sample rate
 CROWD, FEWER = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
 LATE_S = (0.03, 0.1)
-DEAD = 9.0  # of ln amplitude: 78 dB
-PLAINLY = 0.75  # of what other lines leave, in squares
 SILENT = 1e-9  # rms, of full scale 1
 FEWEST_LINES = 3  # lines that say what rings
 BEYOND = (10.0, 0.1)  # times a recording's peak; share of the lines that begin there: what no single hit leaves
@@ -56,7 +53,8 @@ def joint_lines(
     left after LATE_S, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit there
     would have had to leave.
     """
-    signals = np.asarray(signals, float)[:, : int(SECONDS_MAX * sr)]
+    seconds_max = 8.0
+    signals = np.asarray(signals, float)[:, : int(seconds_max * sr)]
     if signals.shape[1] < 256 or not np.isfinite(signals).all():
         raise AudioError(
             f"recordings of {signals.shape[1]} samples after the onset", "a fit needs at least 256 finite samples"
@@ -80,6 +78,7 @@ def _identified(
 
     crowd: of more poles than lines those, too, that take most one after another, where these say plainly more.
     """
+    plainly = 0.75  # of what other lines leave, in squares
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
     for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
@@ -104,7 +103,7 @@ def _identified(
             sr,
             signed,
         )
-        if ((other.noise / noise) ** 2).sum() < PLAINLY * ((found.noise / noise) ** 2).sum():
+        if ((other.noise / noise) ** 2).sum() < plainly * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
     for late in (round(t * sr) for t in LATE_S) if modes is not None and _beyond(found, signals) > BEYOND[1] else ():
         if signals.shape[1] < 8 * late:
@@ -151,6 +150,7 @@ def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: 
 
 def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], signed: bool) -> Lines | None:
     """Find lines from a sample on, as they would have begun at the onset; None where nothing can be identified."""
+    dead = 9.0  # of ln amplitude: 78 dB
     rest = signals[:, late:]
     if not (np.sqrt((rest**2).mean(axis=1)) > SILENT).all():
         return None  # by a recording that a gate has shut nothing rang at the onset
@@ -158,7 +158,7 @@ def _from(late: int, signals: Array, sr: int, band_hz: tuple[float, float], sign
         lines = _identified(rest, noise_rms(rest, sr), sr, band_hz, signed, None, crowd=False)
     except np.linalg.LinAlgError:
         return None
-    alive = lines.decay_per_s * late / sr < DEAD  # what would have been over by then began later
+    alive = lines.decay_per_s * late / sr < dead  # what would have been over by then began later
     if not alive.all():
         lines = lines_of(rest, lines.noise, lines.pole[alive], sr, signed)
     if not len(lines.freq_hz):

@@ -21,9 +21,6 @@ WINDOWS = (512, 2048, 8192)
 ABOVE = 10.0  # m: cells 10 dB above the noise count
 FEWEST_CELLS = 20  # cells of a window that may speak for itself
 FLOOR_WINDOW = 1024
-MOST = 8192  # of its window, where recordings are long: low noise needs narrow bins
-SIDE = 8  # bins of the short window to each side
-REACH = 2.5  # of a frequency, up and down: more than a strong hum and its skirt take up
 HIDING = 1e30  # variance over which nothing stands
 QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
 
@@ -84,8 +81,10 @@ def floor_between(signals: list[Array]) -> Floor:
     Per bin the lower quartile over the last third of every recording, and over neighbouring bins, as no noise is narrow
     (hum is no noise).
     """
+    most = 8192  # of its window, where recordings are long: low noise needs narrow bins
+    side = 8  # bins of the short window to each side
     length = min(len(signal) for signal in signals)
-    window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, MOST), 1))))
+    window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, most), 1))))
     rows = []
     shape = np.hanning(window)
     for signal in signals:
@@ -95,7 +94,7 @@ def floor_between(signals: list[Array]) -> Floor:
         frames = np.lib.stride_tricks.sliding_window_view(tail, window)[:: window // 2]
         rows.append(np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum())
     level = np.quantile(np.concatenate(rows), 0.25, axis=0) / QUARTILE
-    return Floor(np.maximum(_broad(level, SIDE * window // FLOOR_WINDOW), 1e-24))
+    return Floor(np.maximum(_broad(level, side * window // FLOOR_WINDOW), 1e-24))
 
 
 def _broad(level: Array, side: int) -> Array:
@@ -103,10 +102,11 @@ def _broad(level: Array, side: int) -> Array:
 
     ``side`` bins to each side, and no further than a factor, as a noise may fall steeply with frequency.
     """
+    reach = 2.5  # of a frequency, up and down: more than a strong hum and its skirt take up
     count = len(level)
     k = np.arange(count)
-    first = np.maximum(np.ceil(k / REACH).astype(int), k - side)
-    last = np.minimum(np.minimum(np.floor(k * REACH).astype(int), k + side), count - 1)
+    first = np.maximum(np.ceil(k / reach).astype(int), k - side)
+    last = np.minimum(np.minimum(np.floor(k * reach).astype(int), k + side), count - 1)
     found = np.empty(count)
     whole = np.flatnonzero(last - first == 2 * side)
     if len(whole):

@@ -18,18 +18,8 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
 BLOCK_S = 1e-3
-NEAR_DB = 20.0
-FALLS = 1.1  # the loudest block of a strike's first 50 ms over those after
 CLIPPED_RUN = 3
-FADES = (
-    2.0  # energy of a sound's first half over its second: noise of a quarter second comes to 1.1, takes to 3 and more
-)
 SHOWN = 6  # hits whose times are said
-REACH = 64  # samples that the first guess may be off
-SHORT_S, LOW_RATE, GROWS_S = 0.1, 30_000, 0.4
-# times its first 50 ms: beyond the one it is said; beyond the other, to which two modes that start against one another
-# do not come, no mode is looked for
-GROWS, SWELLS = 1.5, 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +51,17 @@ def levels(signal: Array, sr: int) -> tuple[Array, int]:
 
 def span(signal: Array, sr: int) -> Span:
     """Return the first impact of a recording (n,) that is not silent."""
+    near_db = 20.0
+    falls = 1.1  # the loudest block of a strike's first 50 ms over those after
     power, block = levels(signal, sr)
     if len(power) < 4:
         return Span(0, len(signal))
     floor = max(float(np.quantile(power, 0.05)), 1e-20)
     strikes = find_strikes(signal, sr)
-    early = int(np.argmax(power >= power.max() * 10 ** (-NEAR_DB / 10)))  # the first hit, be a later one louder
+    early = int(np.argmax(power >= power.max() * 10 ** (-near_db / 10)))  # the first hit, be a later one louder
     struck = round(strikes[0] * sr) // block if len(strikes) else 0
     begun = early + round(GAP_S / BLOCK_S)
-    if struck > begun and power[early:begun].max() < FALLS * power[begun:struck].max():
+    if struck > begun and power[early:begun].max() < falls * power[begun:struck].max():
         early = struck  # what was there before does not fall: no strike
     loud = early + int(np.argmax(power[early : early + 10]))
     quiet = np.flatnonzero(power[:loud] < max(1e-3 * power[loud], 4 * floor))
@@ -87,11 +79,12 @@ def is_struck(signal: Array, sr: int) -> bool:
 
     An onset stands out, or what follows the loudest rise fades, as noise, hum and tones that last do not.
     """
+    fades = 2.0
     if len(find_strikes(signal, sr)):
         return True
     x = signal[span(signal, sr).start :]
     half = len(x) // 2
-    return bool((x[:half] ** 2).sum() >= FADES * (x[half : 2 * half] ** 2).sum())
+    return bool((x[:half] ** 2).sum() >= fades * (x[half : 2 * half] ** 2).sum())
 
 
 def until_next_hit(signal: Array, sr: int, start: int) -> Span:
@@ -112,7 +105,8 @@ def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float)
     Σ_{n<t} x² + Σ_{n≥t} (x − m)² is least at the true t; a sine begins with a zero, which silence explains as well:
     hence the earliest within (3 noise)² of the least. Nothing is assumed of the phases.
     """
-    first, last = max(0, start - REACH), min(len(signal), start + REACH)
+    reach = 64  # samples that the first guess may be off
+    first, last = max(0, start - reach), min(len(signal), start + reach)
     n = np.arange(first, last)
     model = (modes.amplitude * np.exp(modes.pole / sr * (n - start)[:, None])).real.sum(axis=1)
     x = signal[first:last]
@@ -138,19 +132,23 @@ def describe_clipping(clipped: int) -> str:
 
 def describe_doubts(x: Array, sr: int) -> tuple[list[str], bool]:
     """Say what speaks against a recording (n,) from its onset on; whether that is enough not to look for modes."""
+    short_s, low_rate, grows_s = 0.1, 30_000, 0.4
+    # times its first 50 ms: beyond the one it is said; beyond the other, to which two modes that start against one
+    # another do not come, no mode is looked for
+    grows, swells = 1.5, 3.0
     notes, hopeless = [], False
-    if len(x) < SHORT_S * sr:
+    if len(x) < short_s * sr:
         notes.append(
             f"only {1000 * len(x) / sr:.0f} ms of sound: what lies closer than about {sr / len(x):.0f} Hz "
             "may pass for one line"
         )
-    if sr < LOW_RATE:
+    if sr < low_rate:
         notes.append(f"{sr} samples a second: nothing above {0.49 * sr:.0f} Hz is seen")
-    if len(x) > GROWS_S * sr:
+    if len(x) > grows_s * sr:
         level = np.sqrt((x[: len(x) // (sr // 20) * (sr // 20)].reshape(-1, sr // 20) ** 2).mean(axis=1))
-        if level[3:].max() > GROWS * level[0]:
+        if level[3:].max() > grows * level[0]:
             notes.append(
                 f"the sound grows until {np.argmax(level) / 20:.2g} s after its onset: one impact alone does not"
             )
-            hopeless = bool(level[3:].max() > SWELLS * level[0])
+            hopeless = bool(level[3:].max() > swells * level[0])
     return notes, hopeless

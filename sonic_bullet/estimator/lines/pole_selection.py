@@ -11,8 +11,6 @@ import numpy as np
 from sonic_bullet.estimator.lines.likelihood import moments
 from sonic_bullet.records import Array
 
-SAME = 1e-6  # of a pole's own energy: with less of it apart from those picked it says nothing of its own
-
 
 def apart(pole: Array) -> Array:
     """Poles sorted by frequency without near doubles, which no recording of finite length tells apart."""
@@ -33,6 +31,7 @@ def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> 
     All at once, poles of a crowd (a reverberation's) cancel each other at amplitudes that say nothing. A line's other
     half, at −ω, is taken to be far away.
     """
+    same = 1e-6  # of a pole's own energy: with less of it apart from those picked it says nothing of its own
     if not len(pole):
         return np.zeros(0, int)
     z = pole / sr
@@ -46,7 +45,7 @@ def selected(signals: Array, noise: Array, pole: Array, sr: int, count: int) -> 
     # <e_k, the n-th direction>; of own, what is apart from those picked
     basis, new, found = np.zeros((len(pole), count), complex), own.copy(), []
     for n in range(count):
-        energy = np.where(new > SAME * own, (np.abs(left) ** 2).sum(axis=1) / own, -1.0)
+        energy = np.where(new > same * own, (np.abs(left) ** 2).sum(axis=1) / own, -1.0)
         k = int(energy.argmax())
         if energy[k] < 0:
             break  # nothing is left that they do not say

@@ -14,7 +14,6 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 FASTEST_PER_S = 2500.0
-MOST_WINDOW, MOST_COLUMNS = 300, 1200  # of the data matrix of one recording
 
 
 def start_poles(signals: Array, sr: int, low: float, high: float) -> Array:
@@ -58,12 +57,13 @@ def _low_pass(taps: int, cutoff: float) -> Array:
 
 def _subspace(band: Array, dt: float) -> Array:
     """Return poles of complex series (s, n) of unit noise at step dt: their one signal subspace, then the shift."""
+    most_window, most_columns = 300, 1200  # of the data matrix of one recording
     s, n = band.shape
-    window = min(MOST_WINDOW, n // 3)
+    window = min(most_window, n // 3)
     if window < 8:
         return np.zeros(0, complex)
     # any columns will do: the shift is between rows
-    first = np.arange(0, n - window + 1, 1 + (n - window) // MOST_COLUMNS)
+    first = np.arange(0, n - window + 1, 1 + (n - window) // most_columns)
     gram = np.zeros((window, window), complex)
     for row in band:
         data = row[first[:, None] + np.arange(window)]

@@ -14,11 +14,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 
 LEAST_S = 0.1  # before the onset: five periods, so that Hann's main lobes lie apart
-GUARD_S = 0.005  # before the onset, whose first sample is not known that well
-MOST = 20  # multiples
-ABOVE = 30.0  # times the power between them
-REFINED = 3  # times that the tail's phases mend the frequency
-STAYS = 0.25  # of the comb's power in the tail, at most, once it is taken off
 
 
 def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]:
@@ -40,15 +35,20 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
     float
         Its fundamental in Hz; 0 where there is none.
     """
+    guard_s = 0.005  # before the onset, whose first sample is not known that well
+    most = 20  # multiples
+    above = 30.0  # times the power between them
+    refined = 3  # times that the tail's phases mend the frequency
+    stays = 0.25  # of the comb's power in the tail, at most, once it is taken off
     from scipy.optimize import minimize_scalar
 
-    quiet = signal[: max(0, start - round(GUARD_S * sr))]
+    quiet = signal[: max(0, start - round(guard_s * sr))]
     n = len(quiet)
     if n < LEAST_S * sr:
         return np.zeros(len(signal)), 0.0
     power = np.abs(np.fft.rfft((quiet - quiet.mean()) * np.hanning(n), 4 * n)) ** 2
     step = sr / (4 * n)
-    multiple = np.arange(1, min(MOST, int(0.45 * sr / MAINS_HZ[-1])) + 1)
+    multiple = np.arange(1, min(most, int(0.45 * sr / MAINS_HZ[-1])) + 1)
 
     def stands(f: float) -> Array:
         """Which multiples of f stand above what lies between them."""
@@ -57,7 +57,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
             [np.median(power[int((k + 0.35) * f / step) : int((k + 0.65) * f / step) + 1]) for k in multiple]
         )
         between_least = np.minimum(between, np.concatenate([between[:1], between[:-1]])) / np.log(2)
-        return np.asarray(multiple[(power[at] > ABOVE * between_least) & (power[at] > 0)])
+        return np.asarray(multiple[(power[at] > above * between_least) & (power[at] > 0)])
 
     def left(f: float) -> float:
         rest = quiet - _comb(f, found, n, sr) @ _weights(quiet, f, found, sr)
@@ -78,7 +78,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
     if not f:
         return np.zeros(len(signal)), 0.0
     tail = slice(len(signal) - len(signal) // 3, None)
-    for _ in range(REFINED):
+    for _ in range(refined):
         hum = _comb(f, found, len(signal), sr) @ _weights(quiet, f, found, sr)
         held, carried = (_tones(x[tail], f, found, sr) for x in (signal, hum))
         # the median, as a mode may ring at one of them
@@ -87,7 +87,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
         middle = order[int(np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum()))]
         f += float(turn[middle]) * sr / (np.pi * (tail.start + len(signal) - n))
     held, rest = (_tones(x[tail], f, found, sr) for x in (signal, signal - hum))
-    if (np.abs(rest) ** 2).sum() > STAYS * (np.abs(held) ** 2).sum():
+    if (np.abs(rest) ** 2).sum() > stays * (np.abs(held) ** 2).sum():
         return np.zeros(len(signal)), 0.0
     return hum, f
 

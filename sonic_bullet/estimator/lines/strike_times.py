@@ -15,9 +15,7 @@ from sonic_bullet.records import Array
 
 ORDER = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
 BLOCK_S, GAP_S = 1e-3, 0.05
-ABOVE_DB = 12.0  # over the median of the blocks within NEAR_S: gaussian noise of 1 ms stays below 3 dB
 NEAR_S = 0.25
-BELOW_DB = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
 
 
 def find_strikes(signal: Array, sr: int) -> Array:
@@ -35,6 +33,8 @@ def find_strikes(signal: Array, sr: int) -> Array:
     (s,) array
         Times in s from the first sample, in order; empty where nothing stands out of what could be predicted.
     """
+    above_db = 12.0  # over the median of the blocks within NEAR_S: gaussian noise of 1 ms stays below 3 dB
+    below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
     from scipy.ndimage import median_filter
 
     block = max(1, round(BLOCK_S * sr))
@@ -44,6 +44,6 @@ def find_strikes(signal: Array, sr: int) -> Array:
     left = np.convolve(signal, prediction_error_filter(signal, ORDER))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
     near = median_filter(power, min(round(2 * NEAR_S / BLOCK_S), count) | 1, mode="nearest")
-    stands = power > np.maximum(near * 10 ** (ABOVE_DB / 10), power.max() * 10 ** (-BELOW_DB / 10))
+    stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))
     at = np.flatnonzero(stands) * block / sr
     return at[np.diff(at, prepend=-1.0) > GAP_S]

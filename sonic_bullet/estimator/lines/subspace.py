@@ -16,11 +16,8 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-STOP_DB = 160.0
 # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
 ROUNDING = 1e-7
-OVERSAMPLED = 2.5
-COLUMNS_MOST = 1200
 EARLY = 1500  # samples
 
 
@@ -44,14 +41,16 @@ def poles(
     A band is a slice of the whole recording's transform, times the filter's, turned back at the lower rate: the same
     linear convolution.
     """
+    stop_db = 160.0
+    oversampled = 2.5
     from scipy.fft import fft, ifft, next_fast_len
 
     found = []
-    step = max(1, int(sr / (OVERSAMPLED * width_hz)))
+    step = max(1, int(sr / (oversampled * width_hz)))
     rate = sr / step
     taps = np.ones(1)
     if step > 1:
-        taps = low_pass(width_hz / 2 / sr, (rate - width_hz / 2) / sr, STOP_DB)
+        taps = low_pass(width_hz / 2 / sr, (rate - width_hz / 2) / sr, stop_db)
     points = next_fast_len(-(-(len(signal) + len(taps)) // step))
     size = points * step
     sound, offset = fft(signal, size), (np.arange(points) + points // 2) % points - points // 2
@@ -81,12 +80,13 @@ def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -
 
     widest: of the window; most: how many poles.
     """
+    columns_most = 1200
     n = len(band)
     window = min(widest, n // 3)
     if window < 6:
         return np.zeros(0, complex)
     # the shift is between rows: any columns will do
-    first = np.arange(0, n - window + 1, 1 + (n - window) // COLUMNS_MOST)
+    first = np.arange(0, n - window + 1, 1 + (n - window) // columns_most)
     hankel = band[first[None, :] + np.arange(window)[:, None]]
     power, left = np.linalg.eigh(hankel @ hankel.conj().T)
     size, left = np.sqrt(np.maximum(power[::-1], 0)), left[:, ::-1]

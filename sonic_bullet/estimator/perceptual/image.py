@@ -17,7 +17,6 @@ from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, loudnes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 
-BARK_LAST = 24.0
 WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 OUTSIDE = -2  # in Level.band: a bin that feeds no triangle
 
@@ -36,7 +35,8 @@ class Level:
 
 def band_middles(bark_step: float) -> Array:
     """Return the middles (b,) in Hz of the bands up to 24 Bark."""
-    return bark_to_hz(bark_step * np.arange(1, int(BARK_LAST / bark_step) + 1))
+    bark_last = 24.0
+    return bark_to_hz(bark_step * np.arange(1, int(bark_last / bark_step) + 1))
 
 
 def window(length: int) -> Array:

@@ -29,8 +29,6 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import StruckModes
 
-PER_BARK = 40.0
-PER_DURATION = 1.0
 NEAR = 0.02
 POWER = 0.3
 ALIKE = 0.02
@@ -41,11 +39,13 @@ def match_ratios(
     freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array
 ) -> tuple[Array, Array]:
     """R (k,) of features (k,) beside modes (m,), and the amplitude √Σ k²a² (k,) that the modes have there."""
+    per_bark = 40.0
+    per_duration = 1.0
     if not len(mode_hz) or not len(freq_hz):
         return np.zeros(len(freq_hz)), np.zeros(len(freq_hz))
     loud = energy(mode_decay_per_s, mode_amplitude)
-    per_s = PER_DURATION * float(np.average(mode_decay_per_s, weights=loud + 1e-300))
-    across = PER_BARK * (bark(freq_hz)[:, None] - bark(mode_hz)[None])
+    per_s = per_duration * float(np.average(mode_decay_per_s, weights=loud + 1e-300))
+    across = per_bark * (bark(freq_hz)[:, None] - bark(mode_hz)[None])
     along = np.maximum(
         per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None], 0.0
     )

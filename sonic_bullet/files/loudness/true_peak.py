@@ -18,17 +18,16 @@ from sonic_bullet.records import Array
 OVERSAMPLING = 16
 REACH, KAISER_BETA = 20, 7.0
 """Samples on either side of an interpolated one, and their window: even to 0.45 of the rate."""
-BOUND = 3.5
-"""Upper bound of an interpolated sample over the largest around it: the sum of the sinc's magnitudes."""
 BLOCK_FRAMES = 1 << 14
 
 
 def find_true_peak(sound: KeptSound) -> float:
     """Find the true peak of all channels; blocks that cannot exceed it are skipped."""
+    bound = 3.5  # Upper bound of an interpolated sample over the largest around it: the sum of the sinc's magnitudes
     found = 0.0
     for start in range(0, sound.shape[1], BLOCK_FRAMES):
         block = sound.read(max(start - 2 * REACH, 0), start + BLOCK_FRAMES + 2 * REACH)
-        if BOUND * np.abs(block).max(initial=0.0) > found:
+        if bound * np.abs(block).max(initial=0.0) > found:
             found = max(found, float(np.abs(_between(block)).max()))
     return found
 

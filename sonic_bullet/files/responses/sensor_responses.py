@@ -16,7 +16,6 @@ from sonic_bullet.records import Array, SensorResponse
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
 
-TABLES = (".csv", ".txt", ".tsv")
 REMEDY = "give rows of a frequency in Hz and a factor, or a FIR filter as a sound file"
 LEAST_TAPS = 1024
 """A short filter's spectrum is taken at as many points as of one so long."""
@@ -30,8 +29,9 @@ def read_response(path: str | os.PathLike[str]) -> SensorResponse:
     FileError
         The file cannot be read, or holds no response.
     """
+    tables = (".csv", ".txt", ".tsv")
     name = as_path(path, "path", "name a table (.csv) or a sound file (.wav)")
-    if Path(name).suffix.lower() in TABLES:
+    if Path(name).suffix.lower() in tables:
         with reading(name, "sensor response", FileError, REMEDY):
             table = _table(Path(name).read_text(encoding="utf-8"), name)
         return _response(table[:, 0], table[:, 1], name)

@@ -19,22 +19,20 @@ from sonic_bullet.records import Array, Head
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
 
-CONVENTIONS = ("SimpleFreeFieldHRIR", "GeneralFIR", "GeneralFIR-E", "FreeFieldHRIR")
-EXTRA = "pip install 'sonic_bullet[head]'"
-
 
 def read_head(path: str | os.PathLike[str]) -> Head:
     """Read the head of a SOFA file.
 
     Raises FileError where it cannot be read, holds no responses of two ears by direction, or sofar is missing.
     """
+    extra = "pip install 'sonic_bullet[head]'"
     name = as_path(path, "path", "name a head's file (.sofa)")
     if not Path(name).is_file():
         raise FileError(f"cannot read {name}: no such file", "give a head as a SOFA file (.sofa)")
     try:
         import sofar
     except ImportError:
-        raise FileError(f"cannot read {name}: sofar is not installed", EXTRA) from None
+        raise FileError(f"cannot read {name}: sofar is not installed", extra) from None
     try:
         found = sofar.read_sofa(name, verify=False, verbose=False)
     except Exception as error:  # whatever sofar, netCDF and HDF5 raise
@@ -44,12 +42,13 @@ def read_head(path: str | os.PathLike[str]) -> Head:
 
 
 def _head(found: Any, name: str) -> Head:
+    conventions = ("SimpleFreeFieldHRIR", "GeneralFIR", "GeneralFIR-E", "FreeFieldHRIR")
     convention = str(getattr(found, "GLOBAL_SOFAConventions", ""))
     response = getattr(found, "Data_IR", None)
-    if convention not in CONVENTIONS or response is None:
+    if convention not in conventions or response is None:
         raise FileError(
             f"{name} holds no head's impulse responses but {convention or 'no convention'}",
-            f"give a SOFA file of one of {', '.join(CONVENTIONS)}",
+            f"give a SOFA file of one of {', '.join(conventions)}",
         )
     response = np.array(response, float)
     if response.ndim != 3 or response.shape[1] != 2:

@@ -28,7 +28,6 @@ BAND = 0.8  # of the highest frequency measured: where W begins to fall and the 
 BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
 OFF_RATE = 5e-5  # relative: six figures of a step, and their last
 ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
-STEPS = 4001  # of an edge
 MOTION = {"acceleration": -1, "velocity": 0, "displacement": 1}
 """Powers of iω from a quantity to velocity."""
 
@@ -112,10 +111,11 @@ def _derived(value: Array, freq_hz: Array, power: int) -> Array:
 
 def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
     """Return one between two frequencies; falls to zero at half the first and at the last frequency."""
+    steps = 4001  # of an edge
     below = (freq_hz - low_hz / 2) / (low_hz / 2)
     above = (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
-    step = np.cumsum(np.kaiser(STEPS, BETA))
-    at = np.linspace(0, 1, STEPS)
+    step = np.cumsum(np.kaiser(steps, BETA))
+    at = np.linspace(0, 1, steps)
     return np.asarray(np.interp(below, at, step) * np.interp(above, at, step) / step[-1] ** 2)
 
 

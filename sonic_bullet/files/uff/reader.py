@@ -23,11 +23,7 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-BYTES_MAX = 1 << 30
-LARGEST_VALUE = 1e12
 READ = (15, 58, 164, 2411)
-QUIET = (151, 2412, 82)  # header, elements, trace lines: nothing for a case
-SYSTEMS = (18, 2420)
 QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration", 15: "pressure"}
 FORCES = (9, 13)
 FUNCTIONS = {
@@ -171,7 +167,8 @@ def _dataset(file: Any, number: int, kind: int) -> dict[str, Any]:
 
 def _refuse_cut(path: Path) -> None:
     """Raise FileError where a file is not UFF, or ends inside a dataset, which pyuff would omit."""
-    if path.is_file() and path.stat().st_size > BYTES_MAX:
+    bytes_max = 1 << 30
+    if path.is_file() and path.stat().st_size > bytes_max:
         raise FileError(f"{path} is over 1 GiB", "export fewer responses")
     tags = len(re.findall(rb"(?: {4}-1)(?=[\r\n]| {74}|$)", path.read_bytes()))
     if not tags:
@@ -207,6 +204,7 @@ def _response(
     one: dict[str, Any], nodes: dict[int, Point], units: tuple[float, float], path: str | os.PathLike[str]
 ) -> Response | str:
     """Convert a dataset 58, or describe it where it is not understood; FileError where it is cut."""
+    largest_value = 1e12
     uneven = 1e-4  # of the last abscissa: text has six figures of each
     least_step = 1e-7  # Hz or s: the highest rate that a recording has
     gravity_m_s2 = 9.80665  # standard, of accelerations in g
@@ -223,8 +221,8 @@ def _response(
     count = int(one["num_pts"])
     if not len(x) == len(value) == count or count < 2:
         raise FileError(f"{path} is cut: {len(value)} of {count} values of a function", "export it again")
-    if not (np.isfinite(x).all() and (np.abs(value) <= LARGEST_VALUE).all()):
-        raise FileError(f"{path} holds values that are NaN or beyond {LARGEST_VALUE:g}", "export it again")
+    if not (np.isfinite(x).all() and (np.abs(value) <= largest_value).all()):
+        raise FileError(f"{path} holds values that are NaN or beyond {largest_value:g}", "export it again")
     step = float(x[-1] - x[0]) / (count - 1)
     if not least_step <= step <= LARGEST or np.abs(x[0] + step * np.arange(count) - x).max() > uneven * abs(
         float(x[-1])
@@ -251,11 +249,13 @@ def _counted(unread: Counter[str]) -> list[str]:
 
 def _notes(found: list[Response], unread: Counter[str], kinds: list[int], assumed: int) -> list[str]:
     """List what was not understood and what was assumed, one line each."""
+    quiet = (151, 2412, 82)  # header, elements, trace lines: nothing for a case
+    systems = (18, 2420)
     lines = [f"not used: {', '.join(_counted(unread))}"] if unread else []
-    others = Counter(kind for kind in kinds if kind not in (*READ, *QUIET, *SYSTEMS))
+    others = Counter(kind for kind in kinds if kind not in (*READ, *quiet, *systems))
     if others:
         lines.append("not used: " + ", ".join(f"dataset {kind} ({count})" for kind, count in others.items()))
-    if any(kind in SYSTEMS for kind in kinds):
+    if any(kind in systems for kind in kinds):
         lines.append("local coordinate systems are not used: directions are taken as the mesh's")
     freedoms = {f for r in found for f in (r.strike, r.sensor) if f.position_m is None and f.node}
     if freedoms:

@@ -18,7 +18,6 @@ from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-NORMAL_MODE, VECTOR, DISPLACEMENT = 2, 2, 8  # record 6 of dataset 55
 VELOCITY, FORCE, FREQUENCY = 11, 13, 18
 TITLE = 80
 
@@ -128,6 +127,7 @@ def _nodes(shapes: ModalShapes, mobilities: tuple[Mobility, ...]) -> dict[str, A
 
 def _mode(shapes: ModalShapes, k: int, title: str) -> dict[str, Any]:
     """Make dataset 55 of a mode."""
+    normal_mode, vector, displacement = 2, 2, 8  # record 6 of dataset 55
     omega, d = 2 * np.pi * float(shapes.freq_hz[k]), float(np.nan_to_num(shapes.decay_per_s[k]))
     words = shapes.words[k] if shapes.words else "NONE"
     return {
@@ -135,9 +135,9 @@ def _mode(shapes: ModalShapes, k: int, title: str) -> dict[str, Any]:
         "id1": title,
         "id2": words.encode("ascii", "replace").decode()[:TITLE],
         "id4": f"MODE {k + 1}",
-        "analysis_type": NORMAL_MODE,
-        "data_ch": VECTOR,
-        "spec_data_type": DISPLACEMENT,
+        "analysis_type": normal_mode,
+        "data_ch": vector,
+        "spec_data_type": displacement,
         "load_case": 1,
         "mode_n": k + 1,
         "freq": float(shapes.freq_hz[k]),

@@ -14,13 +14,13 @@ from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.solid import TET_EDGE, TET_FACE, Solid, corner_volume_m3
 from sonic_bullet.records import Array
 
-FARTHEST = 0.25  # of an edge's length: a chord of a right angle deviates by 0.21
 LATTICE = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
 """Where an element's Jacobian is checked: corners and middles of its edges."""
 
 
 def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
     """Move the mid-edge nodes of a straight solid onto the surface vertex_m (v, 3), face (f, 3) that it fills."""
+    farthest = 0.25  # of an edge's length: a chord of a right angle deviates by 0.21
     edge, middle, normal, crease = _surface_edges(solid)
     ends = solid.node_m[edge]
     length, chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), ends.mean(axis=1)
@@ -29,10 +29,10 @@ def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
     line = creases(vertex_m, face)
     if crease.any() and len(line):
         along = nearest_on_lines(vertex_m[line], chord[crease])
-        close = np.linalg.norm(along - chord[crease], axis=1) < FARTHEST * length[crease]
+        close = np.linalg.norm(along - chord[crease], axis=1) < farthest * length[crease]
         target[crease] = np.where(close[:, None], along, target[crease])
     moved = np.linalg.norm(target - chord, axis=1)
-    near = (moved < FARTHEST * length) & (moved > 1e-9 * length)
+    near = (moved < farthest * length) & (moved > 1e-9 * length)
     node = solid.node_m.copy()
     node[middle[near]] = target[near]
     return unfolded(Solid(node, solid.tet, not near.any(), solid.note))

@@ -7,7 +7,6 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.records import Array
 
-THIN_DOF, CHUNKY_DOF = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
 DOF_PER_TET = 5.6  # measured on meshes of bars, slabs and bowls
 CURVED = 1.5
 """Edge on a wall of thickness t and radius r, over √(r t): chords of both sides deviate by a quarter of the wall, and
@@ -20,8 +19,9 @@ def dof_budget(thickness_m: float, diagonal_m: float) -> int:
     A quadratic element of edge e bends correctly while e² « thickness x wavelength, so the number of elements in a
     plate grows as 1/thickness.
     """
+    thin_dof, chunky_dof = 26_000, 10_000  # unknowns by default: a plate's factor stays sparse, a ball's does not
     more = np.clip(0.007 * diagonal_m / thickness_m, 1, 3)
-    return int((THIN_DOF + (CHUNKY_DOF - THIN_DOF) * chunkiness(thickness_m, diagonal_m)) * more)
+    return int((thin_dof + (chunky_dof - thin_dof) * chunkiness(thickness_m, diagonal_m)) * more)
 
 
 def chunkiness(thickness_m: float, diagonal_m: float) -> float:

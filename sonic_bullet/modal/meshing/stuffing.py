@@ -19,11 +19,8 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-MOST_CELLS = 400_000  # of the lattice about the body: 1 GB
-WARP_LONG, WARP_SHORT = 0.24999, 0.41189  # part of an edge [Labelle & Shewchuk 2007, table 1]
 GROUP = 8  # faces that are one dipole from afar
 GROUPS = 8  # groups that are one larger group
-RING = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))
 PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # A wedge 012 345 turned so that its vertex k comes first [Dompierre et al. 1999, table 1]
 TURNED = np.array(
@@ -36,6 +33,7 @@ def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
 
     Edges are edge_m and √3/2 of it. Raises MeshError where the lattice would be too large, or nothing is inside.
     """
+    warp_long, warp_short = 0.24999, 0.41189  # part of an edge [Labelle & Shewchuk 2007, table 1]
     point = vertex_m[face].reshape(-1, 3)
     node_m, corners, tet = _lattice(point.min(axis=0), point.max(axis=0), edge_m)
     index = geometry.surface_index(vertex_m, face)
@@ -44,13 +42,13 @@ def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
     phi = np.where(winding_number(vertex_m[face[index.order]], node_m) > 0.5, distance, -distance)
     tet = tet[(phi[tet] > 0).any(axis=1)]
     a, b = np.unique(np.sort(tet[:, PAIRS].reshape(-1, 2), axis=1), axis=0).T
-    reach = np.where((a < corners) == (b < corners), WARP_LONG, WARP_SHORT)
+    reach = np.where((a < corners) == (b < corners), warp_long, warp_short)
     for kind in (slice(0, corners), slice(corners, None)):
         across = phi[a] * phi[b] < 0
         part = np.where(across, phi[a], 0) / np.where(across, phi[a] - phi[b], 1)
         near = np.zeros(len(phi), bool)
         near[a[across & (part < reach)]] = near[b[across & (1 - part < reach)]] = True
-        near[kind] &= distance[kind] < WARP_SHORT * edge_m  # at a hole's rim the surface is far
+        near[kind] &= distance[kind] < warp_short * edge_m  # at a hole's rim the surface is far
         near[: kind.start], near[kind.stop or len(near) :] = False, False
         node_m[near], phi[near] = foot[near], 0.0
     node_m, tet = _cut(node_m, tet[(phi[tet] > 0).any(axis=1)], phi)
@@ -65,10 +63,12 @@ def _lattice(low: Array, high: Array, edge_m: float) -> tuple[Array, int, Array]
     Returns nodes (n, 3), how many of them are corners of cubes (first), and tetrahedra (t, 4): two neighbouring centres
     and an edge of the square between them.
     """
+    most_cells = 400_000  # of the lattice about the body: 1 GB
+    ring = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))
     cells = np.ceil((high - low) / edge_m).astype(int) + 2
-    if np.prod(cells.astype(float)) > MOST_CELLS:
+    if np.prod(cells.astype(float)) > most_cells:
         raise MeshError(
-            f"mesh is not closed, and its walls are too thin for a lattice of {MOST_CELLS} cells",
+            f"mesh is not closed, and its walls are too thin for a lattice of {most_cells} cells",
             "close its surface, or give a simpler mesh",
         )
     origin = (low + high - cells * edge_m) / 2
@@ -84,7 +84,7 @@ def _lattice(low: Array, high: Array, edge_m: float) -> tuple[Array, int, Array]
         here = centre[centre[:, axis] < cells[axis] - 1]
         one, two = (len(corner) + number(c, cells) for c in (here, here + step))
         u, v = np.delete(np.eye(3, dtype=int), axis, axis=0)
-        square = [number(here + step + i * u + j * v, cells + 1) for i, j in RING]
+        square = [number(here + step + i * u + j * v, cells + 1) for i, j in ring]
         tets += [np.stack([one, two, p, q], axis=1) for p, q in pairwise(square)]
     return node, len(corner), np.concatenate(tets)
 

@@ -22,8 +22,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 
-CAP_PART = 0.05
-"""Of a piece's area: flat caps on its holes, below which it encloses a volume."""
 OPEN_PART = 0.025
 """Mean winding number just outside: a ball with a hole of 5 % of its area has it."""
 SHEET_PART = 0.02
@@ -155,12 +153,13 @@ def _oriented(vertex_m: Array, face: Array) -> tuple[Array, str]:
 
 def _solid_pieces(vertex_m: Array, face: Array) -> Array:
     """Return which faces (f,) are of pieces that enclose a volume but for small holes."""
+    cap_part = 0.05  # of a piece's area: flat caps on its holes, below which it encloses a volume
     label = pieces_of_faces(face)
     solid = np.zeros(len(face), bool)
     for piece in np.unique(label):
         mine = label == piece
         area = geometry.face_areas_m2(vertex_m, face[mine]).sum()
-        solid[mine] = _cap_area_m2(vertex_m, _boundary(face[mine])) < CAP_PART * area
+        solid[mine] = _cap_area_m2(vertex_m, _boundary(face[mine])) < cap_part * area
     return solid
 
 

@@ -20,10 +20,6 @@ GUARD_S, GUARD_S_PER_TET = 20, 0.002
 """Processor time after which a child counts as hung: ten times what meshes take. That is an error, and nothing else is
 tried: a clock decides no result.
 """
-BUSY = 20.0
-"""Wall time per processor time that a child may take on a busy machine before it counts as hung."""
-MEMORY_LIMIT_BYTES = 2 * 1024**3
-CUT_OFF = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
 
 
 class EndlessError(MeshError):
@@ -80,19 +76,22 @@ def in_child(script: str, given: dict[str, Array], guard_s: int) -> dict[str, Ar
 
     Raises MeshError where it fails.
     """
+    busy = 20.0  # Wall time per processor time that a child may take on a busy machine before it counts as hung
+    memory_limit_bytes = 2 * 1024**3
+    cut_off = (9, 24)  # SIGKILL, SIGXCPU: the child's own limit on processor time
     name = script.strip("_").removesuffix(".py").capitalize()
     with temporary_folder() as folder:
         source, target = folder / "in.npz", folder / "out.npz"
-        limits = {"memory": np.array(MEMORY_LIMIT_BYTES), "seconds": np.array(guard_s)}
+        limits = {"memory": np.array(memory_limit_bytes), "seconds": np.array(guard_s)}
         np.savez(source, allow_pickle=False, **given, **limits)
         command = [sys.executable, str(Path(__file__).with_name(script)), str(source), str(target)]
         try:
             ended = subprocess.run(
-                command, timeout=BUSY * guard_s, capture_output=True, text=True, check=False, cwd=folder
+                command, timeout=busy * guard_s, capture_output=True, text=True, check=False, cwd=folder
             )
         except subprocess.TimeoutExpired:
             ended = None
-        if ended is None or -ended.returncode in CUT_OFF:
+        if ended is None or -ended.returncode in cut_off:
             raise EndlessError(f"{name} did not come to an end on the mesh", "repair the mesh, or give a simpler one")
         if ended.returncode != 0 or not target.exists():
             said = (ended.stderr.strip().splitlines() or ["no message"])[-1]

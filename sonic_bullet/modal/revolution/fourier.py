@@ -17,7 +17,6 @@ from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
-CURVED = 1.3  # wave number of a curved wall over that of a flat one of as many modes: membranes take the low ones away
 FINER = 1.5  # sides shorter by this leave FINER^-q of the error, q from 1.1 at notches to 6
 FEWEST_NODES = 120  # fewer save no time
 
@@ -179,7 +178,9 @@ def _wave_number_of(count: int, body: Revolved, thickness: float) -> float:
     Bending modes of its wall [Courant & Hilbert 1924, ch. VI.4], shear waves in its volume [Weyl 1912], or bending
     modes of its length, in pairs.
     """
-    wall = CURVED * np.sqrt(4 * np.pi * (count + 8) * thickness / body.volume_m3)
+    # wave number of a curved wall over that of a flat one of as many modes: membranes take the low ones away
+    curved = 1.3
+    wall = curved * np.sqrt(4 * np.pi * (count + 8) * thickness / body.volume_m3)
     bulk = (3 * np.pi**2 * (count + 8) / body.volume_m3) ** (1 / 3)
     bar = (count / 2 + 2) * np.pi / float(np.ptp(body.outline_m[:, 1]))
     return float(min(wall, bulk, bar))

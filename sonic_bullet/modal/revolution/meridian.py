@@ -21,8 +21,6 @@ ROUND = 2e-5
 """Of the diagonal: what vertices of one ring may differ by."""
 WIDEST_RAD = 0.45
 """Angle of an edge about the axis: a ring of fewer than 14 has an area 3 % less than its disc's."""
-RING = 14
-"""Vertices at one place of the meridian that are a ring."""
 APART = 0.4
 """Of the mesh's edges there: distance of the outline's points between rings."""
 
@@ -230,6 +228,7 @@ def _is_one_curve(walk: Array, flat: Array, place: Array, diagonal: float) -> bo
 
 def _outline(walk: Array, flat: Array, place: Array, fine: Array, diagonal: float) -> Array:
     """Thin points (v, 2) to an outline (p, 2): all poles and rings; others `APART` of the mesh's edges, fine (v,)."""
+    ring = 14  # Vertices at one place of the meridian that are a ring
     ordered, _ = _with_poles(walk, flat, place)
     size = _with_poles(walk, np.stack([fine, fine], axis=1), place)[0][:, 0]
     step = np.linalg.norm(np.diff(ordered, axis=0, prepend=ordered[-1:]), axis=1) > ROUND * diagonal
@@ -240,7 +239,7 @@ def _outline(walk: Array, flat: Array, place: Array, fine: Array, diagonal: floa
     pole = np.unique(group[ordered[:, 0] == 0])
     middle[pole, 0] = 0
     size = np.bincount(group, size) / count
-    whole = count >= RING
+    whole = count >= ring
     whole[pole] = True
     first = int(np.argmax(whole))  # 0 where there is neither
     whole[first] = True

@@ -22,13 +22,9 @@ from sonic_bullet.records import Array
 WALL, LONG = 0.5, 3.0  # a triangle's side over the wall's thickness, at a corner and far from all
 WAVE = 0.25  # a triangle's side over the shortest wave
 BENT = 0.3  # radians that a side may turn
-CORNER = 0.15  # radians: a larger turn is a corner
 GROWTH = 0.5  # of size over distance
 MOST_NODES = 15_000  # three unknowns each: a second or two for each wave around
 
-MOST_DISTANCES = (
-    10_000_000  # between points of a lattice and sides: where it takes more, walls are thin and need no lattice
-)
 
 WaveNumber = Callable[[Array], Array]
 
@@ -109,6 +105,7 @@ class _Outline:
 
 
 def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
+    corner = 0.15  # radians: a larger turn is a corner
     pieces = 600  # of an outline, about, for which the size is found
     outline = body.outline_m
     along = np.roll(outline, -1, axis=0) - outline
@@ -119,8 +116,8 @@ def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
     point = outline[owner] + share[:, None] * along[owner]
     long = length > WALL * wall
     axial = outline[:, 0] == 0
-    kept = (turn > CORNER) | (long & np.roll(long, 1)) | axial
-    notch = outline[(turn > CORNER) & ~axial]
+    kept = (turn > corner) | (long & np.roll(long, 1)) | axial
+    notch = outline[(turn > corner) & ~axial]
     middle = (point + np.roll(point, -1, axis=0)) / 2
     away = np.linalg.norm(middle[:, None] - notch, axis=2).min(axis=1, initial=np.inf)
     wall = thickness(point)
@@ -206,6 +203,7 @@ def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
 
     Returns points (n, 2), the rim's first, and triangles; None where a side is missed.
     """
+    most_distances = 10_000_000
     from scipy.spatial import Delaunay, QhullError
 
     after = np.roll(rim, -1, axis=0)
@@ -216,7 +214,7 @@ def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
     points, step = [rim], float(own.min())
     while step < 2 * float(own.max()) + GROWTH * float((high - low).max()):
         rows, columns = (int(n) for n in np.ceil((high - low)[::-1] / step / [2 * 0.75**0.5, 2]))
-        if 4 * rows * columns * len(rim) < MOST_DISTANCES:
+        if 4 * rows * columns * len(rim) < most_distances:
             i, j = (g.ravel() for g in np.meshgrid(np.arange(-columns, columns + 1), np.arange(-rows, rows + 1)))
             lattice = (low + high) / 2 + step * np.stack([i + 0.5 * (j % 2), j * 0.75**0.5], axis=1)
             lattice = lattice[_inside(lattice, sides)]

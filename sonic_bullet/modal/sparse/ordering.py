@@ -13,8 +13,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-QUANTILES = (0.4, 0.45, 0.5, 0.55, 0.6)
-
 
 def _neighbours(tet: Array, n: int) -> tuple[Array, Array]:
     """Build the graph of the nodes as CSR (start (n+1,), neighbour): nodes of one tetrahedron are neighbours."""
@@ -37,6 +35,7 @@ def _touching(nodes: Array, mask: Array, start: Array, neighbour: Array) -> Arra
 
 def dissection(node_m: Array, tet: Array) -> Array:
     """Order the nodes node_m (n, 3) of a solid tet (t, k) for elimination: (n,)."""
+    quantiles = (0.4, 0.45, 0.5, 0.55, 0.6)
     leaf = 40
     n = len(node_m)
     start, neighbour = _neighbours(tet, n)
@@ -51,7 +50,7 @@ def dissection(node_m: Array, tet: Array) -> Array:
         point = node_m[nodes]
         best: tuple[float, Array, Array, Array] | None = None
         for axis in np.argsort(-np.ptp(point, axis=0), kind="stable")[:2]:
-            for level in np.quantile(point[:, axis], QUANTILES):
+            for level in np.quantile(point[:, axis], quantiles):
                 below = point[:, axis] <= level
                 left, right = nodes[below], nodes[~below]
                 if len(left) == 0 or len(right) == 0:

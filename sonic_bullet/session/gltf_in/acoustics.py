@@ -37,9 +37,6 @@ from sonic_bullet.session.gltf_in.own_words import (
 )
 from sonic_bullet.session.gltf_in.physics import AUDIO, BodyFrame
 
-OTHERWISE = "steel"
-"""Whose elastic constants a body has that rings and does not say what it is made of."""
-
 
 def audio_of(nodes: Nodes) -> Mapping[str, Any]:
     """Return the document's models, materials and surfaces."""
@@ -68,6 +65,7 @@ def material_of(
     nodes: Nodes, said: Mapping[str, Any], index: int, physics: PhysicsMaterial, notes: list[str]
 ) -> tuple[Material | None, Mapping[str, Any]]:
     """Make what a body's contacts are made of, None where nothing says it, and the acoustic material's own words."""
+    otherwise = "steel"  # Whose elastic constants a body has that rings and does not say what it is made of
     tree, audio, name = nodes.tree, audio_of(nodes), nodes.name(index)
     surface: Mapping[str, Any] = {}
     if "acousticSurface" in said:
@@ -82,10 +80,10 @@ def material_of(
         return None, bulk
     elastic: dict[str, Any] = {key: bulk.get(key) for key in ("youngsModulus", "poissonRatio", "density")}
     if missing := [key for key, value in elastic.items() if value is None]:
-        preset = load_material(OTHERWISE)
+        preset = load_material(otherwise)
         usual = {"youngsModulus": preset.youngs_pa, "poissonRatio": preset.poisson, "density": preset.density_kg_m3}
         elastic |= {key: usual[key] for key in missing}
-        notes.append(f"{name} says no {' and no '.join(missing)}: that of {OTHERWISE} is taken")
+        notes.append(f"{name} says no {' and no '.join(missing)}: that of {otherwise} is taken")
     called = str(surface.get("name") or f"surface of {name}")
     own = own_surface(surface)
     octaves, hurst = surface_octaves(tree, surface, called, [] if own is not None else notes)

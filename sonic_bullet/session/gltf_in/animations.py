@@ -15,8 +15,6 @@ from sonic_bullet.records.rigid_scene import BodyPath, RigidBody
 from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
 from sonic_bullet.session.gltf_in.physics import PHYSICS, body_frame
 
-KEYS_MOST = 1_000_000
-
 
 def paths_of(
     nodes: Nodes, number_of: Mapping[int, int], bodies: list[RigidBody], notes: list[str]
@@ -55,11 +53,12 @@ def _path(
     channels: Mapping[int, Mapping[str, Sampler]],
     time_s: Array,
 ) -> BodyPath:
+    keys_most = 1_000_000
     from scipy.spatial.transform import Rotation
 
     name, tree = nodes.name(index), nodes.tree
-    if len(time_s) > KEYS_MOST:
-        raise tree.error(f"{name} has {len(time_s)} keys, {KEYS_MOST} are the most", "export a shorter take")
+    if len(time_s) > keys_most:
+        raise tree.error(f"{name} has {len(time_s)} keys, {keys_most} are the most", "export a shorter take")
     matrix = np.eye(4)
     for one in chain:
         matrix = local_transforms(nodes.entry[one], channels.get(one, {}), time_s) @ matrix

@@ -26,12 +26,11 @@ from sonic_bullet.records.roughness import OCTAVES, WAVE_M, finish_octaves, octa
 
 ROUGHNESS_M, CORRELATION_M, SLOPE = 2e-6, 5e-5, -2.4
 """The draft's defaults: its machined finish."""
-SHORT_SHARE = 1 / 16
-PIXELS_MOST = 1 << 24
 
 
 def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: list[str]) -> tuple[Array, float]:
     """Rms heights (OCTAVES,) in m of an acoustic surface's finish, and its Hurst exponent."""
+    short_share = 1 / 16
 
     def length(key: str, otherwise: float) -> float:
         return as_number(said.get(key, otherwise), f"{name}: {key}", "give metres above 0", above=0)
@@ -47,7 +46,7 @@ def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: l
             raise tree.error(f"{name}: profile without a sampleSpacing", "give metres between its heights")
         notes.append(f"{name}: its profile is played by its spectrum, not height by height")
         return track_octaves(height, length("sampleSpacing", 1.0)), hurst
-    short = length("shortWavelength", correlation * SHORT_SHARE)
+    short = length("shortWavelength", correlation * short_share)
     if short < WAVE_M[-1] / 2**0.5:
         words = f"finishes finer than {WAVE_M[-1] * 1e6:.0f} µm are left out of what rolls and slides"
         if words not in notes:
@@ -97,6 +96,7 @@ def _texture_sides_m(tree: GltfTree, mesh: Mapping[str, Any], which: int) -> Arr
 
 def _slopes(tree: GltfTree, texture: Mapping[str, Any], name: str) -> Array:
     """Slopes (2, h, w) of a normal map, of height over length along u and v [glTF 2.0, sec. 3.9.3]."""
+    pixels_most = 1 << 24
     from PIL import Image
 
     known = one_of(tree, tree.tree.get("textures", ()), texture.get("index"), f"{name}: normalTexture")
@@ -111,7 +111,7 @@ def _slopes(tree: GltfTree, texture: Mapping[str, Any], name: str) -> Array:
     else:
         data = tree.neighbour(unquote(str(uri)))
     with Image.open(io.BytesIO(data)) as picture:
-        if picture.width * picture.height > PIXELS_MOST:
+        if picture.width * picture.height > pixels_most:
             raise tree.error(f"{name}: its normal map is too large", "give at most 4096 x 4096 pixels")
         colour = np.asarray(picture.convert("RGB"), float)
     normal = colour / 255 * 2 - 1

@@ -22,7 +22,6 @@ from sonic_bullet.session.gltf_in.node_frames import Nodes
 from sonic_bullet.session.gltf_in.physics import PHYSICS
 
 ALL = frozenset((0, 1, 2))
-APART_M = 1e-3
 
 
 def joint_of(
@@ -32,6 +31,7 @@ def joint_of(
 
     number_of: bodies by the numbers of their nodes. Raises the tree's error.
     """
+    apart_m = 1e-3
     said = nodes.extension(index, PHYSICS).get("joint")
     if said is None:
         return None
@@ -51,7 +51,7 @@ def joint_of(
     other = said.get("connectedNode")
     one_of(nodes.tree, nodes.entry, other, f"{name}: connectedNode")
     placed, partner = nodes.placed(index), _body_above(nodes, other, number_of)
-    if np.linalg.norm(placed.position_m - nodes.placed(other).position_m) > APART_M:
+    if np.linalg.norm(placed.position_m - nodes.placed(other).position_m) > apart_m:
         notes.append(f"{name}: the ends of its joint are apart at the start: it holds them where its own node is")
     axis = placed.turn[:, free]
     return RigidJoint(

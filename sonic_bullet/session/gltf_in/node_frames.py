@@ -17,8 +17,6 @@ from sonic_bullet.records.coerce import shown
 
 UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """World of glTF -> world with z up."""
-UNEVEN = 1e-4
-"""Share by which a scale may differ between axes and be rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +30,8 @@ class Placed:
     @property
     def uniform(self) -> bool:
         """Whether its scale is the same along all axes."""
-        return bool(np.ptp(self.scale) <= UNEVEN * self.scale.max())
+        uneven = 1e-4  # share by which a scale may differ between axes and be rounding
+        return bool(np.ptp(self.scale) <= uneven * self.scale.max())
 
 
 class Nodes:

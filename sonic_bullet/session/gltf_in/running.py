@@ -18,7 +18,6 @@ from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
 
 MICROPHONE = (0.0, -1.0, 0.5)
-QUIETEST_DB = -200.0
 
 
 def run_gltf(
@@ -71,12 +70,13 @@ def _cast(scene: RigidScene, ids: list[int]) -> dict[int, dict[str, Any]]:
 
 def _add_partners(stage: SceneStage, scene: RigidScene, ids: list[int]) -> None:
     """Who touches and does not ring, with what its contacts are made of; and whose sound has a gain."""
+    quietest_db = -200.0
     world = stage.need_listener().world
     for body_id, body in zip(ids, scene.bodies, strict=True):
         if body.material is not None and body.model is None and not body.solved:
             world.add(body_id, -1, material=body.material)
         if body.gain != 1:
-            stage.gain_db[body_id] = max(20 * math.log10(body.gain), QUIETEST_DB) if body.gain > 0 else QUIETEST_DB
+            stage.gain_db[body_id] = max(20 * math.log10(body.gain), quietest_db) if body.gain > 0 else quietest_db
 
 
 def _ultrasonic(scene: RigidScene, sr: int) -> list[str]:

@@ -39,7 +39,6 @@ from sonic_bullet.session.gltf_in.physics import (
     physics_of,
 )
 
-BYTES_MAX = 1 << 30
 REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
 READ = {PHYSICS, SHAPES, AUDIO, "KHR_texture_transform", "KHR_mesh_quantization"}
 LOOKS = ("KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "EXT_meshopt", "KHR_xmp")
@@ -53,8 +52,9 @@ def is_gltf(path: str | os.PathLike[str]) -> bool:
 
 def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
     """Bodies, materials and models of a scene. Raises FileError, SceneError, RecordError, each one line."""
+    bytes_max = 1 << 30
     with reading(path, "glTF scene", SceneError, REMEDY):
-        if Path(path).stat().st_size > BYTES_MAX:
+        if Path(path).stat().st_size > bytes_max:
             raise SceneError(f"{path} is larger than a gigabyte", "split it")
         return _scene_of(read_tree(Path(path), SceneError, REMEDY), Path(path).name)
 

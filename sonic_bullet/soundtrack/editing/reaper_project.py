@@ -16,9 +16,6 @@ from collections.abc import Iterator
 
 from sonic_bullet.soundtrack.editing.timeline import Timeline
 
-VERSION = '0.1 "6.0"'
-"""Version of the format: fields that it lacks have their defaults in any later Reaper."""
-
 
 def reaper_project(timeline: Timeline) -> bytes:
     """Write the text of NAME.rpp."""
@@ -26,8 +23,9 @@ def reaper_project(timeline: Timeline) -> bytes:
 
 
 def _lines(timeline: Timeline) -> Iterator[str]:
+    version = '0.1 "6.0"'  # Version of the format: fields that it lacks have their defaults in any later Reaper
     sr, film = timeline.sr, timeline.film
-    yield f"<REAPER_PROJECT {VERSION} 0"
+    yield f"<REAPER_PROJECT {version} 0"
     yield f"  PROJOFFS {_seconds(timeline.begins, sr)} 0 0"
     yield f"  SAMPLERATE {sr} 1 0"
     if film is not None:

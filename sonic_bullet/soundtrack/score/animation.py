@@ -20,8 +20,6 @@ STILL_M, STILL_RAD = 1e-5, 1e-4
 """A body that moves less from its first pose all the time does not move: a hundredth of a millimetre."""
 
 
-UNIT = 0.1
-"""Deviation of a quaternion's length from 1 allowed: rounding, and keys that are blended linearly."""
 QUARTER_RAD = np.pi / 2
 """Rotation from frame to frame above which the frame rate hides how a body rotates: it is known but for whole turns,
 and the next that fits, 2π less this one the other way, is no three times as fast."""
@@ -29,10 +27,11 @@ and the next that fits, 2π less this one the other way, is no three times as fa
 
 def check_orientations(names: Sequence[str], turn: Array) -> None:
     """Raise AnimationError, with body and frame, where a quaternion (t, b, 4) is not finite or has not the length 1."""
+    unit = 0.1  # Deviation of a quaternion's length from 1 allowed: rounding, and keys that are blended linearly
     if turn.ndim != 3 or turn.dtype.kind not in "fiu":
         return  # the record's own check reports it
     length = np.linalg.norm(turn.astype(float), axis=2)
-    wrong = ~(np.abs(length - 1) <= UNIT)
+    wrong = ~(np.abs(length - 1) <= unit)
     if wrong.any():
         frame, body = (int(i) for i in np.argwhere(wrong)[0])
         found = length[frame, body]

@@ -25,10 +25,6 @@ from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 
-DRIVEN_STEPS = 4
-"""Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting, too.
-Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting, too."""
-
 
 @dataclass(frozen=True, slots=True)
 class Moves:
@@ -44,6 +40,10 @@ class Moves:
 
 def moves_of(log: ContactLog) -> tuple[Moves, ...]:
     """Find the kinematic bodies of a log: marked as teleported, or of mass 0 and elsewhere than before."""
+    # Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for lasting,
+    # too. Steps in a row that a body is set at least to be driven: the shortest load that the run time takes for
+    # lasting, too.
+    driven_steps = 4
     by_hand = np.zeros((len(log.steps), len(log.bodies)), bool)
     before: Step | None = None
     mass = np.array([one.mass_kg for one in log.bodies])
@@ -61,8 +61,8 @@ def moves_of(log: ContactLog) -> tuple[Moves, ...]:
             numbers = [number for number, _ in group]
             if moved:
                 runs.append((numbers[0], numbers[-1] + 1))
-        drives = tuple(run for run in runs if run[1] - run[0] >= DRIVEN_STEPS)
-        teleports = tuple(n for first, stop in runs if stop - first < DRIVEN_STEPS for n in range(first, stop))
+        drives = tuple(run for run in runs if run[1] - run[0] >= driven_steps)
+        teleports = tuple(n for first, stop in runs if stop - first < driven_steps for n in range(first, stop))
         found.append(Moves(index, drives, teleports))
     return tuple(found)
 

@@ -21,9 +21,6 @@ from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import Animation, check_orientations
 
-RESTITUTION, FRICTION = 0.7, 0.7
-"""Of a body where none is stated: the pair's are products, 0.5 and 0.5."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rule:
@@ -129,6 +126,7 @@ def _stated_of(one: ExportedObject, rules: Sequence[Rule]) -> Rule:
 
 def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple[AnimatedBody, Array, Array]:
     """Build the body, its centre of mass in the object frame, and the quaternion of its principal axes there."""
+    restitution, friction = 0.7, 0.7  # of a body where none is stated: the pair's are products, 0.5 and 0.5
     centre, axes, moments, mass = np.zeros(3), np.array([0.0, 0, 0, 1]), np.zeros(3), 0.0
     shapes = one.shapes
     if one.mesh is not None:
@@ -157,8 +155,8 @@ def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple
     kinematic = bool(said.driven) or (moves and said.mass_kg == 0)
     made = AnimatedBody(
         one.name, shapes, mass if moves else 0.0, moments,
-        RESTITUTION if said.restitution is None else said.restitution,
-        FRICTION if said.friction is None else said.friction, kinematic and moves,
+        restitution if said.restitution is None else said.restitution,
+        friction if said.friction is None else said.friction, kinematic and moves,
     )  # fmt: skip
     return made, centre, axes
 

@@ -18,12 +18,9 @@ STEADY = 0.1
 LEAST_FRAMES = 4
 FALL_RANGE = (0.02, 5.0)
 """Falls below are a slow motion of 1:7, and above another unit of length."""
-HANDED = 0.5
 SIGMAS = 5.0
 REST_FRAMES, WHITE, QUIETER = 16, 5.0, 4.0
 """Frames of a rest from which noise is estimated; see _rests."""
-MAD = 1.4826
-"""Standard deviation over median absolute deviation, of a normal distribution."""
 
 
 def accelerations(animation: Animation, apart: int = 1) -> Array:
@@ -85,6 +82,7 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     From the third differences of flights, in which a parabola has none, or else of bodies at rest, which show no
     rounding. apart (t, b): which bodies are near no other.
     """
+    mad = 1.4826  # Standard deviation over median absolute deviation, of a normal distribution
     flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
     who = animation.free & animation.moving
     calm = flies & who
@@ -93,7 +91,7 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     if calm.sum() < LEAST_FRAMES:
         return None
     third = np.diff(animation.position_m, 3, axis=0)[calm]  # of white noise √20 σ
-    return float(MAD * np.median(np.abs(third), axis=0).max() / np.sqrt(20))
+    return float(mad * np.median(np.abs(third), axis=0).max() / np.sqrt(20))
 
 
 def _rests(position_m: Array) -> Array:
@@ -123,18 +121,19 @@ def hidden_n_s(mass_kg: float, noise_m: float, fps: float) -> float:
 
 def driven_bodies(animation: Animation, apart: Array, noise_m: float | None = None) -> Array:
     """Find bodies (b,) that are driven though not marked: in most frames without contact they do not fall."""
+    handed = 0.5
     pull = float(np.linalg.norm(animation.gravity_m_s2))
     found = np.array([one.driven for one in animation.bodies], bool)
     if pull == 0:
         return found
-    frames = frames_apart(animation, noise_m, HANDED * pull)
+    frames = frames_apart(animation, noise_m, handed * pull)
     fall = accelerations(animation, frames) - animation.gravity_m_s2
-    wrong = np.linalg.norm(fall, axis=2) > HANDED * pull
+    wrong = np.linalg.norm(fall, axis=2) > handed * pull
     flies = np.lib.stride_tricks.sliding_window_view(apart, 2 * frames + 1, axis=0).all(axis=2)
     moving = animation.moving & (np.array([one.mass_kg for one in animation.bodies]) > 0)
     enough = flies.sum(axis=0) >= LEAST_FRAMES
     share = (wrong & flies).sum(axis=0) / np.maximum(flies.sum(axis=0), 1)
-    return np.asarray(found | (moving & enough & (share > HANDED)))
+    return np.asarray(found | (moving & enough & (share > handed)))
 
 
 def hidden_turns(animation: Animation) -> Array:

@@ -27,8 +27,6 @@ from sonic_bullet.soundtrack.score.animation import Animation
 
 TOUCH_M = 1.5e-3
 """How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""
-EVEN = 1e-4
-"""Ridge, of the largest singular value: places of one face get even loads."""
 
 
 def momentum_changes(animation: Animation, motion: Array, hidden_m_s: float = 0.0) -> Array:
@@ -146,6 +144,7 @@ def _along(raw: Array, speeds: Array, at: Array, a: Array, b: Array) -> Array:
 
 def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage: PoseStage) -> Array:
     """Return the RAW rows with forces whose impulses over a frame give each body its `change` (b, 6), no others."""
+    even = 1e-4  # Ridge, of the largest singular value: places of one face get even loads
     if not len(raw):
         return raw
     from scipy.optimize import nnls
@@ -175,7 +174,7 @@ def loaded(animation: Animation, motion: Array, raw: Array, change: Array, stage
                     wrench = np.concatenate([force, np.cross(arm, force)], axis=1)
                     matrix[i : i + 6, 4 * c : 4 * c + 4] += sign * whiten[body] @ wrench.T
         right = np.concatenate([whiten[x] @ change[x] for x in tells])
-        ridge = np.sqrt(EVEN) * np.linalg.norm(matrix, 2) * np.eye(matrix.shape[1]) / 10
+        ridge = np.sqrt(even) * np.linalg.norm(matrix, 2) * np.eye(matrix.shape[1]) / 10
         share = nnls(np.concatenate([matrix, ridge]), np.concatenate([right, np.zeros(len(ridge))]))[0]
         pyramid = share.reshape(-1, 4) * animation.fps
         out["force_n"][rows] = pyramid.sum(axis=1)

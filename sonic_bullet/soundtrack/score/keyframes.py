@@ -25,8 +25,6 @@ from sonic_bullet.soundtrack.frame_rates import fraction_of
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 
 FORMAT = "sonic-bullet-animation/1"
-BYTES_MAX = 1 << 30
-_REMEDY = "see docs/reference/animation.md, or export it again"
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -73,9 +71,11 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
 
     fps: in place of its own; scale: of lengths, besides its unit. Raises FileError, AnimationError.
     """
+    bytes_max = 1 << 30
+    remedy = "see docs/reference/animation.md, or export it again"
     place = Path(path)
-    with reading(path, "animation", AnimationError, _REMEDY):
-        if place.stat().st_size > BYTES_MAX:
+    with reading(path, "animation", AnimationError, remedy):
+        if place.stat().st_size > bytes_max:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         if place.suffix.lower() == ".npz":
             made, arrays = read_container(place, _File, FORMAT, "animation")
@@ -83,7 +83,7 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
             position, turn = (_numbers(arrays, name, many, n) for name, n in (("position", 3), ("quaternion_xyzw", 4)))
             poses = [(position[:, i], turn[:, i]) for i in range(many)]
         else:
-            made = decode_json(place.read_bytes(), _File, f"animation {path}", AnimationError, _REMEDY)
+            made = decode_json(place.read_bytes(), _File, f"animation {path}", AnimationError, remedy)
             poses = [_poses(one) for one in made.bodies]
         frames = max((len(p) for p, _ in poses), default=0)
         unit, up = made.unit_m * scale, made.up

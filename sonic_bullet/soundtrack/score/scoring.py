@@ -39,7 +39,6 @@ from sonic_bullet.soundtrack.score.flight import (
 )
 from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
-ENDINGS = (".glb", ".gltf", ".json", ".npz")
 MICROPHONE = (0.0, -1.0, 0.5)
 DEEP_M = 0.01
 """How deep poses may overlap at a frame and still be one touch of two bodies."""
@@ -51,9 +50,10 @@ def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale
     fps: frames a second in place of its own; scale: of its lengths, 0.01 for centimetres. Raises FileError,
     AnimationError.
     """
+    endings = (".glb", ".gltf", ".json", ".npz")
     place = Path(as_path(path, "path", "name an animation, such as take1.glb"))
-    if place.suffix.lower() not in ENDINGS:
-        raise AnimationError(f"{place} is no animation by its name", f"give one that ends in {', '.join(ENDINGS)}")
+    if place.suffix.lower() not in endings:
+        raise AnimationError(f"{place} is no animation by its name", f"give one that ends in {', '.join(endings)}")
     if not place.is_file():
         raise FileError(f"cannot read {place}: no such file", "give an animation")
     if fps is not None:

@@ -27,7 +27,6 @@ POSE_M, SPEED_M_S = 1e-4, 3e-2
 """σ_x, σ_v: a pose is trusted to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
 about a step of the simulation.
 """
-RESTITUTIONS = (0.0, 0.3, 0.5, 0.65, 0.8, 0.95)
 NUDGE = 0.01  # m/s, and of restitution
 FORCES = ("force_n", "friction_1_n", "friction_2_n")
 ENOUGH = 4.0
@@ -199,11 +198,12 @@ class Shooting:
 
     def _searched(self, k: int) -> _Try:
         """Search the best start at frame k."""
+        restitutions = (0.0, 0.3, 0.5, 0.65, 0.8, 0.95)
         rounds = 4
         best = self._shot(k, self._prior.copy(), self._given)
         best = self._flown(k, best)
         touching = best.shot.touching.copy()
-        others = [self._shot(k, best.speed, self._with(e)) for e in RESTITUTIONS] if touching.any() else []
+        others = [self._shot(k, best.speed, self._with(e)) for e in restitutions] if touching.any() else []
         for one in others:
             touching |= one.shot.touching
         islands = self._islands(touching)

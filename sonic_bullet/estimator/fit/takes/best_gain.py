@@ -27,8 +27,6 @@ from sonic_bullet.records import Array
 STEP_DB, WITHIN_DB = 1.0, 2.0
 BELOW_DB, OVER_DB = 10.0, 40.0
 """The grid begins where the loudest cell is that far below its noise, and ends that far over equal energy."""
-NEARER_DB = 0.05
-"""Than silence: what is printed as the same is the same."""
 CELLS = 6000
 """Of a window and of a kind that the grid is searched by, at most: D to some 0.1 dB."""
 LOWEST = 2
@@ -101,6 +99,7 @@ def _refined(
     power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, searched: tuple[Array, Array], recorded: bool
 ) -> BestGain:
     """Return the best gain about the lowest minima of a search, by all cells."""
+    nearer_db = 0.05  # Than silence: what is printed as the same is the same
     grid, costs = searched
     silence = BestGain(0.0, distance_at(power, made, floor, 0.0))
     padded = np.concatenate([[np.inf], costs, [np.inf]])
@@ -116,7 +115,7 @@ def _refined(
         best = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.1})
         found += [BestGain(float(10 ** (best.x / 20)), float(best.fun))] if np.isfinite(best.fun) else []
     nearest = min(found, key=lambda one: one.distance_db, default=silence)
-    return silence if nearest.distance_db > silence.distance_db - NEARER_DB else nearest
+    return silence if nearest.distance_db > silence.distance_db - nearer_db else nearest
 
 
 def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Array:

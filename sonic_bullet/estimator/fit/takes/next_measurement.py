@@ -19,8 +19,6 @@ from sonic_bullet.estimator.fit.typical_strike import ringing
 ATTACK_S = 0.02
 NOT_MODAL = 0.5
 """Of the energy within ATTACK_S, that lines which ring do not describe."""
-STRONG = 1e-2
-"""Of the strongest line's energy: a line worth another strike."""
 
 
 def next_measurement(found: CaseFit) -> str:
@@ -78,9 +76,10 @@ def _attack_left(e: RecordedObject) -> float:
 
 def _within_widths(e: RecordedObject) -> tuple[float, float] | None:
     """Return the strongest neighbours of the lines that ring which lie within half the widths d/π of both."""
+    strong = 1e-2  # of the strongest line's energy: a line worth another strike
     keep = ringing(e.lines)
     energy = np.nan_to_num(e.lines.energy)
-    keep = keep[energy[keep] >= STRONG * energy[keep].max(initial=0)]
+    keep = keep[energy[keep] >= strong * energy[keep].max(initial=0)]
     found = [
         (float(min(energy[a], energy[b])), float(e.lines.freq_hz[a]), float(e.lines.freq_hz[b]))
         for a, b in pairwise(keep)
