@@ -17,6 +17,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 SIDES = ("before", "after")  # the folders of --predict
+SHOWN = 4  # numbers of a list, in the summary: all of them are in the JSON
 
 
 def run_diagnose(
@@ -81,6 +82,7 @@ def _summary(found: Any) -> str:
     """Format the diagnosis for a terminal."""
     from sonic_bullet.diagnosis.deciding_measurement import next_measurement
     from sonic_bullet.diagnosis.remainder import NOTHING
+    from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
     from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 
     splits = {r.split for r in found.case.recordings}
@@ -117,12 +119,8 @@ def _summary(found: Any) -> str:
     text.append(table(("log-spectral distance", "before", "after"), rows))
     if found.errors["floor"] is not None:
         text.append(f"noise alone: {found.errors['floor']:.2f} dB")
-    others = [c for c in found.closed.tried if c.id not in {a.id for a in found.closed.added}]
-    if others:
-        text.append(
-            "tried and not kept: "
-            + "; ".join(f"{c.id} {c.mean_db:+.2f} dB (chance {c.control_db:+.2f})" for c in others)
-        )
+    if tried := effect_table(found.closed):
+        text.append(table(HEAD, [row.cells() for row in tried]))
     if found.unexplained:
         text.append(f"left: {found.unexplained['words']}")
     if said := next_measurement(found.found, found.closed, found.unexplained):
@@ -134,7 +132,8 @@ def _number(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list):
-        return "[" + ", ".join(_number(v) for v in value) + "]"
+        more = f", and {len(value) - SHOWN} more" if len(value) > SHOWN else ""
+        return "[" + ", ".join(_number(v) for v in value[:SHOWN]) + more + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{k} {_number(v)}" for k, v in value.items()) + "}"
     return str(value)

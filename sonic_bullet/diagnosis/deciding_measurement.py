@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement as of_fit
@@ -17,8 +18,6 @@ DIFFERS = 0.5
 """Standard deviation of ln of what is left, over strikes: more goes with the place or the strike."""
 NO_MODE = 0.5
 """Of what is left, that no modes play."""
-SLOPE = 0.3
-"""Of ln of what is left against ln J: more goes with strength."""
 
 
 def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[str, Any]) -> str:
@@ -29,12 +28,12 @@ def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[s
 def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
     """Yield a measurement for each thing that is open, the most important first."""
     most = max(left["when"], key=left["when"].__getitem__)
-    slope = left["slope_against_impulse"]
+    slope, slope_sd = left["slope_against_impulse"], left["slope_standard_error"]
     if len(end.judged) == 1:
         yield "strike the same place again, three times or more: no effect can be told by one strike"
     if any(isinstance(c.effect, Dereverberates) and c.mean_db > 0 for c in end.tried) and most != "first":
         yield "record at half the distance and at twice it: what the room adds stays, what the body radiates does not"
-    if slope is not None and abs(slope) > SLOPE:
+    if slope is not None and abs(slope) > RULES.standard_errors * slope_sd:
         yield "strike one place at five strengths from soft to hard, force recorded: what is left goes with strength"
     if left["share_of_no_modes"] > NO_MODE and most == "first":
         yield (

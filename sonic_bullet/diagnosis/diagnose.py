@@ -25,6 +25,7 @@ from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_ea
 from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db, take_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import listing, remainder
+from sonic_bullet.diagnosis.selection.effect_table import effect_table
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
@@ -258,8 +259,7 @@ def predictions(d: Diagnosis) -> list[tuple[str, int, Array, Array]]:
 
 def described(d: Diagnosis) -> dict[str, Any]:
     """Return the diagnosis as JSON holds it."""
-    from sonic_bullet.diagnosis.selection.stepwise import described as tried
-
+    parameters = {c.id: c.effect.parameters() for c in (*d.closed.tried, *d.closed.added)}
     return {
         "case": d.case.name,
         "verdict": d.verdict,
@@ -275,7 +275,19 @@ def described(d: Diagnosis) -> dict[str, Any]:
             }
             for c in d.closed.added
         ],
-        "candidates": tried(d.closed.tried),
+        "candidates": [
+            {
+                "id": row.id,
+                "numbers": row.numbers,
+                "cv_error_drop_db": row.nearer_db,
+                "standard_error_db": row.standard_error_db,
+                "null_drop_db": row.chance_db,
+                "strikes": row.strikes,
+                "word": row.word,
+                "parameters": parameters[row.id],
+            }
+            for row in effect_table(d.closed)
+        ],
         "errors": d.errors,
         "errors_sone": d.errors_sone,
         **({"errors_lines": d.errors_lines} if d.errors_lines else {}),

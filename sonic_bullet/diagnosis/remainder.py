@@ -54,10 +54,10 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     ]
     when = [float(np.nanmean(row)) for row in whole]
     total = np.nanmean(share, axis=(1, 2))
-    slope = (
+    slope, slope_sd = (
         _slope(np.log(level), np.log(np.maximum(total, 1e-9)))
         if np.ptp(np.log(level)) > 0.3 and len(total) > 2
-        else None
+        else (None, None)
     )
     scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
     thirds = ["first", "second", "last"]
@@ -65,14 +65,11 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     words += f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
         f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in bands[:2]
     )
-    if slope is not None:
-        words += (
-            "; its share grows with the strike"
-            if slope > 0.3
-            else "; its share falls with the strike"
-            if slope < -0.3
-            else "; its share does not depend on the strike's strength"
-        )
+    if slope is not None and slope_sd is not None:
+        # by two standard errors: of few strikes a slope alone says nothing
+        significant = abs(slope) > RULES.standard_errors * slope_sd
+        goes = f"{'grows' if slope > 0 else 'falls'} with the strike" if significant else "hardly goes with the strike"
+        words += f"; its share {goes} (as its impulse to the power {slope:.1f} ± {slope_sd:.1f})"
     if len(total) > 1:
         words += f"; {_places(takes, scatter)}"
     strange = of_no_body(takes, made)
@@ -94,6 +91,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         "bands_off": [asdict(band) for band in end.bands],
         "when": dict(zip(thirds, when, strict=True)),
         "slope_against_impulse": slope,
+        "slope_standard_error": slope_sd,
         "scatter_over_strikes": scatter,
         "share_of_no_modes": strange,
         "lines_again_at_ratio": again,
@@ -129,7 +127,9 @@ def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Arr
     """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
-    edges = edges[edges < 0.5 * sr]
+    lowest = min((float(made[t.body].model.freq_hz.min(initial=np.inf)) for t in takes), default=np.inf)
+    lowest = min([lowest, *(float(g.lines.freq_hz.min(initial=np.inf)) for t in takes if (g := t.body.recorded))])
+    edges = edges[(edges < 0.5 * sr) & (edges * 2 ** (1 / 3) > min(lowest, 0.25 * sr))]  # below rings no mode, no line
     rows, level = [], []
     shape = np.hanning(WINDOW)
     for take in takes:
@@ -153,7 +153,9 @@ def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Arr
     return np.array(rows), edges, np.array(level)
 
 
-def _slope(x: Array, y: Array) -> float:
-    """Compute the slope of y over x by least squares."""
-    x = x - x.mean()
-    return float((x * (y - y.mean())).sum() / max(float((x * x).sum()), 1e-300))
+def _slope(x: Array, y: Array) -> tuple[float, float]:
+    """Compute the slope of y over x, three points or more, by least squares, and its standard error."""
+    x, y = x - x.mean(), y - y.mean()
+    size = max(float((x * x).sum()), 1e-300)
+    slope = float((x * y).sum()) / size
+    return slope, float(np.sqrt(((y - slope * x) ** 2).sum() / (len(x) - 2) / size))

@@ -19,6 +19,7 @@ from sonic_bullet.diagnosis.diagnose import Diagnosis
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import predict_takes
+from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
 from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
@@ -153,18 +154,9 @@ def _plane(d: Diagnosis) -> str:
 
 
 def _candidates(d: Diagnosis) -> str:
-    kept = {c.id for c in d.closed.added}
-    rows = [
-        (
-            c.id,
-            "added" if c.id in kept else "no",
-            f"{c.mean_db:+.2f}",
-            f"{c.control_db:+.2f}",
-            " ".join(f"{x:+.2f}" for x in c.drop_db),
-        )
-        for c in sorted(d.closed.tried, key=lambda c: -c.mean_db)
-    ]
-    head = ("candidate", "kept", "nearer, dB", "chance, dB", "strike by strike, each left out in turn")
+    drop = {c.id: " ".join(f"{x:+.2f}" for x in c.drop_db) for c in (*d.closed.tried, *d.closed.added)}
+    rows = [(*row.cells(), drop[row.id]) for row in effect_table(d.closed)]
+    head = (*HEAD, "strike by strike, each left out in turn")
     silent = "<p>Candidates that do not stand here found nothing of theirs in the recordings.</p>"
     return "<h2>Candidate effects</h2>" + (_table(head, rows) if rows else "") + silent
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, may_be_accepted, needed
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, may_be_accepted, needed, refusal
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.radiation import Radiation
@@ -112,3 +112,11 @@ def test_whatever_is_accepted_had_hope(strikes: int, certain: bool) -> None:
             kept += 1
             assert may_be_accepted(replace(one, drop_db=one.drop_db[:2]), open_db, gap), (one.drop_db, open_db)
     assert kept > 100
+
+
+def test_a_refusal_says_its_rule() -> None:
+    """Each rule in words with its number; none of what is accepted."""
+    assert refusal(candidate(1.0, 1.1, 0.9, 1.0), 2.0, first=True) == ""
+    assert "must come 0.40 dB nearer" in refusal(candidate(0.1, 0.1, 0.1, 0.1), 2.0, first=True)
+    assert "standard errors" in refusal(candidate(4.0, -1.0, 0.2, -0.4), 2.0, first=True)
+    assert "chance" in refusal(candidate(1.0, 1.1, 0.9, 1.0, control_db=0.95), 2.0, first=True)

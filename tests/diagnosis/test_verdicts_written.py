@@ -69,6 +69,7 @@ CASES: list[tuple[Callable[[], Struck], tuple[Any, ...], str, str]] = [
 def test_every_verdict_can_be_written(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
     made: Callable[[], Struck],
     effects: tuple[Any, ...],
     verdict: str,
@@ -92,6 +93,11 @@ def test_every_verdict_can_be_written(
     assert written["verdict"] == verdict
     assert words in written["unexplained"].get("words", "")
     assert [one["id"] for one in written["effects"]] == ["damping-law"] * (verdict == "explained")
+    for row in written["candidates"]:
+        assert (row["word"] == "named") == (row["id"] in {one["id"] for one in written["effects"]}) and row["word"]
+        assert row["standard_error_db"] > 0 and row["numbers"] == -1 and row["strikes"] == len(takes)
+    said = capsys.readouterr().out
+    assert ("named, or why not" in said) == bool(written["candidates"])
     assert written["baseline"]["gamma_m2_s2"] is None and written["errors"]["floor"] is None
     if "dB more" in words:
         assert all(isinstance(band["early"], bool) for band in written["unexplained"]["bands_off"])

@@ -49,6 +49,8 @@ class Candidate:
         Gain in likelihood of lines left out (decay_test.py).
     impulse_n_s : (s,)
         Of the strikes.
+    why_not : str
+        The rule that kept it out in its last round; empty of what was accepted.
     """
 
     id: str
@@ -60,6 +62,7 @@ class Candidate:
     spread: dict[str, Any]
     lines: float = 0.0
     impulse_n_s: np.ndarray[Any, Any] = field(default_factory=lambda: np.zeros(0))
+    why_not: str = ""
 
     @property
     def mean_db(self) -> float:
@@ -114,16 +117,22 @@ def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
 
 def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
     """Decide whether a candidate explains enough, significantly, and more than chance; first: see needed."""
+    return not refusal(c, gap_db, first=first)
+
+
+def refusal(c: Candidate, gap_db: float, *, first: bool) -> str:
+    """Return why a candidate is not accepted; empty where it is. first: see needed."""
     if len(c.drop_db) == 0:
-        return False
+        return "no strike could be left out"
     need = needed(gap_db, first=first, certain=c.certain)
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
-        return False
+        return f"strikes left out must come {need:.2f} dB nearer"
     more = c.whole_db - max(c.control_db, 0.0)  # a control effect is not held against corrections either
+    chance = "" if more > RULES.chance_share * need else "chance comes as near"
     drop = np.sort(c.drop_db)
     if c.certain and c.loud and -np.minimum(drop, 0).sum() < RULES.lost_share * drop[-1]:
         # what goes with level is for the loudest to show, which these others were fitted without
-        return more > RULES.chance_share * need
+        return chance
     if len(drop) > RULES.many_strikes and drop[1:].mean() > RULES.odd_strike_factor * max(
         need, needed(gap_db, first=first)
     ):
@@ -135,10 +144,10 @@ def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
         and (drop[-2] > need or (first and c.certain and c.loud))
     ):
         # no strike speaks against it, though loud ones may gain far more than soft ones
-        return more > RULES.chance_share * need
-    return bool(drop.mean() > RULES.standard_errors * sd) and more > max(
-        RULES.standard_errors * sd, RULES.chance_share * need
-    )
+        return chance
+    if not drop.mean() > RULES.standard_errors * sd:
+        return f"less than {RULES.standard_errors:g} standard errors"
+    return chance or ("" if more > RULES.standard_errors * sd else "chance comes as near")
 
 
 def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:

@@ -1,12 +1,13 @@
 """Choice of the accepted candidate that is added, and of the added ones that are still needed at the end.
 
-able -> on all strikes together it helps, too -> the best, or the simplest of those that strikes cannot separate from
-    it -> phases, where two are nearly the same
+every candidate of a round -> why it is not accepted, if it is not; on all strikes together it helps, too -> the best,
+    or the simplest of those that strikes cannot separate from it -> phases, where two are nearly the same
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,12 +17,28 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, move
 from sonic_bullet.diagnosis.prediction.prediction import predict_fitted
 from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed, refusal
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.diagnosis.selection.decay_test import numbers, of_decays, tells
 from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Evidence
+
+
+def examined(
+    found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool
+) -> list[Candidate]:
+    """Return a round's candidates, each with why it is not accepted; else lines may favour one. full: a room anew."""
+
+    def why_not(c: Candidate) -> str:
+        why = refusal(c, max(now.gap_db, 0.0), first=first)
+        return why or ("" if helps(c, problem, now, full, first=first) else "all strikes together come no nearer")
+
+    made = [replace(c, why_not=why_not(c)) for c in found]
+    if all(c.why_not for c in made):
+        by = max((c for c in made if by_lines(c, problem, full)), key=lambda c: c.lines, default=None)
+        made = [replace(c, why_not="") if c is by else c for c in made]
+    return made
 
 
 def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> bool:

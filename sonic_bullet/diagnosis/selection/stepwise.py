@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,13 +33,13 @@ from sonic_bullet.diagnosis.prediction.score import (
     predict_takes,
 )
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted
+from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
-from sonic_bullet.diagnosis.selection.simplest import by_lines, helps, pruned, simplest
+from sonic_bullet.diagnosis.selection.simplest import examined, pruned, simplest
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence, Stage
 
@@ -62,6 +62,8 @@ class Closed:
         Where levels are off, which is why the verdict is not `none`.
     judged, left_out : Comparable, tuple of LeftOut
         What the hypotheses were compared with, and what could not be compared.
+    withheld : tuple of str, str
+        Ids of accepted effects that the verdict does not name, and why not; empty of others.
     """
 
     before: Hypothesis
@@ -76,6 +78,7 @@ class Closed:
     bands: tuple[BandOff, ...]
     judged: Comparable
     left_out: tuple[LeftOut, ...]
+    withheld: tuple[tuple[str, ...], str] = ((), "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +175,11 @@ def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, lef
         bands = bands_off(problem.takes, made if by is start else problem.predict(by))
     if bands:
         verdict, off = "unexplained", 0.0
+    withheld: tuple[tuple[str, ...], str] = ((), "")
     if verdict != "explained":
+        if added:
+            closes = 1 - now.gap_db / max(before - now.floor_db, 1e-9)
+            withheld = tuple(c.id for c in added), f"they close {100 * closes:.0f} % of the gap, which is too little"
         h, now, added = start, replace(now, distance_db=before), []
     tried = tuple(last.values())
     return Closed(
@@ -188,6 +195,7 @@ def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, lef
         bands,
         problem.takes,
         left_out,
+        withheld,
     )
 
 
@@ -233,9 +241,9 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         other = reidentified(h, problem.bodies)
         full = now if other is h else replace(now, distance_db=problem.distance_db(other))
         costly = full.gap_db > RULES.costly_open_share * (before_db - now.floor_db)
-        found = cross_validated(h, drawn, evidence, costly=costly)
+        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, first=not added)
         last |= {c.id: c for c in found}
-        pair, acceptable = None, _acceptable(found, problem, now, full, first=not added)
+        pair, acceptable = None, [c for c in found if not c.why_not]
         if not added:
             first, weak = (
                 found,
@@ -247,9 +255,10 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
             pair = pairwise(start, found, problem) if weak else None
         pair = pair or _room_anew(h, acceptable, found, problem)
         if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
-            found = cross_validated(h, drawn.only(*late), evidence, costly=costly)
+            late_ones = cross_validated(h, drawn.only(*late), evidence, costly=costly)
+            found = examined(late_ones, problem, now, full, first=not added)
             last |= {c.id: c for c in found}
-            acceptable = _acceptable(found, problem, now, full, first=not added)
+            acceptable = [c for c in found if not c.why_not]
             pair = _room_anew(h, acceptable, found, problem)
         if pair:
             (h, added), passed = pair, [(), ()]
@@ -259,6 +268,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         if not acceptable:
             break
         best = simplest(acceptable, problem.bodies, evidence)
+        last |= {c.id: replace(c, why_not=f"{best.id} was taken first") for c in acceptable if c is not best}
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
         if isinstance(best.effect, Dereverberates) and problem.distance_db(h) > now.distance_db:
             h = reidentified(h, problem.bodies)  # a room's response by lines so far off that it sounds worse than none
@@ -273,16 +283,6 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
     if again is not h and (distance_db := problem.distance_db(again)) < now.distance_db:
         h, now = again, replace(now, distance_db=distance_db)
     return Rounds(h, now, added, first, last, weak)
-
-
-def _acceptable(
-    found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool
-) -> list[Candidate]:
-    """Select the candidates that strikes left out favour, else the one that lines do; full: with a room anew."""
-    able = [
-        c for c in found if accepted(c, max(now.gap_db, 0.0), first=first) and helps(c, problem, now, full, first=first)
-    ]
-    return able or sorted((c for c in found if by_lines(c, problem, full)), key=lambda c: -c.lines)[:1]
 
 
 def _room_anew(
@@ -330,11 +330,3 @@ def _by_a_finer_mesh(
             both, added, ideal.distance_db, replace(ideal, distance_db=problem.distance_db(both)), problem
         )
     return verdict, off if verdict != "unexplained" else 0.0, far
-
-
-def described(candidates: Sequence[Candidate]) -> list[dict[str, Any]]:
-    """Return the candidates as JSON holds them."""
-    return [
-        {"id": c.id, "cv_error_drop_db": c.mean_db, "null_drop_db": c.control_db, "parameters": c.effect.parameters()}
-        for c in candidates
-    ]
