@@ -155,7 +155,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         world = self._world
         world.steps.clear()
         self._listener.read()  # the sound of steps outside of env.step is part of no observation
-        with world.hearing(self._listener.step):
+        with self._listener.together(), world.hearing(self._listener.step):
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
         new = self._listener.read()

@@ -26,13 +26,13 @@ from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.render.surface.rigid_motion import with_rigid
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
-from sonic_bullet.residual.player import SECTION, Grain, Rubbed, rubbed, section_grain
+from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain
 from sonic_bullet.residual.transfer import StruckModes
 from sonic_bullet.synth.bank import ModeSet, audible
 from sonic_bullet.synth.pulse import pulse_spectrum
 
 if TYPE_CHECKING:
-    from sonic_bullet.render.synthesis_state import StepScratch
+    from sonic_bullet.render.synthesis_state import Setup, State, StepScratch
 
 Rubs = Mapping[tuple[int, int, int], Rubbed]
 """By lower body, higher body and side: the force so far."""
@@ -280,6 +280,25 @@ def friction_grains(
                 if len(sample):
                     grains.append(Grain((number + 2) * SECTION, w, body, sample))
     return grains, kept
+
+
+def add_residuals(setup: Setup, state: State, step: Array, found: int, drives: int) -> None:
+    """Add the residuals' grains of the step to the modes."""
+    first, n, sr, room = int(step["sample"]), int(step["count"]), setup.sr, state.scratch
+    modes = state.table.bodies["modes"]
+    pulses = pulses_of(room, found, modes, float(step["begin_s"]), float(step["after_s"]))
+    rubs = drives_of(room, drives, modes, n)
+    more, state.rubs = friction_grains(
+        state.rubs, rubs, state.resonators, state.voices, state.body, first, n, setup.seed
+    )
+    struck = (
+        grain
+        for begin_s, one in pulses
+        for grain in impact_grains(one, begin_s, state.resonators, state.voices, sr, first, setup.seed)
+    )
+    state.grains = (*state.grains, *struck, *more)
+    state.grains = add_grains(room.source[:, :, :n], state.grains, first)
+    room.sounds[:, 0] = 1  # whatever rings, a grain may have sounded
 
 
 def with_lines(resonator: Resonator, voice: ResidualVoice | None) -> ModeSet:

@@ -23,7 +23,7 @@ from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.groups import DriverCall, Frames, StepTables
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
-from sonic_bullet.render.residual_voice import drives_of, friction_grains, impact_grains, pulses_of
+from sonic_bullet.render.residual_voice import add_residuals
 from sonic_bullet.render.ringing_on import with_tail
 from sonic_bullet.render.space.directions import take_aim, until_turned
 from sonic_bullet.render.space.space_state import hears_apart
@@ -31,7 +31,6 @@ from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.surface.finished_channels import finish_channels
 from sonic_bullet.render.surface.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
-from sonic_bullet.residual.player import add_grains
 from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.clock import Clock, exact_step
 from sonic_bullet.synth.path_kernel import AT_REST
@@ -125,7 +124,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
         elif status == driver.PAUSED:
             found, drives = state.scratch.count.tolist()
             if state.has_residual:
-                _add_residuals(setup, state, table[done], found, drives)
+                add_residuals(setup, state, table[done], found, drives)
             if state.witness is not None:
                 state.witness(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
         elif status == driver.BROKEN:
@@ -163,25 +162,6 @@ def _make_room(state: State, step: Array, samples: int) -> None:
     state.ringing.with_room(4 * pairs)
     state.scratch.fit(pairs, columns, samples, state.bank.observed.shape)
     state.changed()
-
-
-def _add_residuals(setup: Setup, state: State, step: Array, found: int, drives: int) -> None:
-    """Add the residuals' grains of the step to the modes."""
-    first, n, sr, room = int(step["sample"]), int(step["count"]), setup.sr, state.scratch
-    modes = state.table.bodies["modes"]
-    pulses = pulses_of(room, found, modes, float(step["begin_s"]), float(step["after_s"]))
-    rubs = drives_of(room, drives, modes, n)
-    more, state.rubs = friction_grains(
-        state.rubs, rubs, state.resonators, state.voices, state.body, first, n, setup.seed
-    )
-    struck = (
-        grain
-        for begin_s, one in pulses
-        for grain in impact_grains(one, begin_s, state.resonators, state.voices, sr, first, setup.seed)
-    )
-    state.grains = (*state.grains, *struck, *more)
-    state.grains = add_grains(room.source[:, :, :n], state.grains, first)
-    room.sounds[:, 0] = 1  # whatever rings, a grain may have sounded
 
 
 def drained(setup: Setup, state: State, last: Step | None) -> Array:
@@ -256,21 +236,30 @@ class Synthesizer:
         bodies: by index, at least those new in the step. Without a sensor nothing is computed but the time. Raises
         LogError where a body comes that had left.
         """
-        before = self._clock
-        self._clock = before.after(step.dt_s)
-        count = self._clock.sample(self._setup.sr) - before.sample(self._setup.sr)
-        channels = self._setup.channels
-        first = self._steps == 0
-        self._steps += 1
+        return self.feed_all([step], bodies)
+
+    def feed_all(self, steps: Sequence[Step], bodies: Records) -> Array:
+        """Take in steps of the same bodies each; return what `feed` gives for each of them, joined."""
+        lengths = {*self._state.waiting, *(one.dt_s for one in steps)} if len(steps) > 1 else ()
+        if len(lengths) > 1:  # a frame that grows may have to wait
+            return np.concatenate([self.feed(one, bodies) for one in steps], axis=1)
+        channels, sr, rendered = self._setup.channels, self._setup.sr, len(self._state.waiting) == LATENCY_STEPS
+        begin, before_first, first = self._clock.sample(sr), LATENCY_STEPS - len(self._state.waiting), self._steps == 0
+        silent = 0
+        for number, one in enumerate(steps, 1):
+            self._clock = self._clock.after(one.dt_s)
+            if number <= before_first:
+                silent = self._clock.sample(sr) - begin
+        count = self._clock.sample(sr) - begin
+        self._steps += len(steps)
         if channels == 0:
             return np.zeros((0, count))
-        rendered = len(self._state.waiting) == LATENCY_STEPS
-        fresh = self._take([step], bodies)
+        fresh = self._take(steps, bodies)
         if not rendered:
             # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run
             # dry
-            uneven = (exact_step(step.dt_s) * self._setup.sr).denominator != 1
-            fresh = np.zeros((channels, count + (uneven and first)))
+            uneven = (exact_step(steps[0].dt_s) * sr).denominator != 1
+            fresh = np.concatenate([np.zeros((channels, silent + (uneven and first))), fresh], axis=1)
         if self._lag.shape[1] == 0 and fresh.shape[1] == count:
             return fresh
         queue = np.concatenate([self._lag, fresh], axis=1)

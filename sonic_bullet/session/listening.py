@@ -9,9 +9,9 @@ A frame lags physics by `latency_steps`, as a strike spans steps and loads are i
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -20,11 +20,12 @@ import numpy as np
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.listener.opening import open_simulator
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
-from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
-from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options, shown
+from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
+from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.render import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
 from sonic_bullet.session.arguments import as_sensors, keywords
@@ -32,21 +33,14 @@ from sonic_bullet.session.directed import absent
 from sonic_bullet.session.felt_bodies import felt_now
 from sonic_bullet.session.keeping import KeptRun, package_versions
 from sonic_bullet.session.material_choice import choose_materials, current_choice
-from sonic_bullet.session.wanted_bodies import WantedBody, checked, enter_bodies, solved_bodies, wanted_body
-
-
-def _opened(client: Any) -> World:
-    from sonic_bullet.listener.opening import open_simulator
-
-    return open_simulator(client)
-
-
-def _wanted(world: World, who: Any, how: Any) -> WantedBody:
-    """Convert one entry of a cast."""
-    body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
-    given = how if isinstance(how, Mapping) else {"material": how}
-    check_options(map(str, given), [name for name in keywords(Listener.add) if name != "progress"], "add_all")
-    return wanted_body(world, body, link, **{"material": None, **given})
+from sonic_bullet.session.wanted_bodies import (
+    WantedBody,
+    checked,
+    enter_bodies,
+    solved_bodies,
+    wanted_body,
+    wanted_cast,
+)
 
 
 class Listener:
@@ -69,7 +63,7 @@ class Listener:
         self.sr, self.sensors = check_sr(sr), as_sensors(sensors, "sensors")
         self.seed = as_whole(seed, "seed", "give a whole number, 0 or more", least=0, most=2**63 - 1)
         self.air = as_kind(air, Air, "air", "give an Air(density_kg_m3=…, sound_speed_m_s=…), or leave it out")
-        self.world = client if isinstance(client, World) else _opened(client)
+        self.world = client if isinstance(client, World) else open_simulator(client)
         self.world.felt = felt_now(self.sensors)
         self.world.silence(current_choice().silent)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
@@ -82,11 +76,13 @@ class Listener:
         self._models: WeakKeyDictionary[ModalModel, None] = WeakKeyDictionary()  # of all bodies, each once
         self._begin()
         self._frame: Array | None = np.zeros((channels_of(self.sensors), 0))
+        self._held: list[Step] | None = None
         self.world.listen(self.step)
 
     def _begin(self) -> None:
         """Start with an empty log."""
         self._kept = KeptRun(channels_of(self.sensors), keep_log=self.world.logged)
+        self._present: Array | None = None  # bodies of the step that sounded last
         self._emptied = self.world.emptied
 
     def reset(self) -> None:
@@ -100,6 +96,7 @@ class Listener:
         """
         if not self._attached:
             raise SceneError("the listener is detached", "attach a new one")
+        self._sound_held()
         self.world.reset()
         self._synth.reset()
         self._begin()
@@ -165,9 +162,7 @@ class Listener:
         cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What the cache lacks
         is computed side by side, on two cores. progress, warnings, errors: as of `add`.
         """
-        if not isinstance(cast, Mapping):
-            raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
-        return self._added([_wanted(self.world, *entry) for entry in cast.items() if not absent(entry[0])], progress)
+        return self._added(wanted_cast(self.world, cast, keywords(Listener.add)), progress)
 
     def _added(
         self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None
@@ -176,16 +171,9 @@ class Listener:
         as_call(progress, "progress")
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, asked)
-        models = self._solved(wanted, progress=progress)
+        models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, progress=progress)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
         return enter_bodies(self.world, wanted, models, asked)
-
-    @says_so(text="progress")
-    def _solved(
-        self, wanted: Sequence[WantedBody], *, progress: Callable[[str], None] | None = None
-    ) -> list[list[ModalModel]]:
-        assert progress is not None
-        return solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, progress)
 
     def step(self) -> Array:
         """Process the physics step just made; return `frame`. Without hooks, call it after each step.
@@ -204,7 +192,15 @@ class Listener:
             self._emptied = self.world.emptied
             self._kept.event("reset")
         self._kept.step(step)
-        frame = self._frame = self._synth.feed(step, self.world.records)
+        if self._held is not None and step.body is self._present and self._playback is None:
+            self._held.append(step)
+            return np.zeros((channels_of(self.sensors), 0))
+        self._sound_held()
+        self._present = step.body
+        return self._sound([step], returned_s)
+
+    def _sound(self, steps: Sequence[Step], returned_s: float = 0.0) -> Array:
+        frame = self._frame = self._synth.feed_all(steps, self.world.records)
         self._kept.frame(frame)
         if self._synth.unkept is not None:
             self._kept.give_up("sound", self._synth.unkept)
@@ -213,6 +209,25 @@ class Listener:
         if self._kept.unsaid:
             self._kept.say()
         return frame
+
+    def _sound_held(self) -> None:
+        if self._held:
+            held, self._held = self._held, []
+            self._sound(held)
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """Let the steps of the block sound at its end: the same samples for less time. Until then `frame` stays.
+
+        For environments that hide many steps in one call.
+        """
+        outer, self._held = self._held, self._held or []
+        try:
+            yield
+        finally:
+            if outer is None:
+                self._sound_held()
+                self._held = None
 
     def play(
         self, device: str | int | None = None, *, full_scale_pa: float = FULL_SCALE_PA, ahead_s: float = AHEAD_S
@@ -238,14 +253,8 @@ class Listener:
             self._playback.close()
         self.world.make_ready()
         make_ready()  # else loading machine code would delay the first step
-        self._playback = start_playback(
-            device,
-            sr=self.sr,
-            channels=channels_of(self.sensors),
-            lag_steps=self.latency_steps,
-            full_scale_pa=full_scale_pa,
-            ahead_s=ahead_s,
-        )
+        how: dict[str, Any] = {"sr": self.sr, "channels": channels_of(self.sensors), "lag_steps": self.latency_steps}
+        self._playback = start_playback(device, **how, full_scale_pa=full_scale_pa, ahead_s=ahead_s)
         return self._playback
 
     def read(self) -> Array:
@@ -259,27 +268,19 @@ class Listener:
         microphones; rolling and sliding continue. `sound` and files fall silent at that very sample, `frame` later by
         its lag. It is an event of the log, so that a replay stops there too, at any rate.
         """
+        self._sound_held()
         self._kept.event("quench")
         self._synth.quench()
 
     @property
     def contacts(self) -> ContactLog:
         """Contact log so far, all that a later render or comparison needs; SceneError where it is not kept."""
-        simulator = self.world.simulator
+        simulator, world, versions = self.world.simulator, self.world, package_versions()
         return ContactLog(
-            tuple(self.world.bodies),
-            self._kept.steps(),
-            self.sensors,
-            self.sr,
-            self.seed,
-            self.air,
-            self.world.untouched,
-            tuple(self._kept.events),
-            simulator.engine,
-            {**package_versions(), **simulator.versions},
-            simulator.changes,
+            tuple(world.bodies), self._kept.steps(), self.sensors, self.sr, self.seed, self.air, world.untouched,
+            tuple(self._kept.events), simulator.engine, {**versions, **simulator.versions}, simulator.changes,
             supports=self.supports,
-        )
+        )  # fmt: skip
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -343,8 +344,6 @@ class Listener:
         """Return the listener."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Detach the listener."""
         self.detach()

@@ -10,7 +10,7 @@ order from the cache, as in one process: the same models, the same errors.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -25,10 +25,11 @@ from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.compiled import folder as code_folder
+from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import one_thread, parallel_map, said_here
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
-from sonic_bullet.records.coerce import as_kind, as_number, shown
+from sonic_bullet.records.coerce import as_kind, as_number, check_options, shown
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeWarning, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -37,7 +38,7 @@ from sonic_bullet.records.roughness import with_roughness
 from sonic_bullet.render import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
-from sonic_bullet.session.directed import direction
+from sonic_bullet.session.directed import absent, direction
 
 Say = Callable[[str], None]
 
@@ -69,6 +70,21 @@ class WantedBody:
     names: tuple[str, ...] = ()
     own_shapes: bool = False
     mounting: Mounting | None = None
+
+
+def wanted_cast(world: World, cast: object, names: Iterable[str]) -> list[WantedBody]:
+    """Convert a cast, of whose entries ``names`` are the keywords; raises SceneError for what is no mapping."""
+    if not isinstance(cast, Mapping):
+        raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
+    found = []
+    for who, how in cast.items():
+        if absent(who):
+            continue
+        body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)
+        given = how if isinstance(how, Mapping) else {"material": how}
+        check_options(map(str, given), [name for name in names if name != "progress"], "add_all")
+        found.append(wanted_body(world, body, link, **{"material": None, **given}))
+    return found
 
 
 def wanted_body(
@@ -143,8 +159,14 @@ def _naming(link: str, of: int) -> Iterator[None]:
         raise type(error)(what, error.remedy + rest) from error
 
 
+@says_so(text="progress")
 def solved_bodies(
-    world: World, wanted: Sequence[WantedBody], known: Iterable[ModalModel], air: Air | None, say: Say
+    world: World,
+    wanted: Sequence[WantedBody],
+    known: Iterable[ModalModel],
+    air: Air | None,
+    *,
+    progress: Say | None = None,
 ) -> list[list[ModalModel]]:
     """Return the models of each body's links.
 
@@ -155,14 +177,15 @@ def solved_bodies(
     air
         The medium; None: no sensor receives them.
     """
+    assert progress is not None
     with one_thread():
-        _prepare(world, wanted, air, say)
+        _prepare(world, wanted, air, progress)
         models, shared = [], list(known)
         for one in wanted:
-            mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared, say)
+            mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared, progress)
             for (name, _), model in zip(one.parts, mine, strict=True):
                 if air is not None and model.mode_count:
-                    say(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
+                    progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                     with _naming(name, len(one.parts)):
                         radiation_of(model, air)
             shared += mine

@@ -8,6 +8,7 @@ import sys
 import tracemalloc
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,9 @@ class CountedListener:
         later = self.clock.after(DT_S)
         self.unread += later.sample(self.sr) - self.clock.sample(self.sr)
         self.clock = later
+
+    def together(self) -> AbstractContextManager[None]:
+        return nullcontext()
 
     def read(self) -> np.ndarray:
         count, self.unread = self.unread, 0

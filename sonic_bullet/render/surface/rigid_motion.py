@@ -90,7 +90,7 @@ def until_motions(steps: Sequence[Step]) -> int:
 
 def enter_mobility(rows: Array, number: Array, motions: Array) -> None:
     """Enter ΨᵀΨ of links that are known to be joined into rows of BODY; number (b,): of these in the log."""
-    for body in np.unique(motions["body"]).tolist():
+    for body in np.unique(motions["body"]).tolist() if len(motions) else ():
         row = rows[np.searchsorted(number, body)]
         shape = motions["shape"][motions["body"] == body]
         row["jointed"], row["mobility"] = 1, shape.T @ shape
