@@ -29,7 +29,6 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
-RESPONSES = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
 Point = tuple[float, float, float]
 
 
@@ -54,6 +53,7 @@ def run_case_new(
 
     Raises SonicBulletError.
     """
+    responses = {"sum": "sum of modes", "pressure": "pressure", "velocity": "velocity"}
     _check_options(hold_out, force_channel, force_newton, mesh, material)
     drawing = _drawing(picture, split)
     place = _new_place(folder)
@@ -93,7 +93,7 @@ def run_case_new(
         if mesh is not None:
             thing["mesh"] = name_of[Path(mesh)]
         case = _described(
-            place, [name_of[s] for s in sounds], thing, RESPONSES[sensor], sensor_at, sensor_direction, medium
+            place, [name_of[s] for s in sounds], thing, responses[sensor], sensor_at, sensor_direction, medium
         )
         if made is not None:
             case = with_responses(case, made, sensor_at, sensor_direction)

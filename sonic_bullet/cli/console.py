@@ -16,14 +16,12 @@ from sonic_bullet.machine.supervisor import supervised
 from sonic_bullet.machine.worker import stop_word
 from sonic_bullet.records.errors import SonicBulletError, interrupts
 
-QUICK = ("cache", "case", "materials")
-"""Commands that take long only on a busy machine, and report no progress."""
-
 
 def run_and_exit(cli: click.Group) -> NoReturn:
     """Run the command that the command line asks for, in a child process, and exit."""
+    quick = ("cache", "case", "materials")  # Commands that take long only on a busy machine, and report no progress
     word = "" if {"-h", "--help"} & set(sys.argv) or not cli.commands.keys() & set(sys.argv[1:2]) else sys.argv[1]
-    ending = supervised(lambda: _run(cli), command="" if word in QUICK else word)
+    ending = supervised(lambda: _run(cli), command="" if word in quick else word)
     if ending.words:
         _say(ending.words)
     sys.exit(ending.code)

@@ -15,7 +15,6 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
 NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
-DECAYS = ("t60_s", "t60_sd_s", "loss_factor", "loss_factor_sd", "q", "q_sd")
 
 
 def run_features(
@@ -29,6 +28,7 @@ def run_features(
     picture: str | None,
 ) -> None:
     """Run `features`; raises SonicBulletError."""
+    decays = ("t60_s", "t60_sd_s", "loss_factor", "loss_factor_sd", "q", "q_sd")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     picture, json_to, csv_to = places(picture, json_to, csv_to)
@@ -48,7 +48,7 @@ def run_features(
             _draw(picture, observed, sr, found)
         say(_summary(recording, found))
     warn(f"{recording}: {note}" for note in [found.note] if note)
-    write_csv(csv_to, feature_rows(found), (*NUMBERS, *DECAYS))
+    write_csv(csv_to, feature_rows(found), (*NUMBERS, *decays))
     write_json(json_to, described(found, notes, doubtful=bool(found.note) or (bool(which) and channel is None)))
 
 

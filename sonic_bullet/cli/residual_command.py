@@ -16,8 +16,6 @@ from sonic_bullet.records import Residual
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
-UNSHAPED = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
-
 
 def run_residual(source: str, *, output: str, picture: str | None, json_to: str | None, **one: Any) -> None:
     """Run `residual`; raises SonicBulletError."""
@@ -67,13 +65,14 @@ def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, 
 
 def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
     """Return preset and strikes of a recording without a shape: a named material, with features in place of modes."""
+    unshaped = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
     import msgspec
 
     from sonic_bullet.estimator.residual.recorded_strikes import recording_strikes
     from sonic_bullet.presets import named_preset
     from sonic_bullet.residual.code import form_of
 
-    given = [f"--{name.replace('_', '-')}" for name in UNSHAPED if one[name]]
+    given = [f"--{name.replace('_', '-')}" for name in unshaped if one[name]]
     if given:
         raise FileError(f"{' and '.join(given)} given without a shape", "give --mesh too, or leave it out")
     if one["material"] is None:

@@ -22,7 +22,6 @@ from sonic_bullet.records.units import HEARING_LIMIT_HZ
 if TYPE_CHECKING:
     from sonic_bullet.presets import Preset
 
-DEFAULT_MATERIAL = "steel"
 MADE_HZ = (250, 1000, 4000)
 MADE_COLUMNS = ("name", "η", "exponent", "spread of ln η", *(f"T60 at {freq_hz} Hz in s" for freq_hz in MADE_HZ))
 RECORDED_COLUMNS = (
@@ -110,6 +109,7 @@ def chosen_material(
     MaterialError
         The name is unknown, or constants are missing or unphysical.
     """
+    default_material = "steel"
     from sonic_bullet.presets import load_material
 
     given = {"youngs_pa": youngs_pa, "poisson": poisson, "density_kg_m3": density_kg_m3}
@@ -120,7 +120,7 @@ def chosen_material(
             f"{' and '.join(options[key] for key in missing)} missing",
             "give all three of --young, --poisson, --density, or a --material too",
         )
-    base = load_material(name or DEFAULT_MATERIAL)
+    base = load_material(name or default_material)
     if len(missing) == 3:
         return base
     rho = base.density_kg_m3 if density_kg_m3 is None else density_kg_m3

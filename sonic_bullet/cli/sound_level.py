@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from sonic_bullet.files.levels import FileLevel
     from sonic_bullet.files.rows.spool import KeptSound
 
-DEFAULT_PEAK_DBFS = -1.0
-"""Peak level that leaves room for overshoots of converters and lossy codecs [EBU R 128, sec. h]."""
 TAIL_DB = -60.0
 OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json", "fade_s")
 
@@ -122,6 +120,8 @@ class LevelWish:
 
         By default silent sound is not scaled, nor sound for a file that cannot state its scale (W64).
         """
+        # Peak level that leaves room for overshoots of converters and lossy codecs [EBU R 128, sec. h].
+        default_peak_dbfs = -1.0
         from sonic_bullet.files.levels import find_level
         from sonic_bullet.render.silence import is_silent
 
@@ -130,7 +130,7 @@ class LevelWish:
         unstated = own is not None and own.text == "nowhere"
         as_it_is = self.pascals or self.lufs is not None or self.peak_dbfs is not None
         if not as_it_is and not unstated and not is_silent(sound, log):
-            peak_dbfs = DEFAULT_PEAK_DBFS
+            peak_dbfs = default_peak_dbfs
         return find_level(self.faded(sound, sr), sr, peak_dbfs, self.lufs, 1.0)
 
     def say(self, path: str, level: FileLevel, peak: float, log: ContactLog, clipped: int = 0) -> dict[str, Any]:

@@ -21,16 +21,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Comparison", "Consequence", "Difference", "SceneSide", "compare"]
 
-_HOME = {
-    "Comparison": "comparison_record",
-    "Difference": "comparison_record",
-    "Consequence": "comparison_record",
-    "SceneSide": "sides",
-    "compare": "compared_sides",
-}
-
 
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(importlib.import_module(f"sonic_bullet.comparing.{_HOME[name]}"), name)
+    home = {
+        "Comparison": "comparison_record",
+        "Difference": "comparison_record",
+        "Consequence": "comparison_record",
+        "SceneSide": "sides",
+        "compare": "compared_sides",
+    }
+    if name in home:
+        return getattr(importlib.import_module(f"sonic_bullet.comparing.{home[name]}"), name)
     raise AttributeError(f"module 'sonic_bullet.comparing' has no attribute '{name}'")

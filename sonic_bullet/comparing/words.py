@@ -58,7 +58,6 @@ PLAIN = {
 }
 COUNTS = ("seed", "since_step", "until_step")
 """Numbers without a relative change."""
-SHAPES = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
 
 
 def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
@@ -152,11 +151,12 @@ def name_of(a: Side, b: Side, who: Who, link: int) -> str:
 
 
 def _made_of(side: Side, who: Who) -> str:
+    shapes = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
     shape = material = ""
     for call in side.calls:
         if who in call.made:
             value = call.arguments.get("baseCollisionShapeIndex")
-            shape = SHAPES.get(int(value.get("shapeType", 0)), "body") if isinstance(value, dict) else "body"
+            shape = shapes.get(int(value.get("shapeType", 0)), "body") if isinstance(value, dict) else "body"
         if call.name == "add" and call.who == who:
             material = call.arguments["material"].name
     return f"{material} {shape}".strip()

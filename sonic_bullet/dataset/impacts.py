@@ -17,7 +17,6 @@ from sonic_bullet.records import Shape
 from sonic_bullet.session.known_shapes import KnownShape, known_shape
 
 MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
-SLOW = ("plastic",)
 FLOOR = "concrete"
 SIZES = (0.6, 1.4)
 
@@ -118,8 +117,9 @@ def build(
 
 
 def known(object: str, material: str) -> KnownShape:
-    """Solve an object once for all its sizes and materials; apart for SLOW ones, which have several times the modes."""
-    group = [name for name in MATERIALS if (name in SLOW) == (material in SLOW)]
+    """Solve an object once for all its sizes and materials; apart for slow ones, which have several times the modes."""
+    slow = ("plastic",)
+    group = [name for name in MATERIALS if (name in slow) == (material in slow)]
     return known_shape(OBJECTS[object], group, largest=SIZES[1])
 
 

@@ -18,14 +18,13 @@ if TYPE_CHECKING:
 
 __all__ = ["SoundObservation", "log_mel", "mel_filters"]
 
-_HOME = {"SoundObservation": "sound_observation", "log_mel": "mel_features", "mel_filters": "mel_features"}
-
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    home = {"SoundObservation": "sound_observation", "log_mel": "mel_features", "mel_filters": "mel_features"}
+    if name not in home:
         raise AttributeError(f"module 'sonic_bullet.environments' has no attribute '{name}'")
     try:
-        return getattr(importlib.import_module(f"sonic_bullet.environments.{_HOME[name]}"), name)
+        return getattr(importlib.import_module(f"sonic_bullet.environments.{home[name]}"), name)
     except ModuleNotFoundError as error:
         if error.name != "gymnasium":
             raise

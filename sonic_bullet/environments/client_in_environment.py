@@ -14,8 +14,6 @@ from typing import Any
 from sonic_bullet.listener.opening import bullet_client, connected_number, is_mujoco, mujoco_pair
 from sonic_bullet.records.errors import SceneError
 
-DEPTH = 3
-"""Levels of attributes that are searched: env.robot.sim.physics_client is the third."""
 REMEDY = "give client=, a BulletClient, the pybullet module, a client id or MuJoCo's (model, data)"
 
 
@@ -27,10 +25,11 @@ def client_in(env: Any) -> Any:
     SceneError
         Several are equally near.
     """
+    depth = 3  # Levels of attributes that are searched: env.robot.sim.physics_client is the third
     level, seen = [env.unwrapped], {id(env.unwrapped)}
     numbers: dict[int, None] = {}
     module = None
-    for _ in range(DEPTH):
+    for _ in range(depth):
         clients: dict[int, Any] = {}
         below = []
         for pair in (mujoco_pair([value for _, value in _parts(thing)]) for thing in level):

@@ -11,9 +11,6 @@ from hashlib import blake2b
 
 from sonic_bullet.records.contacts import Step
 
-MOST_REMEMBERED = 16_384
-"""Most env.steps of seeded episodes that are stored, 2.5 MB; the oldest are dropped first."""
-
 
 class RepeatedEpisodes:
     """Hashes of the steps of seeded episodes, by seed and by the actions so far; the first episode is the reference.
@@ -33,11 +30,13 @@ class RepeatedEpisodes:
 
     def differ(self, action: bytes, steps: Sequence[Step]) -> bool:
         """Tell whether poses or contacts of this episode differ so far from the first of its seed and actions."""
+        # most env.steps of seeded episodes that are stored, 2.5 MB; the oldest are dropped first
+        most_remembered = 16_384
         self._actions.update(action)
         for step in steps:
             self._steps.update(step.contacts.row.tobytes() + step.position_m.tobytes() + step.quaternion_xyzw.tobytes())
         key, now = self._actions.digest(), self._steps.digest()
         self._differ |= self._known.setdefault(key, now) != now
-        if len(self._known) > MOST_REMEMBERED:
+        if len(self._known) > most_remembered:
             del self._known[next(iter(self._known))]
         return self._differ

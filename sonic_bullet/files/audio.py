@@ -38,7 +38,6 @@ from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, b
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
-SAMPLE_BYTES = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, "PCM_S8": 1, "PCM_U8": 1}
 CHUNK_LIMIT_BYTES = 2**32 - 2**16  # what the 32-bit sizes of WAV and AIFF can count, less room for headers
 BLOCK_FRAMES = 1 << 18
 
@@ -96,6 +95,7 @@ class AudioWriter:
         scale: bool = True,
     ) -> None:
         """Open the partial file; FileError (place, extension, subtype), AudioError (rate, channels, gain, size)."""
+        sample_bytes = {"FLOAT": 4, "DOUBLE": 8, "PCM_32": 4, "PCM_24": 3, "PCM_16": 2, "PCM_S8": 1, "PCM_U8": 1}
         import soundfile
 
         self.path = os.fspath(path)
@@ -108,7 +108,7 @@ class AudioWriter:
         if own.text == "chunks" and self.scale_pa is not None:
             chunks = ixml_chunk(self.scale_pa) + (chunks or wave_chunks([], description=scale_text(self.scale_pa)))
         self.over_4_gib = own.over_4_gib
-        self.frame_bytes, self.chunks = channels * SAMPLE_BYTES.get(self.subtype, 0), chunks
+        self.frame_bytes, self.chunks = channels * sample_bytes.get(self.subtype, 0), chunks
         if self.format == "WAV" and expected_frames * self.frame_bytes + len(chunks) > CHUNK_LIMIT_BYTES:
             self.format, self.over_4_gib = "RF64", True
         self.frames = self.clipped = self.over = 0

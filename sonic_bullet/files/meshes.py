@@ -22,8 +22,6 @@ from sonic_bullet.records.errors import FileError, MeshError
 
 MeshSurface = tuple[Array, Array]
 REMEDY = "repair the mesh, or export it again"
-ARCHIVES = {"zip", "bz2", "tar.gz", "tar.bz2"}
-SEVERAL_FILES = {"gltf", "dae"}  # formats whose numbers may be in separate files
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
@@ -146,17 +144,19 @@ def _corners(line: str, words: list[str], so_far: int) -> list[int]:
 
 
 def _other(path: Path) -> Iterator[MeshSurface]:
+    archives = {"zip", "bz2", "tar.gz", "tar.bz2"}
+    several_files = {"gltf", "dae"}  # formats whose numbers may be in separate files
     import trimesh
 
     kind = path.suffix.lower().lstrip(".")
-    if kind in ARCHIVES or kind not in trimesh.available_formats():
+    if kind in archives or kind not in trimesh.available_formats():
         hint = " (or: pip install pycollada)" if kind == "dae" else ""
         raise MeshError(f"mesh file {path}: format '{kind}' is not known", "convert it to OBJ, STL or PLY" + hint)
     if kind == "off":
         _check_off(path)
     _check_counts(path, kind)
     try:
-        if kind in SEVERAL_FILES:
+        if kind in several_files:
             scene = trimesh.load_scene(path, process=False, maintain_order=True, skip_materials=True)
         else:
             # a read of more bytes than the file has returns those there are, and allocates no more

@@ -32,7 +32,6 @@ NAMES = {
     "bool": "true or false",
     "null": "null",
 }
-BOUNDS = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
 
 
 def decode_json(content: bytes, form: type[T], where: str, error: type[SonicBulletError], remedy: str) -> T:
@@ -156,6 +155,7 @@ def _there(tree: Any, keys: list[Key]) -> str:
 
 def _wanted(said: str) -> str:
     """Convert msgspec's words for a type and its bounds to plain ones."""
+    bounds = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
     found = re.fullmatch(r"`([^`]*)`(.*)", said)
     if found is None:
         return said.replace("`", "")
@@ -164,7 +164,7 @@ def _wanted(said: str) -> str:
         return f"a list of {length[1]}"
     words = " or ".join(NAMES.get(kind, kind) for kind in kinds.split(" | "))
     sign, _, bound = rest.partition(" ")
-    return f"{words} {BOUNDS[sign]} {bound.removesuffix('.0')}" if sign in BOUNDS else f"{words} {rest}".strip()
+    return f"{words} {bounds[sign]} {bound.removesuffix('.0')}" if sign in bounds else f"{words} {rest}".strip()
 
 
 def _forms_at(form: msgspec.inspect.Type, keys: list[Key]) -> Iterator[msgspec.inspect.Type]:

@@ -13,21 +13,21 @@ import msgspec
 
 from sonic_bullet.records.counts import format_count
 
-FREE = frozenset({"note", "source", "licence", "license"})
-"""Text fields for readers, allowed at any place of a file."""
-MOST = 20  # most lines
 QUOTED = 60  # characters of a name from a file
 
 
 def unread_fields(value: Any, form: type[msgspec.Struct], where: str) -> tuple[str, ...]:
-    """Return a line for each field of a decoded value that ``form`` lacks, `MOST` at most, and a count of others."""
+    """Return a line for each field of a decoded value that ``form`` lacks, `most` at most, and a count of others."""
+    most = 20  # most lines
     lines = list(_unread(value, msgspec.inspect.type_info(form), where))
-    more = len(lines) - MOST
+    more = len(lines) - most
     many = format_count(more, "more field is", "more fields are")
-    return tuple(lines[:MOST] + ([f"{where}: {many} not known"] if more > 0 else []))
+    return tuple(lines[:most] + ([f"{where}: {many} not known"] if more > 0 else []))
 
 
 def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]:
+    # Text fields for readers, allowed at any place of a file
+    free = frozenset({"note", "source", "licence", "license"})
     match form:
         case msgspec.inspect.UnionType(types=kinds):
             for kind in kinds:
@@ -37,7 +37,7 @@ def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]
             for name, inner in value.items():
                 if name in known:
                     yield from _unread(inner, known[name], f"{where}: {name}")
-                elif name not in FREE:
+                elif name not in free:
                     yield f"{where}: field '{shown(name)}' is not known and not read{nearest_field(name, tuple(known))}"
         case msgspec.inspect.DictType(value_type=kind) if isinstance(value, dict):
             for name, inner in value.items():

@@ -28,12 +28,6 @@ from sonic_bullet.records.errors import MeshError, ModalError
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
-ORDERS = {2: (2.0, 3.0, 4.0), 3: (2.0, 2.5, 3.5)}
-"""Orders of convergence of frequencies in h, by degree: least, middle and most.
-
-Smooth lumps have 4 [Strang & Fix 1973, ch. 6.3]. Lower orders are measured where walls are an element thick, and along
-creases, where stress is singular.
-"""
 FINER = 0.7  # from one edge to the next: half the elements of a wall
 ALIKE, LARGER = 1.2, 3
 """Ratio of a coarser body's edge to a finer one's below which the two are too similar to compare; how often a coarser
@@ -135,10 +129,14 @@ class Elements:
         return [raw._replace(found=found, place=(nodes, free, (less[0] - less[2]) / 2 if self._same_body else less[1]))]
 
     def _less(self, tensor: Array, fine: Array, say: Callable[[str], None]) -> Array:
-        """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (3, m) by `ORDERS`.
+        """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (3, m) by `orders`.
 
         NaN where there is no coarser body to compare with.
         """
+        # Orders of convergence of frequencies in h, by degree: least, middle and most. Smooth lumps have 4 [Strang &
+        # Fix 1973, ch. 6.3]. Lower orders are measured where walls are an element thick, and along creases, where
+        # stress is singular.
+        orders = {2: (2.0, 3.0, 4.0), 3: (2.0, 2.5, 3.5)}
         coarser, ratio = self._coarser()
         if coarser is None or not len(fine):
             return np.full((3, len(fine)), np.nan)
@@ -150,7 +148,7 @@ class Elements:
         # modes closer to one another than their correction may have changed places: they get its mean
         apart = np.flatnonzero(np.diff(np.log(fine)) / 2 > np.abs(lost[:-1])) + 1
         lost = np.concatenate([np.full(len(few), few.mean()) for few in np.split(lost, apart) if len(few)])
-        return np.array([lost / (ratio**order - 1) for order in ORDERS[self.degree]])
+        return np.array([lost / (ratio**order - 1) for order in orders[self.degree]])
 
     def _solved(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> Sector:
         """Solve for the modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""

@@ -26,7 +26,6 @@ from sonic_bullet.records import Array
 
 RESOLVED = 2 * np.pi / 3
 """k times a triangle's edge: three edges a wavelength. Spheres are within 0.7 dB there, plates within 1.5."""
-ALIKE = 0.1  # of k times the body's radius: modes that differ by less share a solution; kernels turn by 0.1 at most
 NUMBERS = np.array(
     [1, 2, 0.5, 0.5 / np.pi, np.pi, 1e-30, 0.25 / np.pi]
     + [1 / sign for sign in (-6, 120, -5040, 362880, -39916800, 24, -720, 40320, -3628800, 479001600)],
@@ -82,11 +81,12 @@ def _kept_kernels(corner: bytes) -> Array:
 
 
 def _alike(turns: Array) -> list[Array]:
-    """Group modes (m,), by index, whose values lie within `ALIKE` of the least of their group."""
+    """Group modes (m,), by index, whose values lie within `alike` of the least of their group."""
+    alike = 0.1  # of k times the body's radius: modes that differ by less share a solution; kernels turn by 0.1 at most
     order = np.argsort(turns, kind="stable")
     groups: list[list[int]] = []
     for at in order:
-        if groups and turns[at] - turns[groups[-1][0]] <= ALIKE:
+        if groups and turns[at] - turns[groups[-1][0]] <= alike:
             groups[-1].append(int(at))
         else:
             groups.append([int(at)])

@@ -68,37 +68,36 @@ __all__ = [
     "isotropic_stiffness_pa",
 ]
 
-_HOME = {
-    "Air": "sensors",
-    "Ambisonics": "sensors",
-    "Array": "arrays",
-    "Binaural": "sensors",
-    "Body": "simulated",
-    "ContactMicrophone": "sensors",
-    "Material": "bodies",
-    "Head": "receivers",
-    "Microphone": "sensors",
-    "MicrophonePath": "receivers",
-    "ModalModel": "bodies",
-    "ModalSum": "sensors",
-    "ORTHOTROPIC": "bodies",
-    "Residual": "residual",
-    "RoomResponse": "receivers",
-    "ShoeboxRoom": "receivers",
-    "Sensor": "sensors",
-    "SensorResponse": "touching.sensor_response",
-    "Shape": "bodies",
-    "ShapeKind": "bodies",
-    "Vibrometer": "sensors",
-    "channel_sensors": "sensors",
-    "channels_of": "sensors",
-    "felt_bodies": "sensors",
-    "frozen_array": "arrays",
-    "isotropic_stiffness_pa": "bodies",
-}
-
 
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(importlib.import_module(f"sonic_bullet.records.{_HOME[name]}"), name)
+    home = {
+        "Air": "sensors",
+        "Ambisonics": "sensors",
+        "Array": "arrays",
+        "Binaural": "sensors",
+        "Body": "simulated",
+        "ContactMicrophone": "sensors",
+        "Material": "bodies",
+        "Head": "receivers",
+        "Microphone": "sensors",
+        "MicrophonePath": "receivers",
+        "ModalModel": "bodies",
+        "ModalSum": "sensors",
+        "ORTHOTROPIC": "bodies",
+        "Residual": "residual",
+        "RoomResponse": "receivers",
+        "ShoeboxRoom": "receivers",
+        "Sensor": "sensors",
+        "SensorResponse": "touching.sensor_response",
+        "Shape": "bodies",
+        "ShapeKind": "bodies",
+        "Vibrometer": "sensors",
+        "channel_sensors": "sensors",
+        "channels_of": "sensors",
+        "felt_bodies": "sensors",
+        "frozen_array": "arrays",
+        "isotropic_stiffness_pa": "bodies",
+    }
+    if name in home:
+        return getattr(importlib.import_module(f"sonic_bullet.records.{home[name]}"), name)
     raise AttributeError(f"module 'sonic_bullet.records' has no attribute '{name}'")

@@ -8,8 +8,6 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 
-MOST = {"freq_hz": 1e6, "decay_per_s": 1e6, "amplitude": 1e6, "time_s": 1e4, "power_per_hz": 1e9}
-"""Largest numbers of a sound; products of larger ones overflow."""
 SLOWEST_HZ = 0.01
 LOUDER = 1.1
 """A preset's levels are kept to a quarter of a decibel."""
@@ -56,6 +54,8 @@ class Residual:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        # largest numbers of a sound; products of larger ones overflow
+        largest = {"freq_hz": 1e6, "decay_per_s": 1e6, "amplitude": 1e6, "time_s": 1e4, "power_per_hz": 1e9}
         faintest = 1e-6
         m, count = len(np.atleast_1d(self.mode_freq_hz)), len(np.atleast_1d(self.line_freq_hz))
         b, n = len(np.atleast_1d(self.freq_hz)), len(np.atleast_1d(self.time_s))
@@ -91,7 +91,7 @@ class Residual:
         for name in shapes:
             value, most = (
                 float(getattr(self, name).max(initial=0.0)),
-                next(top for part, top in MOST.items() if name.endswith(part)),
+                next(top for part, top in largest.items() if name.endswith(part)),
             )
             require(
                 value <= most,

@@ -31,14 +31,6 @@ table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .8rem;border-b
 img{max-width:100%}.verdict{font-size:1.4rem}figure{margin:1.5rem 0}figcaption{color:#555}\
 audio{vertical-align:middle;width:16rem}"""
 
-WORDS = {
-    "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
-    "explained": "The model lacks something, and what it lacks has a name.",
-    "unexplained": "Something is left that none of the known effects accounts for.",
-    "worse-than-silence": "What was fitted is farther from the recordings than silence, so no effect was sought.",
-    "nothing": "Nothing could be compared, so nothing is known of what the model lacks.",
-}
-
 
 def write_report(path: str, d: Diagnosis) -> None:
     """Write the page, whole or not at all. Raises FileError."""
@@ -48,11 +40,18 @@ def write_report(path: str, d: Diagnosis) -> None:
 
 def page(d: Diagnosis) -> str:
     """Render the page's text."""
+    words = {
+        "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
+        "explained": "The model lacks something, and what it lacks has a name.",
+        "unexplained": "Something is left that none of the known effects accounts for.",
+        "worse-than-silence": "What was fitted is farther from the recordings than silence, so no effect was sought.",
+        "nothing": "Nothing could be compared, so nothing is known of what the model lacks.",
+    }
     name = html.escape(d.case.name)
     parts = [
         f"<!doctype html><html lang=en><meta charset=utf-8><title>{name}</title><style>{STYLE}</style>",
         f"<h1>{name}</h1><p class=verdict><b>{d.verdict}</b>. "
-        f"{WORDS['nothing' if type(d.closed) is NothingCompared else d.verdict]}</p>",
+        f"{words['nothing' if type(d.closed) is NothingCompared else d.verdict]}</p>",
         _effects(d),
         _errors(d),
         f"<p>{html.escape(d.unexplained['words'])}.</p>" if d.unexplained else "",

@@ -29,19 +29,17 @@ LINE_FLOOR = 1e-4
 BAND_OCTAVES = 1 / 6
 ABOVE = 2.0
 """Cells whose mean is less than this times the floor are the floor."""
-LOWEST_BINS = 1.5
-"""An offset or a drift fills the first two bins of a Hann window."""
 LINE_WIDTHS = 6.0
 ROOM = 1.25
 """Six half widths hold nine tenths of a damped sinusoid's energy."""
-NEPERS = 40.0
 
 
 def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
-    """Compute Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `NEPERS`."""
+    """Compute Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `nepers`."""
+    nepers = 40.0
     out = np.zeros(n)
     decay = np.asarray(decay_per_s, float)
-    length = np.where(decay > 0, np.minimum(n, NEPERS * sr / np.maximum(decay, 1e-9) + 1), n).astype(np.int64)
+    length = np.where(decay > 0, np.minimum(n, nepers * sr / np.maximum(decay, 1e-9) + 1), n).astype(np.int64)
     _damped(np.exp((-decay + 2j * np.pi * np.asarray(freq_hz)) / sr), np.asarray(amplitude, complex), length, out)
     return out
 
@@ -111,14 +109,15 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
 
 
 def shared_cells(left: list[Power]) -> tuple[Array, Array, Array]:
-    """Compute `cells` of the mean over strikes, where most strikes have some themselves. Nothing below `LOWEST_BINS`.
+    """Compute `cells` of the mean over strikes, where most strikes have some themselves. Nothing below `lowest_bins`.
 
     What one of two strikes has and the other has not is no property of the body.
     """
+    lowest_bins = 1.5  # An offset or a drift fills the first two bins of a Hann window
     mean = Power(left[0].freq_hz, left[0].time_s, np.mean([p.per_hz for p in left], axis=0))
     freq, time, per_hz = cells(mean, noise_floor_per_hz(mean))
     most = np.mean([cells(p, noise_floor_per_hz(p))[2] > 0 for p in left], axis=0) > 0.5
-    return freq, time, np.where(most & (freq > LOWEST_BINS * mean.freq_hz[1])[:, None], per_hz, 0.0)
+    return freq, time, np.where(most & (freq > lowest_bins * mean.freq_hz[1])[:, None], per_hz, 0.0)
 
 
 def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:

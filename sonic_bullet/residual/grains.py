@@ -40,7 +40,6 @@ from sonic_bullet.residual.transfer import (
 
 LONGEST_S = 0.5
 STEP_DB = 2.0
-KNOTS = 33
 SEEDS = (0x5EED, 0xF00D)
 
 
@@ -213,12 +212,13 @@ def _filter(base: Array, gain: Array, out: Array) -> None:  # pragma: no cover -
 
 
 def angles(number: int) -> Array:
-    """Draw an angle (k,) for each bin, random over `KNOTS` bands: grains of two numbers are all but uncorrelated."""
-    state = np.uint64(mixed_number(number)) + np.arange(KNOTS, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    """Draw an angle (k,) for each bin, random over `knots` bands: grains of two numbers are all but uncorrelated."""
+    knots = 33
+    state = np.uint64(mixed_number(number)) + np.arange(knots, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     knot = (state ^ (state >> np.uint64(31))) / 2.0**64
-    return np.asarray(2 * np.pi * np.interp(np.arange(WINDOW // 2 + 1), np.linspace(0, WINDOW // 2, KNOTS), knot))
+    return np.asarray(2 * np.pi * np.interp(np.arange(WINDOW // 2 + 1), np.linspace(0, WINDOW // 2, knots), knot))
 
 
 @njit(nogil=True)

@@ -29,8 +29,6 @@ from sonic_bullet.residual.spectrogram import Power
 
 DOMINANT = 24
 """Most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1."""
-ONE_MODE = 1e-3
-"""Modes closer than this, relative, count as one: an analysis finds one line."""
 FAINT = 1e-6
 LEAST_DECAY_PER_S = 0.1
 TINY = 1e-300
@@ -103,11 +101,12 @@ def source_power(residual: Residual) -> Power:
 
 
 def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
-    """Merge modes closer than `ONE_MODE`: powers add, frequency and decay are the mean by power.
+    """Merge modes closer than `one_mode`: powers add, frequency and decay are the mean by power.
 
     Also returns (m,) which of them each is.
     """
-    group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > ONE_MODE * modes.freq_hz[1:])]).astype(np.int64)
+    one_mode = 1e-3  # Modes closer than this, relative, count as one: an analysis finds one line
+    group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > one_mode * modes.freq_hz[1:])]).astype(np.int64)
     weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY
     total = np.bincount(group, weight)
     freq, decay = (np.bincount(group, weight * value) / total for value in (modes.freq_hz, modes.decay_per_s))

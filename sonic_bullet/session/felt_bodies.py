@@ -8,7 +8,6 @@ from contextvars import ContextVar
 
 from sonic_bullet.records import Sensor, felt_bodies
 
-EVERY_BODY = range(1 << 31)
 _every: ContextVar[bool] = ContextVar("every", default=False)
 
 
@@ -24,4 +23,5 @@ def feeling_all() -> Iterator[None]:
 
 def felt_now(sensors: Sequence[Sensor]) -> Collection[int]:
     """Return the ids of bodies of which a listener with these sensors describes the links."""
-    return EVERY_BODY if _every.get() else felt_bodies(sensors)
+    every_body = range(1 << 31)
+    return every_body if _every.get() else felt_bodies(sensors)

@@ -19,9 +19,6 @@ from sonic_bullet.session.arguments import as_material
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.material_choice import MaterialChoice, current_choice
 
-GROUND_M = 5.0
-"""Length above which a static, flat body is ground: no board that is struck to sound is as long."""
-
 
 def add_links(
     listener: Listener,
@@ -82,12 +79,13 @@ def _chosen_by_name(listener: Listener, who: tuple[int, int]) -> Material | None
 
 
 def is_ground(shapes: tuple[Shape, ...]) -> bool:
-    """Tell whether a static body is ground: a plane, flat and longer than GROUND_M, or larger than any struck body."""
+    """Tell whether a static body is ground: a plane, flat and longer than ground_m, or larger than any struck body."""
+    ground_m = 5.0  # length above which a static, flat body is ground: no board that is struck to sound is as long
     flattest = 0.5  # largest thickness of a flat body over its second side: pybullet_data's planes are 200 x 200 x 10 m
     if any(shape.kind == "plane" for shape in shapes):
         return True
     thin, middle, long = sorted(_sides_m(shapes))
-    return bool((long > GROUND_M and thin <= flattest * middle) or long > LARGEST_M)
+    return bool((long > ground_m and thin <= flattest * middle) or long > LARGEST_M)
 
 
 def _long(shapes: tuple[Shape, ...]) -> str:

@@ -24,16 +24,6 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.synth.clock import Clock
 
-COLOURS = {
-    "wood": (0.72, 0.53, 0.34),
-    "porcelain": (0.93, 0.93, 0.90),
-    "glass": (0.60, 0.80, 0.85),
-    "metal": (0.60, 0.63, 0.68),
-    "steel": (0.60, 0.63, 0.68),
-    "brass": (0.80, 0.68, 0.35),
-    "plastic": (0.85, 0.40, 0.35),
-    "rubber": (0.25, 0.25, 0.27),
-}
 HOW_IT_IS_DRAWN = "film the scene, or, of an animation that was scored, give it a material in the table of score"
 WIDE_M = 20.0
 """A figure wider than this is ground, which need not be in view."""
@@ -113,11 +103,21 @@ def _stack(rows: Sequence[Array], size: int) -> Array:
 
 def _figure(body: Body) -> Figure | None:
     """Make a figure of a body's model; None where it has no surface."""
+    colours = {
+        "wood": (0.72, 0.53, 0.34),
+        "porcelain": (0.93, 0.93, 0.90),
+        "glass": (0.60, 0.80, 0.85),
+        "metal": (0.60, 0.63, 0.68),
+        "steel": (0.60, 0.63, 0.68),
+        "brass": (0.80, 0.68, 0.35),
+        "plastic": (0.85, 0.40, 0.35),
+        "rubber": (0.25, 0.25, 0.27),
+    }
     other_colour = (0.75, 0.72, 0.66)
     if body.model is None or not len(body.model.face):
         return None
     name = body.material.name.lower() if body.material is not None else ""
-    colour = next((rgb for word, rgb in COLOURS.items() if word in name), other_colour)
+    colour = next((rgb for word, rgb in colours.items() if word in name), other_colour)
     return Figure(body.model.vertex_m, body.model.face, colour)
 
 

@@ -33,8 +33,6 @@ Examples:
 The physics runs as fast as the card takes its sound. The last line says what was played, how late each step sounds,
 and how often there was nothing to play: then the scene is too much for this machine in real time; render it."""
 
-CARD_OPTIONS = ("device", "full_scale_pa", "ahead_s")
-
 
 @click.command(epilog=EPILOG)
 @click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
@@ -58,6 +56,7 @@ CARD_OPTIONS = ("device", "full_scale_pa", "ahead_s")
 @json_option
 def play(scene: str, json_to: str | None, **options: Any) -> None:
     """Play a PyBullet scene, or a contact log, on a sound card while it runs."""
+    card_options = ("device", "full_scale_pa", "ahead_s")
     path = Path(scene)
     check_scene_file(scene, "play")
     materials = WantedMaterials.read(options.pop("material"), options.pop("silent"))
@@ -70,7 +69,7 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
         given["device"] = int(given["device"])
     with clean_stdout(json_to) as say:
         with progress_bar(path.name) as (progress, tell):
-            show = _Show({name: given.pop(name) for name in CARD_OPTIONS if name in given}, progress, tell)
+            show = _Show({name: given.pop(name) for name in card_options if name in given}, progress, tell)
             try:
                 notes = (_play_log if is_log(scene) else _play_scene)(scene, given, materials, space, show)
             except KeyboardInterrupt as error:

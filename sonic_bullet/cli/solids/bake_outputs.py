@@ -24,10 +24,6 @@ if TYPE_CHECKING:
 MESH_MATERIAL = "steel"
 PROGRAMS, FEW_POINTS = (".dsp", ".h"), 64
 """Default number of points of programs, whose tables a compiler reads."""
-SCENE_S = 0.1
-"""Length of the run that finds a scene's bodies."""
-STRIKE_RATE_HZ, LONGEST_STRIKE_S, STRIKE_FALL = 48_000, 10.0, 6.9
-"""Values of a .wav: e^-6.9 is -60 dB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +43,7 @@ class _StrikeWish:
 
     def write(self, path: str, model: BakedModel) -> str:
         """Write the strike; return its description."""
+        strike_rate_hz, longest_strike_s, strike_fall = 48_000, 10.0, 6.9  # Values of a .wav: e^-6.9 is -60 dB
         import numpy as np
 
         from sonic_bullet.bake import choose_strike, render_strike
@@ -60,10 +57,10 @@ class _StrikeWish:
             impulse_n_s=self.impulse or IMPULSE_N_S,
             contact_s=CONTACT_S if self.contact_ms is None else self.contact_ms / 1000,
         )
-        slowest = float(model.decay_per_s[model.freq_hz < STRIKE_RATE_HZ / 2].min(initial=np.inf))
-        seconds = min(LONGEST_STRIKE_S, strike.contact_s + STRIKE_FALL / max(slowest, 1e-3)) or LONGEST_STRIKE_S
-        sound = render_strike(model, strike, STRIKE_RATE_HZ, seconds)
-        report = write_audio(path, sound[None], STRIKE_RATE_HZ, peak_dbfs=-1)
+        slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
+        seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
+        sound = render_strike(model, strike, strike_rate_hz, seconds)
+        report = write_audio(path, sound[None], strike_rate_hz, peak_dbfs=-1)
         at = ", ".join(f"{1e3 * x:.4g}" for x in strike.point_m)
         size = float(np.linalg.norm(strike.impulse_n_s))
         return f"a strike of {size:.3g} N·s at ({at}) mm: peak {report.peak_pa:.3g} Pa at 1 m, its modes alone"
@@ -157,9 +154,10 @@ def _scene_models(
     source: str, material: tuple[str, ...], name: str | None, pruning: PruningOptions, *, one: bool
 ) -> list[BakedModel]:
     """Return the models of a scene's or log's bodies with modes, each once. one: the format holds a single body."""
+    scene_s = 0.1  # length of the run that finds a scene's bodies
     from sonic_bullet.bake import bake_body
 
-    log = scene_log(source, WantedMaterials.read(material, ()), SCENE_S)
+    log = scene_log(source, WantedMaterials.read(material, ()), scene_s)
     bodies: dict[str, Body] = {}
     for body in log.bodies:
         if body.model is not None and body.model.mode_count and body.material is not None:

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from sonic_bullet.soundtrack.sound_events import SoundEvent
     from sonic_bullet.soundtrack.stems import Stem
 
-LATEST_S = 1e9
-
 
 def soundtrack_options(command: Any) -> Any:
     """Add the options of `SoundtrackWish`."""
@@ -75,6 +73,7 @@ class SoundtrackWish:
 
     def checked(self, output: str) -> SoundtrackWish:
         """Return the same with the stems' folder absolute and tried; raises FileError."""
+        latest_s = 1e9
         if self.events is not None and Path(self.events).suffix.lower() not in (".json", ".csv"):
             raise FileError(f"cannot write {self.events}: events are JSON or CSV", "end the name with .json or .csv")
         form = AUDIO_FORMATS.get(Path(output).suffix.lower())
@@ -84,8 +83,8 @@ class SoundtrackWish:
 
         if self.time_reference_s is not None and not self.cues:
             raise FileError("--time-reference is told beside cue points", "give --cues too")
-        if self.time_reference_s is not None and not self.time_reference_s <= LATEST_S:
-            raise FileError(f"--time-reference is {self.time_reference_s:g} s", f"give 0 to {LATEST_S:g}, 30 years")
+        if self.time_reference_s is not None and not self.time_reference_s <= latest_s:
+            raise FileError(f"--time-reference is {self.time_reference_s:g} s", f"give 0 to {latest_s:g}, 30 years")
         own = {"--stem-peak-dbfs": self.stem_peak_dbfs, "--stem-lufs": self.stem_lufs}
         for option, asked in own.items():
             if asked is not None and self.stems is None:

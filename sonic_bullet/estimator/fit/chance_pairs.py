@@ -21,7 +21,6 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.records import Array
 
-STRONG = 1e-3  # of the strongest line's energy
 PAIRED = 0.6  # share of the strong lines that are to be modes
 DRAWS = 8
 MOVED = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
@@ -31,8 +30,9 @@ Placing = Callable[[tuple[RecordedObject, ...]], tuple[Pairs, ...]]
 
 
 def strong_lines(lines: Lines) -> Array:
-    """Which lines (k,) hold `STRONG` of the strongest line's energy."""
-    return np.asarray(lines.energy >= STRONG * lines.energy.max(initial=0))
+    """Which lines (k,) hold `strong` of the strongest line's energy."""
+    strong = 1e-3  # of the strongest line's energy
+    return np.asarray(lines.energy >= strong * lines.energy.max(initial=0))
 
 
 def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...], place: Placing) -> bool:

@@ -14,10 +14,6 @@ if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.recorded import RecordedObject
     from sonic_bullet.files.cases import CaseRecording
 
-FEWEST_CYCLES = 5.0
-"""Of a line in the time in which it falls to 1/e: what is over sooner is the attack, lines that cancel each other, and
-no mode. Without them takes held out of six measured objects are predicted 0.2 dB worse at most."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TypicalStrike:
@@ -34,9 +30,12 @@ class TypicalStrike:
 
 
 def ringing(lines: Lines) -> Array:
-    """Return indices (k,) of the lines that ring, by frequency: those that last `FEWEST_CYCLES`."""
+    """Return indices (k,) of the lines that ring, by frequency: those that last `fewest_cycles`."""
+    # Of a line in the time in which it falls to 1/e: what is over sooner is the attack, lines that cancel each other,
+    # and no mode. Without them takes held out of six measured objects are predicted 0.2 dB worse at most.
+    fewest_cycles = 5.0
     decay = np.nan_to_num(lines.decay_per_s)
-    keep = np.flatnonzero((decay > 0) & (lines.freq_hz >= FEWEST_CYCLES * decay))
+    keep = np.flatnonzero((decay > 0) & (lines.freq_hz >= fewest_cycles * decay))
     return keep[np.argsort(lines.freq_hz[keep], kind="stable")]
 
 

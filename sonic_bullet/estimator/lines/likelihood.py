@@ -18,7 +18,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-GONE = 41.0  # e^-41: a mode is silent below the rounding of its own start
 STEPS_MOST = 60
 BLOCK = 256  # about the square root of a second's samples
 
@@ -36,15 +35,16 @@ class Sinusoids:
 
 
 def _powers(pole: Array, step: int, count: int) -> Array:
-    """e^{pole·step·m} (count, k), zero once below e^-GONE: no subnormal numbers."""
+    """e^{pole·step·m} (count, k), zero once below e^-gone: no subnormal numbers."""
+    gone = 41.0  # e^-41: a mode is silent below the rounding of its own start
     fine = 16
     outer = -(-count // fine)
     above, below = (
-        np.exp(np.maximum(e.real, -GONE) + 1j * e.imag)
+        np.exp(np.maximum(e.real, -gone) + 1j * e.imag)
         for e in (pole * (step * m)[:, None] for m in (fine * np.arange(outer), np.arange(fine)))
     )
     power = (above[:, None] * below).reshape(outer * fine, len(pole))[:count]
-    last = np.minimum(GONE / np.maximum(-pole.real * step, 1e-12), count).astype(int)
+    last = np.minimum(gone / np.maximum(-pole.real * step, 1e-12), count).astype(int)
     for k in np.flatnonzero(last < count):
         power[last[k] :, k] = 0
     return np.asarray(power)

@@ -18,7 +18,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
 BLOCK_S = 1e-3
-CLIPPED_RUN = 3
 SHOWN = 6  # hits whose times are said
 
 
@@ -117,11 +116,12 @@ def by_modes(signal: Array, start: int, modes: Sinusoids, sr: int, noise: float)
 
 
 def clipped_samples(signal: Array) -> int:
-    """How many samples stand in runs of `CLIPPED_RUN` and more at the largest magnitude: the recorder's ceiling."""
+    """How many samples stand in runs of `clipped_run` and more at the largest magnitude: the recorder's ceiling."""
+    clipped_run = 3
     top = np.abs(signal) >= np.abs(signal).max() * (1 - 1e-6)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], top, [False]]).astype(np.int8)))
     run = edges[1::2] - edges[::2]
-    return int(run[run >= CLIPPED_RUN].sum())
+    return int(run[run >= clipped_run].sum())
 
 
 def describe_clipping(clipped: int) -> str:

@@ -13,8 +13,6 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 
-LEAST_S = 0.1  # before the onset: five periods, so that Hann's main lobes lie apart
-
 
 def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]:
     """Find the hum in a recording.
@@ -31,10 +29,11 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
     Returns
     -------
     (n,) array
-        The hum; zeros where there is none, or less than `LEAST_S` to tell it from.
+        The hum; zeros where there is none, or less than `least_s` to tell it from.
     float
         Its fundamental in Hz; 0 where there is none.
     """
+    least_s = 0.1  # before the onset: five periods, so that Hann's main lobes lie apart
     guard_s = 0.005  # before the onset, whose first sample is not known that well
     most = 20  # multiples
     above = 30.0  # times the power between them
@@ -44,7 +43,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
 
     quiet = signal[: max(0, start - round(guard_s * sr))]
     n = len(quiet)
-    if n < LEAST_S * sr:
+    if n < least_s * sr:
         return np.zeros(len(signal)), 0.0
     power = np.abs(np.fft.rfft((quiet - quiet.mean()) * np.hanning(n), 4 * n)) ** 2
     step = sr / (4 * n)

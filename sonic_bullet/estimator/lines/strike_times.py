@@ -15,7 +15,6 @@ from sonic_bullet.records import Array
 
 ORDER = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
 BLOCK_S, GAP_S = 1e-3, 0.05
-NEAR_S = 0.25
 
 
 def find_strikes(signal: Array, sr: int) -> Array:
@@ -33,7 +32,8 @@ def find_strikes(signal: Array, sr: int) -> Array:
     (s,) array
         Times in s from the first sample, in order; empty where nothing stands out of what could be predicted.
     """
-    above_db = 12.0  # over the median of the blocks within NEAR_S: gaussian noise of 1 ms stays below 3 dB
+    near_s = 0.25
+    above_db = 12.0  # over the median of the blocks within near_s: gaussian noise of 1 ms stays below 3 dB
     below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
     from scipy.ndimage import median_filter
 
@@ -43,7 +43,7 @@ def find_strikes(signal: Array, sr: int) -> Array:
         return np.zeros(0)
     left = np.convolve(signal, prediction_error_filter(signal, ORDER))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
-    near = median_filter(power, min(round(2 * NEAR_S / BLOCK_S), count) | 1, mode="nearest")
+    near = median_filter(power, min(round(2 * near_s / BLOCK_S), count) | 1, mode="nearest")
     stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))
     at = np.flatnonzero(stands) * block / sr
     return at[np.diff(at, prepend=-1.0) > GAP_S]

@@ -18,7 +18,6 @@ from sonic_bullet.records import Array
 
 # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
 ROUNDING = 1e-7
-EARLY = 1500  # samples
 
 
 def low_pass(passed: float, stopped: float, stop_db: float) -> Array:
@@ -69,8 +68,9 @@ def poles(
 
 
 def early_poles(signal: Array, sr: int, noise: Array, band_hz: tuple[float, float], fastest_per_s: float) -> Array:
-    """Return poles (k,) of the first `EARLY` samples, no filter before them: a band's filter outlasts the fast ones."""
-    pole = _shift_poles(signal[:EARLY], float(np.median(noise)), EARLY // 3, EARLY // 9) * sr
+    """Return poles (k,) of the first `early` samples, no filter before them: a band's filter outlasts the fast ones."""
+    early = 1500  # samples
+    pole = _shift_poles(signal[:early], float(np.median(noise)), early // 3, early // 9) * sr
     freq = pole.imag / (2 * np.pi)
     return np.asarray(pole[(freq >= band_hz[0]) & (freq < band_hz[1]) & (pole.real < 0) & (pole.real > -fastest_per_s)])
 

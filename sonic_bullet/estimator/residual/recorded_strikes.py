@@ -29,7 +29,6 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import StruckModes
 
-NEAR = 0.02
 POWER = 0.3
 ALIKE = 0.02
 """A feature whose power is represented but for less than this, a tenth of a decibel, leaves nothing."""
@@ -39,6 +38,7 @@ def match_ratios(
     freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array
 ) -> tuple[Array, Array]:
     """R (k,) of features (k,) beside modes (m,), and the amplitude √Σ k²a² (k,) that the modes have there."""
+    nearby = 0.02
     per_bark = 40.0
     per_duration = 1.0
     if not len(mode_hz) or not len(freq_hz):
@@ -50,7 +50,7 @@ def match_ratios(
         per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None], 0.0
     )
     apart = across**2 + along**2
-    score, near = 1 / (1 + apart), (loud**POWER) / (apart + NEAR**2) ** 2
+    score, near = 1 / (1 + apart), (loud**POWER) / (apart + nearby**2) ** 2
     ratio = (near * score).sum(axis=1) / np.maximum(near.sum(axis=1), 1e-300)
     return ratio, np.sqrt(((score * mode_amplitude) ** 2).sum(axis=1))
 

@@ -26,18 +26,6 @@ from sonic_bullet.records.errors import FileError
 READ = (15, 58, 164, 2411)
 QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration", 15: "pressure"}
 FORCES = (9, 13)
-FUNCTIONS = {
-    0: "general functions",
-    2: "auto spectra",
-    3: "cross spectra",
-    5: "transmissibilities",
-    6: "coherences",
-    7: "auto correlations",
-    8: "cross correlations",
-    9: "power spectral densities",
-    10: "energy spectral densities",
-    12: "spectra",
-}
 Point = tuple[float, float, float]
 
 
@@ -204,13 +192,25 @@ def _response(
     one: dict[str, Any], nodes: dict[int, Point], units: tuple[float, float], path: str | os.PathLike[str]
 ) -> Response | str:
     """Convert a dataset 58, or describe it where it is not understood; FileError where it is cut."""
+    functions = {
+        0: "general functions",
+        2: "auto spectra",
+        3: "cross spectra",
+        5: "transmissibilities",
+        6: "coherences",
+        7: "auto correlations",
+        8: "cross correlations",
+        9: "power spectral densities",
+        10: "energy spectral densities",
+        12: "spectra",
+    }
     largest_value = 1e12
     uneven = 1e-4  # of the last abscissa: text has six figures of each
     least_step = 1e-7  # Hz or s: the highest rate that a recording has
     gravity_m_s2 = 9.80665  # standard, of accelerations in g
     kind, quantity = int(one["func_type"]), QUANTITIES.get(int(one["ordinate_spec_data_type"]))
     if kind not in (1, 4):
-        return FUNCTIONS.get(kind, f"functions of type {kind}")
+        return functions.get(kind, f"functions of type {kind}")
     below = int(one.get("orddenom_spec_data_type", 0))
     if quantity is None or (below not in FORCES and below != 0):
         word = "frequency responses" if kind == 4 else "time records"

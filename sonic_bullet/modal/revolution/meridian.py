@@ -19,10 +19,6 @@ from sonic_bullet.records import Array
 
 ROUND = 2e-5
 """Of the diagonal: what vertices of one ring may differ by."""
-WIDEST_RAD = 0.45
-"""Angle of an edge about the axis: a ring of fewer than 14 has an area 3 % less than its disc's."""
-APART = 0.4
-"""Of the mesh's edges there: distance of the outline's points between rings."""
 
 
 class Projected(NamedTuple):
@@ -227,7 +223,8 @@ def _is_one_curve(walk: Array, flat: Array, place: Array, diagonal: float) -> bo
 
 
 def _outline(walk: Array, flat: Array, place: Array, fine: Array, diagonal: float) -> Array:
-    """Thin points (v, 2) to an outline (p, 2): all poles and rings; others `APART` of the mesh's edges, fine (v,)."""
+    """Thin points (v, 2) to an outline (p, 2): all poles and rings; others `apart` of the mesh's edges, fine (v,)."""
+    apart = 0.4  # of the mesh's edges there: distance of the outline's points between rings
     ring = 14  # Vertices at one place of the meridian that are a ring
     ordered, _ = _with_poles(walk, flat, place)
     size = _with_poles(walk, np.stack([fine, fine], axis=1), place)[0][:, 0]
@@ -248,14 +245,15 @@ def _outline(walk: Array, flat: Array, place: Array, fine: Array, diagonal: floa
     kept = [0]
     for k in range(1, len(middle)):
         ends = middle[[kept[-1], coming[np.searchsorted(coming, k)] % len(middle)]]
-        if whole[k] or np.linalg.norm(ends - middle[k], axis=1).min() >= APART * size[k]:
+        if whole[k] or np.linalg.norm(ends - middle[k], axis=1).min() >= apart * size[k]:
             kept.append(k)
     return middle[kept]
 
 
 def _is_round(outline: Array, middle: Array, radius: Array, length: Array, diagonal: float) -> bool:
-    """Say whether edges' middles (e, 3) lie as near the outline as on rings without a gap of `WIDEST_RAD`."""
-    allowed = np.maximum((1 - np.cos(WIDEST_RAD / 2)) * radius, 0.05 * length) + ROUND * diagonal
+    """Say whether edges' middles (e, 3) lie as near the outline as on rings without a gap of `widest_rad`."""
+    widest_rad = 0.45  # Angle of an edge about the axis: a ring of fewer than 14 has an area 3 % less than its disc's
+    allowed = np.maximum((1 - np.cos(widest_rad / 2)) * radius, 0.05 * length) + ROUND * diagonal
     return bool((placed(outline, flattened(middle)).off <= allowed).all())
 
 

@@ -25,9 +25,6 @@ from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
 PHYSICS, SHAPES, AUDIO = "KHR_physics_rigid_bodies", "KHR_implicit_shapes", "KHR_audio_rigid_bodies"
 UP_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Turns a shape whose axis is z so that it is y."""
-MOTION = {"isKinematic", "mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation"} | {
-    "linearVelocity", "angularVelocity", "gravityFactor", "extensions", "extras"
-}  # fmt: skip
 COLLIDER = {"geometry", "physicsMaterial", "extensions", "extras"}
 
 
@@ -80,12 +77,19 @@ def body_frame(nodes: Nodes, index: int) -> BodyFrame:
 
 def motion_of(nodes: Nodes, index: int, notes: list[str]) -> BodyMotion:
     """Read a node's `motion`; without one, a body stands still."""
+    motion = {"isKinematic", "mass", "centerOfMass", "inertiaDiagonal", "inertiaOrientation"} | {
+        "linearVelocity",
+        "angularVelocity",
+        "gravityFactor",
+        "extensions",
+        "extras",
+    }
     name, own = nodes.name(index), nodes.extension(index, PHYSICS)
     said = own.get("motion")
     zero = np.zeros(3)
     if said is None:
         return BodyMotion(0.0, zero, zero, zero, 1.0)
-    notes += [f"{name}: motion.{key} is not known" for key in sorted(set(said) - MOTION)]
+    notes += [f"{name}: motion.{key} is not known" for key in sorted(set(said) - motion)]
     if said.get("isKinematic"):  # it follows its animation, or stands still
         return BodyMotion(0.0, zero, zero, zero, 1.0)
     turn = nodes.placed(index).turn  # velocities are in the node's space [KHR_physics_rigid_bodies, Motions]
