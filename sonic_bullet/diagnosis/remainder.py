@@ -73,7 +73,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     if len(total) > 1:
         words += f"; {_places(takes, scatter)}"
     strange = of_no_body(takes, made)
-    if strange > RULES.no_body_share:
+    if strange > RULES.most_share:
         words += (
             "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes "
             "with time or level, or is noise"

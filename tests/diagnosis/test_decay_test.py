@@ -53,14 +53,14 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
 @pytest.mark.slow
 def test_a_law_in_a_room_is_told_by_lines() -> None:
     found, named = tried(LAW)
-    assert found[0].lines > RULES.line_gain
+    assert found[0].lines > RULES.strong_evidence
     assert named
 
 
 @pytest.mark.slow
 def test_rayleighs_own_damping_in_a_room_is_no_law() -> None:
     found, named = tried()
-    assert all(c.lines < RULES.line_gain for c in found)
+    assert all(c.lines < RULES.strong_evidence for c in found)
     assert not named
 
 

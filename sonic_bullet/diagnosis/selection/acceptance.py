@@ -14,7 +14,7 @@ strikes alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ class Candidate:
         With the effect.
     drop_db : (s,)
         Gain in the distance of each left-out strike, less the gain of corrections learnt again where it moves modes; of
-        the first_strikes alone where it could not be accepted any more.
+        the loudest_strikes alone where it gains on none of those.
     whole_db : float
         Mean with that gain, by which candidates are ordered.
     control_db : float
@@ -108,7 +108,7 @@ def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
     certain : bool
         Lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only agree, too.
     """
-    faint, share = (RULES.certain_drop_db, RULES.certain_share) if certain else (RULES.faint_drop_db, RULES.faint_share)
+    faint, share = (RULES.certain_drop_db, RULES.certain_share) if certain else (RULES.faint_drop_db, RULES.most_share)
     return max(
         min(RULES.least_drop_db, max(faint, share * gap_db)) if first else RULES.least_drop_db,
         RULES.least_drop_share * gap_db,
@@ -128,7 +128,7 @@ def refusal(c: Candidate, gap_db: float, *, first: bool) -> str:
     if not (c.mean_db > need and np.isfinite(c.sd_db)):
         return f"strikes left out must come {need:.2f} dB nearer"
     more = c.whole_db - max(c.control_db, 0.0)  # a control effect is not held against corrections either
-    chance = "" if more > RULES.chance_share * need else "chance comes as near"
+    chance = "" if more > RULES.most_share * need else "chance comes as near"
     drop = np.sort(c.drop_db)
     if c.certain and c.loud and -np.minimum(drop, 0).sum() < RULES.lost_share * drop[-1]:
         # what goes with level is for the loudest to show, which these others were fitted without
@@ -140,7 +140,7 @@ def refusal(c: Candidate, gap_db: float, *, first: bool) -> str:
     sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
     if (
         len(drop) >= RULES.many_strikes
-        and drop[0] > -max(RULES.loss_share * drop.mean(), RULES.noise_db)
+        and drop[0] > -RULES.lost_share * drop.mean()
         and (drop[-2] > need or (first and c.certain and c.loud))
     ):
         # no strike speaks against it, though loud ones may gain far more than soft ones
@@ -148,34 +148,6 @@ def refusal(c: Candidate, gap_db: float, *, first: bool) -> str:
     if not drop.mean() > RULES.standard_errors * sd:
         return f"less than {RULES.standard_errors:g} standard errors"
     return chance or ("" if more > RULES.standard_errors * sd else "chance comes as near")
-
-
-def may_be_accepted(asked: Candidate, open_db: np.ndarray[Any, Any], gap_db: float) -> bool:
-    """Decide whether a candidate could still be accepted that was evaluated on the first few strikes alone.
-
-    Of gains at most m_i the mean over its standard error is largest at min(m_i, c) for some c, so caps_tried of these
-    are tried; loud strikes may gain most.
-
-    Parameters
-    ----------
-    asked : Candidate
-        Gains on the first strikes, impulses of all.
-    open_db : (s,)
-        The most it may gain on each.
-    gap_db : float
-        What is open.
-    """
-    first, loud = (
-        len(asked.drop_db),
-        np.isin(np.arange(len(open_db)), np.argsort(-asked.impulse_n_s)[: RULES.loudest_strikes]),
-    )
-    for cap in (np.inf, *np.linspace(0.0, max(float(open_db.max()), 0.0), RULES.caps_tried)[1:]):
-        for free in (np.zeros(len(open_db), bool), loud):
-            drop = np.where(free, open_db, np.minimum(open_db, cap))
-            drop[:first] = asked.drop_db
-            if accepted(replace(asked, drop_db=drop, whole_db=gap_db, control_db=0.0), gap_db, first=True):
-                return True
-    return False
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:

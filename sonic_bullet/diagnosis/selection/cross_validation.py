@@ -28,7 +28,7 @@ from sonic_bullet.diagnosis.prediction.line_score import Listed
 from sonic_bullet.diagnosis.prediction.prediction import predict, predict_each
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, may_be_accepted, mean
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, mean
 from sonic_bullet.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.diagnosis.selection.thresholds import RULES
@@ -82,7 +82,7 @@ def cross_validated(
         ):
             continue  # lines that were paired with another material's modes tell little of what mixes these
         if group[0].traits.cost is Cost.COSTLY and (
-            not costly or any(c.mean_db > RULES.cheap_share * gap for c in found)
+            not costly or any(c.mean_db > RULES.most_share * gap for c in found)
         ):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         if group[0].traits.cost is Cost.COSTLY:
@@ -245,12 +245,14 @@ def _cross_validated(
         lines = likelier(predict_each(fold.base, lined), made, evidence, less) if lined else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    found = parallel_map(judged, range(min(RULES.first_strikes, len(folds))))
-    asked = Candidate(kind.id, whole, h, np.array([g.drop_db for g in found]), 0.0, 0.0, {}, impulse_n_s=_levels(folds))
-    if may_be_accepted(
-        asked, np.array([f.least - f.noise for f in folds]), mean([f.before - f.noise for f in folds])
-    ) or tells(h, whole):  # lines may speak for what strikes do not
-        found += parallel_map(judged, range(len(found), len(folds)))
+    level = _levels(folds)
+    loud = np.argsort(-np.nan_to_num(level), kind="stable")[: RULES.loudest_strikes].tolist()
+    gains = dict(zip(loud, parallel_map(judged, loud), strict=True))
+    if any(g.drop_db > 0 for g in gains.values()) or tells(h, whole):  # lines may speak for what strikes do not
+        rest = [i for i in range(len(folds)) if i not in gains]
+        gains |= dict(zip(rest, parallel_map(judged, rest), strict=True))
+    asked = sorted(gains)
+    found = [gains[i] for i in asked]
     added = refitted(replace(h, effects=(*h.effects, whole)), bodies, evidence.observed)
     drop, whole_db, control_db = (
         np.array([g.drop_db for g in found]),
@@ -259,7 +261,6 @@ def _cross_validated(
     )
     # each line is left out in so many of the folds
     lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)
-    level = _levels(folds[: len(found)])
     return Candidate(
         kind.id,
         whole,
@@ -269,7 +270,7 @@ def _cross_validated(
         control_db,
         jackknife([g.effect.parameters() for g in found if g.effect is not None]),
         lines,
-        level,
+        level[asked],
     )
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.diagnosis.evidence.refit import ROUGH
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves_itself
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.selection.thresholds import RULES
@@ -74,7 +75,7 @@ def _cost(made: Predictions, one: ObjectEvidence) -> Array:
     """Compute ρ (k,) of lines' decays (k,) against those of their modes."""
     per_s = next(p.model.decay_per_s for body, p in made.items() if body.recorded is one.source)
     model = np.array([per_s[m].mean() for m in one.mode])
-    sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), RULES.decay_scatter)
+    sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), ROUGH)
     with np.errstate(divide="ignore"):
         z = np.log(one.decay_per_s / np.maximum(model, 1e-9)) / sd
-    return np.asarray(RULES.cauchy_width**2 * np.log1p((z / RULES.cauchy_width) ** 2))
+    return np.asarray(RULES.standard_errors**2 * np.log1p((z / RULES.standard_errors) ** 2))

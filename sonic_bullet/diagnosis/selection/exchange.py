@@ -38,7 +38,7 @@ Less = Callable[[Evidence], Evidence]
 
 def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
     """Select a round's other accepted candidates, which the best may precede by chance, or by what the model lacks."""
-    return tuple(c for c in found if c is not best and c.mean_db > RULES.rival_share * best.mean_db)
+    return tuple(c for c in found if c is not best and c.mean_db > RULES.most_share * best.mean_db)
 
 
 def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
@@ -164,7 +164,7 @@ def exchanged(
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
             place = next(k for k, e in enumerate(effects) if e.id == rival.id)
             other = again(refitted(with_effects(best, effects, problem.bodies), problem.bodies), place, problem)
-            if problem.distance_db(other) > problem.distance_db(best) + RULES.far_rival_db:
+            if problem.distance_db(other) > problem.distance_db(best) + RULES.suffices_db:
                 continue  # it would have to gain by strikes it never saw
             other = settled(other, problem)
             far = left_out_db(best, place, problem) if far is None else far
@@ -206,12 +206,12 @@ def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ..
     if moves(best) or moves(other) or dry[0] != dry[1]:
         return False
     mine, its = phases(best, bodies), phases(other, bodies)
-    return bool(np.isfinite([mine, its]).all() and its > mine + RULES.hint_of_phases)
+    return bool(np.isfinite([mine, its]).all() and its > mine + RULES.strong_evidence)
 
 
 def significant(gain_db: Array, least_db: float) -> bool:
     """Decide whether strikes agree that there is a gain (s,), and more than least_db."""
     if len(gain_db) < 2 or gain_db.mean() <= least_db:
         return False
-    none_loses = len(gain_db) >= RULES.many_strikes and gain_db.min() > -RULES.loss_share * gain_db.mean()
+    none_loses = len(gain_db) >= RULES.many_strikes and gain_db.min() > -RULES.lost_share * gain_db.mean()
     return bool(none_loses or gain_db.mean() > RULES.standard_errors * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))

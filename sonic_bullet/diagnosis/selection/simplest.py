@@ -56,7 +56,7 @@ def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, f
     )
     if after >= full.distance_db + RULES.same_share * max(full.gap_db, 0.0):
         return False
-    return before.distance_db - after > RULES.helps_share * needed(
+    return before.distance_db - after > RULES.most_share * needed(
         max(before.gap_db, 0.0), first=first, certain=c.certain
     )
 
@@ -66,7 +66,7 @@ def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
 
     Without a mesh nothing distinguishes modes among a room's lines.
     """
-    if not (problem.has_meshes and c.lines > RULES.line_gain):
+    if not (problem.has_meshes and c.lines > RULES.strong_evidence):
         return False
     return problem.distance_db(reidentified(c.hypothesis, problem.bodies)) < full.distance_db + RULES.same_share * max(
         full.gap_db, 0.0
@@ -78,7 +78,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
 
     That is by two standard errors of the difference, and alike_share of its gain. Where another with no more numbers is
     nearly as near (phases_decide_share), the lines' phases may decide (phase_test.py): by clear_phases, or by
-    hint_of_phases where it is alike_share. Between two that only change decays the lines' own decays decide, by BIC.
+    strong_evidence where it is alike_share. Between two that only change decays the lines' own decays decide, by BIC.
     Effects that move modes are not compared: corrections are learnt anew with them, and are numbers too.
     """
     best = able[0]
@@ -115,7 +115,8 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Ev
     own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
     off = np.array(
         [
-            misfit(c.hypothesis, bodies) + (RULES.hint_of_phases if close(c, RULES.alike_share) else RULES.clear_phases)
+            misfit(c.hypothesis, bodies)
+            + (RULES.strong_evidence if close(c, RULES.alike_share) else RULES.clear_phases)
             for c in others
         ]
     )
@@ -127,7 +128,7 @@ def pruned(
 ) -> tuple[Hypothesis, list[Candidate]]:
     """Remove effects that later ones have made needless."""
     for candidate in added[:-1]:
-        if candidate.lines > RULES.line_gain:
+        if candidate.lines > RULES.strong_evidence:
             continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), problem.bodies), problem.bodies)

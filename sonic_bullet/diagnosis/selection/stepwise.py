@@ -248,7 +248,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
             first, weak = (
                 found,
                 all(
-                    problem.distance_db(c.hypothesis) - now.floor_db > RULES.weak_share * max(now.gap_db, 0.0)
+                    problem.distance_db(c.hypothesis) - now.floor_db > RULES.most_share * max(now.gap_db, 0.0)
                     for c in found
                 ),
             )
@@ -304,12 +304,12 @@ def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: S
     gap, left = before_db - now.floor_db, now.gap_db
     if not added:
         excused = gap < RULES.suffices_db or (
-            gap < of_the_mesh(h, problem) and of_no_body(problem.takes, problem.predict(h)) < RULES.no_body_share
+            gap < of_the_mesh(h, problem) and of_no_body(problem.takes, problem.predict(h)) < RULES.most_share
         )
         return "none" if excused else "unexplained"
     # whose response takes up what a mesh gets wrong, too: that is no excuse
     room = any(isinstance(e, Dereverberates) for e in h.effects)
-    most = max((1 - (RULES.explained_by_room_share if room else RULES.explained_share)) * gap, RULES.suffices_db)
+    most = max((1 - (RULES.explained_by_room_share if room else RULES.most_share)) * gap, RULES.suffices_db)
     return "explained" if left <= most or (not room and left <= of_the_mesh(h, problem)) else "unexplained"
 
 
@@ -322,7 +322,7 @@ def _by_a_finer_mesh(
         return verdict, 0.0, start
     ideal = problem.score(far)
     ideal = replace(ideal, distance_db=min(ideal.distance_db, before_db))
-    if ideal.gap_db < RULES.suffices_db and of_no_body(problem.takes, problem.predict(start)) < RULES.no_body_share:
+    if ideal.gap_db < RULES.suffices_db and of_no_body(problem.takes, problem.predict(start)) < RULES.most_share:
         verdict = "none"
     elif added:
         both, _ = beyond(h, problem)

@@ -71,6 +71,12 @@ FIRST_DIAGNOSIS = _since("f650a3c")  # the commit with which diagnosis began
 class Thresholds:
     """All of them. Raises ValueError where one is out of its range, or has no unit, reason or provenance."""
 
+    most_share: Threshold = T(
+        0.5,
+        "1",
+        "most of a gap, of a gain or of what is needed: more than half",
+        "convention: of two parts the larger",
+    )
     # acceptance
     least_drop_db: Threshold = T(0.4, "dB", "mean gain on strikes left out, at least", FIRST_DIAGNOSIS)
     least_drop_share: Threshold = T(0.08, "of the gap", "the same, where the gap is wide", _since("5e45792"))
@@ -80,7 +86,6 @@ class Thresholds:
         "in place of the least drop while nothing is found, if the gain is most of the gap",
         _since("0d18b91"),
     )
-    faint_share: Threshold = T(0.5, "of the gap", "what counts as most of it for a faint drop", _since("0d18b91"))
     certain_drop_db: Threshold = T(
         0.1,
         "dB",
@@ -88,19 +93,14 @@ class Thresholds:
         _since("58d84bf"),
     )
     certain_share: Threshold = T(0.25, "of the gap", "in place of the faint share, likewise", _since("ca2b773"))
-    chance_share: Threshold = T(
-        0.5, "of the drop needed", "by how much an effect must gain more than a control effect", FIRST_DIAGNOSIS
-    )
     standard_errors: Threshold = T(
         2.0, "standard errors", "a mean over strikes differs from zero", "convention: 95 % of a normal mean"
     )
-    loudest_strikes: Count = C(
-        2, "strikes", "one of these must gain most by what depends on amplitude", _since("ca2b773")
-    )
+    loudest_strikes: Count = C(2, "strikes", "left out first; what gains on none of them is dropped", _since("ca2b773"))
     lost_share: Threshold = T(
         0.15,
-        "of the loudest strike's gain",
-        "all that the others may lose by what depends on amplitude",
+        "of the gain",
+        "what one strike may lose of the mean, all others together of the loudest's, and not speak against an effect",
         _since("2b1b956"),
     )
     many_strikes: Count = C(
@@ -112,22 +112,12 @@ class Thresholds:
     odd_strike_factor: Threshold = T(
         3.0, "times the drop needed", "what the rest must gain before one strike counts as odd", _since("3e49a55")
     )
-    loss_share: Threshold = T(
-        0.1, "of the mean gain", "what a strike may lose and still not speak against an effect", _since("b840359")
-    )
-    noise_db: Threshold = T(0.03, "dB", "the same at least, for noise alone moves a distance as far", _since("0e9159a"))
-    caps_tried: Count = C(
-        60, "levels", "gains tried on strikes not yet played, before a candidate is dropped", _since("60c4492")
-    )
     # simplest
-    helps_share: Threshold = T(
-        0.5, "of the drop needed", "gain on all strikes together, for one of few lines may be chance", _since("8138e87")
-    )
-    line_gain: Threshold = T(
+    strong_evidence: Threshold = T(
         6.0,
         "2 Δ ln L",
-        "likelihood of decays left out, where a room's response says the same of the strikes",
-        _since("8d31fbf"),
+        "of lines' decays or phases, where strikes prefer neither",
+        "Kass & Raftery 1995, section 3.2: 6 to 10 is strong",
     )
     same_share: Threshold = T(
         0.1, "of what a room's response leaves open", "two that differ by less say the same", _since("bb1e1b4")
@@ -135,18 +125,11 @@ class Thresholds:
     # stepwise
     rounds: Count = C(4, "rounds", "effects added one by one, at most", FIRST_DIAGNOSIS)
     suffices_db: Threshold = T(1.5, "dB", "a smaller gap is the mesh's and the shapes' own", FIRST_DIAGNOSIS)
-    explained_share: Threshold = T(0.5, "of the gap", "what accepted effects must close to be named", FIRST_DIAGNOSIS)
     explained_by_room_share: Threshold = T(
         0.7,
         "of the gap",
         "the same with a room, whose response has a tap for every sample and takes up much",
         _since("8b6cb3e"),
-    )
-    no_body_share: Threshold = T(
-        0.5, "of what is open", "with more left by lines in phase, it is no mesh's error", _since("8b6cb3e")
-    )
-    weak_share: Threshold = T(
-        0.5, "of the gap", "where every candidate leaves more, two are tried at once", _since("08f1067")
     )
     costly_open_share: Threshold = T(
         0.3, "of the first gap", "with less left, no costly candidate is tried", _since("af918d8")
@@ -163,35 +146,14 @@ class Thresholds:
         0.2, "of the gain", "between two that differ by less, phases or decays may decide", _since("5245b93")
     )
     clear_phases: Threshold = T(25.0, "2 Δ ln L", "phases decide against what strikes prefer", _since("5245b93"))
-    hint_of_phases: Threshold = T(
-        5.0, "2 Δ ln L", "phases decide where strikes prefer neither, or to keep an effect", _since("951b71d")
-    )
     # exchange
-    rival_share: Threshold = T(
-        0.5,
-        "of the best candidate's gain",
-        "an accepted candidate with as much may replace it later",
-        _since("62e487b"),
-    )
-    far_rival_db: Threshold = T(
-        1.0, "dB", "a rival farther from the fitted strikes is not fitted through", _since("9002cdf")
-    )
     alike_share: Threshold = T(0.03, "of the gain", "two that differ by less are alike", _since("f039c9b"))
     # cross-validation
     kept_lines_share: Threshold = T(0.75, "of the lines", "kept in every fold, the others left out", FIRST_DIAGNOSIS)
     control_draws: Count = C(2, "draws", "of the control effect, for every strike left out", FIRST_DIAGNOSIS)
-    first_strikes: Count = C(2, "strikes", "left out before a candidate without hope is dropped", _since("802019b"))
     control_numbers: Count = C(8, "numbers", "of a control effect, at most", FIRST_DIAGNOSIS)
     enough_effects: Count = C(
         2, "effects", "with as many found and little open, no long search is begun", _since("879e402")
-    )
-    cheap_share: Threshold = T(
-        0.6, "of the gap", "where a cheap candidate closes as much, costly ones wait", _since("5e45792")
-    )
-    # decay test
-    decay_scatter: Threshold = T(0.02, "of a decay", "how far decays scatter about their law", _since("8d31fbf"))
-    cauchy_width: Threshold = T(
-        2.0, "standard errors", "within them the loss of decays is quadratic", _since("8d31fbf")
     )
     # levels by band
     early_s: Threshold = T(
@@ -220,7 +182,7 @@ class Thresholds:
             raise ValueError(
                 "what lines agree on needs no larger drop than what is faint, and that none larger than any other"
             )
-        if not self.explained_share <= self.explained_by_room_share:
+        if not self.most_share <= self.explained_by_room_share:
             raise ValueError("a room must close no less of the gap than another effect")
 
 
