@@ -234,6 +234,12 @@ def residual(**options: Any) -> None:
     help="Also write one page that opens offline: players, spectrograms, evidence, the verdict in words.",
 )
 @click.option(
+    "--next",
+    "propose",
+    is_flag=True,
+    help="Also propose the strike that would separate the two best models most, and how far they lie apart there.",
+)
+@click.option(
     "--seed",
     type=click.IntRange(0),
     default=0,

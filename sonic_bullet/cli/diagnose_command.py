@@ -6,6 +6,7 @@ Exit 0: a verdict; 1: the baseline is farther from the recordings than silence.
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,14 @@ SHOWN = 4  # numbers of a list, in the summary: all of them are in the JSON
 
 
 def run_diagnose(
-    source: str, *, output: str | None, json_to: str | None, predict: str | None, report: str | None, seed: int
+    source: str,
+    *,
+    output: str | None,
+    json_to: str | None,
+    predict: str | None,
+    report: str | None,
+    seed: int,
+    propose: bool = False,
 ) -> None:
     """Run `diagnose`; raises SonicBulletError."""
     if output is not None and not output.endswith(".json"):
@@ -39,6 +47,11 @@ def run_diagnose(
             found = diagnose(case, seed=seed, progress=progress)
             if folder is not None:
                 written = _predicted(found, folder)
+            if propose:
+                from sonic_bullet.diagnosis.separating_strike import separating_strike
+
+                progress("looking for the strike that would tell most")
+                strike = separating_strike(found.closed)
             if report is not None:
                 from sonic_bullet.report.diagnosis_page import write_report
 
@@ -50,10 +63,13 @@ def run_diagnose(
 
             write_preset(output, preset_of(found))
         say(_summary(found))
+        if propose:
+            say(f"next strike: {strike or 'no two models to separate, or no recordings'}")
         if predict is not None:
             say(f"{format_count(written, 'strike')} predicted in {predict}")
     warn(found.warnings)
-    write_json(json_to, described(found))
+    asked = {"next_strike": asdict(strike) if strike else None} if propose else {}
+    write_json(json_to, described(found) | asked)
     if found.verdict == "worse-than-silence":
         raise click.exceptions.Exit(1)
 

@@ -88,7 +88,9 @@ def test_every_verdict_can_be_written(
     monkeypatch.setattr(module, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr(diagnose_command, "read_case", lambda _: case)
     place = tmp_path / "d.json"
-    diagnose_command.run_diagnose("made", output=None, json_to=str(place), predict=None, report=None, seed=0)
+    diagnose_command.run_diagnose(
+        "made", output=None, json_to=str(place), predict=None, report=None, seed=0, propose=True
+    )
     written = json.loads(place.read_text())
     assert written["verdict"] == verdict
     assert words in written["unexplained"].get("words", "")
@@ -98,6 +100,11 @@ def test_every_verdict_can_be_written(
         assert row["standard_error_db"] > 0 and row["numbers"] == -1 and row["strikes"] == len(takes)
     said = capsys.readouterr().out
     assert ("named, or why not" in said) == bool(written["candidates"])
+    assert "next strike: " in said
+    assert (written["next_strike"] is not None) == bool(written["candidates"])
+    if verdict == "explained":
+        assert written["next_strike"]["models"] == ["damping-law", "no effect"]
+        assert written["next_strike"]["apart_db"] > written["next_strike"]["apart_so_far_db"] > 1.0
     assert written["baseline"]["gamma_m2_s2"] is None and written["errors"]["floor"] is None
     if "dB more" in words:
         assert all(isinstance(band["early"], bool) for band in written["unexplained"]["bands_off"])
