@@ -11,12 +11,15 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
+from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import accepted
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.effects.damping_law import DampingLaw
+from sonic_bullet.effects.radiation import IMPEDANCE, Radiation, areas
+from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.estimator.lines.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
 from tests.made.problems import posed
@@ -79,3 +82,17 @@ def test_objects_of_one_strike_stand_trial_with_the_others() -> None:
     assert accepted(found[0], 5.0, first=True) and found[0].drop_db.min() > 0
     out = left_out_db(found[0].hypothesis, 0, posed(bodies, takes))
     assert len(out) == len(takes) and np.isfinite(out).all()
+
+
+def test_what_the_medium_takes_is_taken_of_another_object_by_its_own_shape() -> None:
+    """Δd = s ½ ρ₀ c σ A of the other's own A; a dashpot under the first object is not under the other one.
+
+    α and β are without what a body radiates once that is named, so another object must radiate, too.
+    """
+    air, held = Radiation(0.04, 0.3), SupportDamping(((0.0477, 0.0371, 0.0),), (9.0,))
+    other = replace(recorded(), recorded=None)
+    other = replace(other, model=replace(other.model, shape=np.float32(2) * other.model.shape))  # a quarter of the mass
+    plain, model = predict(truth(), other).model, predict(replace(truth(), effects=(air, held)), other).model
+    expected = 0.3 * 0.5 * IMPEDANCE * air.efficiency(plain.freq_hz) * areas(plain)
+    assert expected.min() > 0
+    assert model.decay_per_s - plain.decay_per_s == pytest.approx(expected, rel=1e-3)

@@ -45,8 +45,13 @@ class Hypothesis:
 
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """Return the effects of a stage; for an object that was not fitted only those that carry over."""
-        mine = (e for e in self.effects if e.stage is stage and (fitted or e.owner in CARRIES))
+        mine = (e for e in self.effects if e.stage is stage and (fitted or carries(e)))
         return tuple(sorted(mine, key=lambda e: OWNER_ORDER.index(e.owner)) if stage is Stage.SOUND else mine)
+
+
+def carries(effect: Effect) -> bool:
+    """Decide whether an effect acts on other objects of the material: the medium's does, by each object's own shape."""
+    return effect.owner in CARRIES or effect.traits.needs_unknown_medium
 
 
 def moves(h: Hypothesis) -> bool:
