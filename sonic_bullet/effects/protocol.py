@@ -100,8 +100,8 @@ class Traits:
         It is proposed only where lines agree on it, each by its own baseband, and goes with level: a smaller gain on
         excluded strikes is enough, of which a loud one gains most.
     needs_unknown_medium : bool
-        It is the medium's: where that is known, the baseline has it, or there is none. It acts on other objects by their
-        own shapes.
+        It is the medium's: where that is known, the baseline has it, or there is none. It acts on other objects by
+        their own shapes.
     """
 
     moves_modes: bool = False
