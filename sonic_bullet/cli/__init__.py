@@ -36,7 +36,16 @@ from sonic_bullet.cli.examples import (
     MODES_EPILOG,
     RESIDUAL_EPILOG,
 )
-from sonic_bullet.cli.parameters import Numbers, channel_option, csv_option, json_option, strike_options, uff_option
+from sonic_bullet.cli.parameters import (
+    ManyOptions,
+    Numbers,
+    channel_option,
+    csv_option,
+    json_option,
+    many_options,
+    strike_options,
+    uff_option,
+)
 from sonic_bullet.cli.scenes.dataset_command import dataset
 from sonic_bullet.cli.scenes.play_command import play
 from sonic_bullet.cli.scenes.render_command import render
@@ -169,8 +178,14 @@ def features(**options: Any) -> None:
 
 
 @cli.command(epilog=FIT_EPILOG)
-@click.argument("source", metavar="RECORDING|CASE_DIR")
-@click.option("-o", "--output", required=True, metavar="PRESET.json", help="The fitted material as a preset file.")
+@click.argument("sources", nargs=-1, required=True, metavar="RECORDING|CASE_DIR...")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="PRESET.json|DIR",
+    help="The fitted material as a preset file; of several cases a folder, with a folder each.",
+)
 @strike_options
 @click.option(
     "--dimension-tolerance",
@@ -184,11 +199,17 @@ def features(**options: Any) -> None:
 @csv_option
 @uff_option
 @json_option
-def fit(**options: Any) -> None:
+@many_options
+def fit(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
-    from sonic_bullet.cli.fit_command import run_fit
+    if len(sources) > 1 or many.given:
+        from sonic_bullet.cli.many.many_cases import run_many
 
-    run_fit(**options)
+        run_many("fit", sources, many, **options)
+    else:
+        from sonic_bullet.cli.fit_command import run_fit
+
+        run_fit(sources[0], **options)
 
 
 @cli.command(epilog=RESIDUAL_EPILOG)
@@ -215,12 +236,13 @@ def residual(**options: Any) -> None:
 
 
 @cli.command(epilog=DIAGNOSE_EPILOG)
-@click.argument("source", metavar="CASE_DIR")
+@click.argument("sources", nargs=-1, required=True, metavar="CASE_DIR...")
 @click.option(
     "-o",
     "--output",
-    metavar="PRESET.json",
-    help="The fitted material, with the effects that belong to it and its object, as a preset file.",
+    metavar="PRESET.json|DIR",
+    help="The fitted material, with the effects that belong to it and its object, as a preset file; of several cases "
+    "a folder, with a folder each.",
 )
 @json_option
 @click.option(
@@ -246,11 +268,17 @@ def residual(**options: Any) -> None:
     show_default=True,
     help="Seed of what is left out in turn, and of the null effects.",
 )
-def diagnose(**options: Any) -> None:
+@many_options
+def diagnose(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
     """Find which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
-    from sonic_bullet.cli.diagnose_command import run_diagnose
+    if len(sources) > 1 or many.given:
+        from sonic_bullet.cli.many.many_cases import run_many
 
-    run_diagnose(**options)
+        run_many("diagnose", sources, many, **options)
+    else:
+        from sonic_bullet.cli.diagnose_command import run_diagnose
+
+        run_diagnose(sources[0], **options)
 
 
 @cli.group(epilog=CASE_EPILOG)

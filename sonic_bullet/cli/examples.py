@@ -35,6 +35,7 @@ Examples:
 --material porcelain -o mug.json --json
   sonic-bullet fit my_case/ -o preset.json       (several strikes, sizes, sensors: a folder with a case.json)
   sonic-bullet fit my_case/ -o preset.json --dimension-tolerance 0.1 --uff modes.uff
+  sonic-bullet fit cases/*/ -o out --workers 4 --csv lines.csv   (a folder a case, and out/summary.csv)
 The preset plays at once: listener.add(body, material="preset.json")."""
 
 RESIDUAL_EPILOG = """\b
@@ -57,6 +58,7 @@ Examples:
   sonic-bullet diagnose my_case/ --json verdict.json --predict predicted/ --report page.html
   sonic-bullet diagnose my_case/ --next           (which strike would tell the two best models apart)
   sonic-bullet diagnose my_case/ -o preset.json   (what belongs to material and object sounds in every scene)
+  sonic-bullet diagnose cases/*/ -o out --workers 4 --report page.html
 A verdict is none, explained, unexplained or worse-than-silence (exit 1)."""
 
 CASE_EPILOG = """\b

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass
+from functools import wraps
 from typing import Any
 
 import click
@@ -160,3 +163,53 @@ def strike_options(command: Any) -> Any:
     ):
         command = option(command)
     return command
+
+
+def many_options(command: Any) -> Any:
+    """Add the options of a command that takes many cases; it is called with a `ManyOptions` as ``many``."""
+
+    @wraps(command)
+    def called(*, workers: int | None, limit_s: float | None, scheduler: str | None, **options: Any) -> None:
+        command(many=ManyOptions(workers, limit_s, scheduler), **options)
+
+    for option in reversed(
+        (
+            click.option(
+                "--workers",
+                type=click.IntRange(1, 1024),
+                metavar="N",
+                help="Of several cases: processes at once. [default: one a core]",
+            ),
+            click.option(
+                "--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster whose workers do the cases."
+            ),
+            click.option(
+                "--limit",
+                "limit_s",
+                type=click.FloatRange(0, min_open=True),
+                metavar="S",
+                help="Of several cases: wall time that each may take. [default: 3600]",
+            ),
+        )
+    ):
+        called = option(called)
+    return called
+
+
+@dataclass(frozen=True, slots=True)
+class ManyOptions:
+    """How many cases are done. workers, limit_s: None: not given."""
+
+    workers: int | None
+    limit_s: float | None
+    scheduler: str | None
+
+    @property
+    def given(self) -> bool:
+        """Whether any of them was given."""
+        return any(one is not None for one in (self.workers, self.limit_s, self.scheduler))
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -3,7 +3,7 @@
     NAME.py, or `impacts` -> Recipe: its text, by value
     recipe, seed, number (a job) -> sample(rng) -> DatasetScene -> build(client) -> listener, steps -> Sample: sound in
         pascals, contacts as labels, parameters, provenance
-    jobs -> processes (job_processes) or a Dask cluster (cluster_jobs) -> Sample, or the reason why there is none
+    jobs -> processes or a Dask cluster (`sonic_bullet.jobs`) -> Sample, or the reason why there is none
         -> SampleFolder: NAME.wav, then NAME.json, each renamed when whole -> manifest.jsonl, failures.jsonl
         -> layouts of loaders (`sonic_bullet.dataset.loaders`)
 

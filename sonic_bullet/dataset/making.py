@@ -5,22 +5,19 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from sonic_bullet.dataset.cluster_jobs import open_cluster, run_on_cluster
-from sonic_bullet.dataset.job_processes import Failed, run_jobs
 from sonic_bullet.dataset.loaders.layouts import check_formats, write_layout
 from sonic_bullet.dataset.object_splits import SHARES, object_names, splits_of
 from sonic_bullet.dataset.recipes import Recipe
 from sonic_bullet.dataset.sample_folder import SampleFolder, open_folder
 from sonic_bullet.dataset.samples import Job, Sample, make_sample, warm_up
 from sonic_bullet.files.levels import check_sr
+from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.records.counts import format_count
-from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.session.keeping import package_versions
 
 
@@ -100,37 +97,27 @@ def make_dataset(
     check_formats(formats)
     numbers = range(first, first + count)
     job = partial(_make, recipe, seed, sr)
-    with open_cluster(scheduler) if scheduler else nullcontext() as cluster, open_folder(folder, made_by) as kept:
+    with open_workers(workers, limit_s, scheduler) as crew, open_folder(folder, made_by) as kept:
         missing = [number for number in numbers if not kept.is_done(number)]
-        made, failures, splits = 0, dict[int, str](), dict[str, str]()
-        try:
-            if missing:
-                if cluster is None:
-                    say("machine code")
-                    warm_up()
-                say("objects")
-                names = object_names(recipe, seed, kept, numbers.stop, workers, limit_s)
-                splits = splits_of(names, shares)
-                say(f"0 of {len(missing)}")
-            if cluster is None:
-                jobs = run_jobs(job, missing, workers, limit_s)
-            else:
-                jobs = run_on_cluster(cluster, job, missing, limit_s, say)
-            for number, found in jobs:
-                if isinstance(found, Failed):
-                    failures[number] = found.reason
-                elif found.labels["object"] not in splits:
-                    failures[number] = "the recipe drew another object the second time; draw all by rng"
-                else:
-                    kept.keep(found, splits[found.labels["object"]])
-                    made += 1
-                failed = f", {len(failures)} failed" if failures else ""
-                say(f"{made} of {len(missing)}{failed}")
-        except BaseException:
-            with suppress(SonicBulletError):
-                kept.write_lists(numbers, failures)
-            raise
-        kept.write_lists(numbers, failures)
+        splits = dict[str, str]()
+
+        def prepare() -> None:
+            if crew.cluster is None:
+                say("machine code")
+                warm_up()
+            say("objects")
+            splits.update(splits_of(object_names(recipe, seed, kept, numbers.stop, workers, limit_s), shares))
+
+        def keep(number: int, made: Sample) -> str | None:
+            if made.labels["object"] not in splits:
+                return "the recipe drew another object the second time; draw all by rng"
+            kept.keep(made, splits[made.labels["object"]])
+            return None
+
+        made, failures = finish_jobs(
+            job, missing, crew, keep=keep, write_lists=lambda failed: kept.write_lists(numbers, failed), say=say,
+            prepare=prepare,
+        )  # fmt: skip
         layouts = {name: str(write_layout(name, kept, numbers, say)) for name in dict.fromkeys(formats)}
         return _summary(kept, numbers, made, failures, layouts)
 

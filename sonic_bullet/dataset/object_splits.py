@@ -12,9 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from sonic_bullet.dataset.job_processes import Failed, attempt, run_jobs
 from sonic_bullet.dataset.recipes import Recipe
 from sonic_bullet.dataset.sample_folder import SampleFolder
+from sonic_bullet.jobs.job_processes import Failed, attempt, run_jobs
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import SceneError
 

@@ -20,15 +20,10 @@ from typing import Any
 import msgspec
 
 from sonic_bullet.dataset.samples import Sample
-from sonic_bullet.files.atomic import cannot, replacing
+from sonic_bullet.files.atomic import replacing
 from sonic_bullet.files.audio import write_audio
+from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines, written
 from sonic_bullet.machine.json_text import json_bytes
-from sonic_bullet.records.errors import FileError
-
-try:
-    import fcntl
-except ImportError:  # Windows has no such locks: two runs there share a folder unnoticed
-    fcntl = None  # type: ignore[assignment]
 
 LabelledSounds = Callable[[], Iterator[tuple[dict[str, Any], Path]]]
 """Labels and sound file of each sample, by number, from the first at each call."""
@@ -53,7 +48,7 @@ class SampleFolder:
     def keep(self, sample: Sample, split: str) -> None:
         """Write a sample: sound first, labels last."""
         audio = self.place(sample.number, ".wav")
-        with _written(audio):
+        with written(audio):
             audio.parent.mkdir(parents=True, exist_ok=True)
         write_audio(audio, sample.sound.astype(float), sample.sr, subtype="FLOAT")
         with replacing(self.place(sample.number, ".json")) as file:
@@ -68,10 +63,9 @@ class SampleFolder:
 
     def write_lists(self, numbers: range, failures: Mapping[int, str]) -> None:
         """Write manifest and failures."""
-        with replacing(self.root / "manifest.jsonl") as file:
-            file.writelines(json_bytes(one) + b"\n" for one in self.labels(numbers))
-        with replacing(self.root / "failures.jsonl") as file:
-            file.writelines(json_bytes({"number": n, "reason": why}) + b"\n" for n, why in sorted(failures.items()))
+        write_json_lines(self.root / "manifest.jsonl", self.labels(numbers))
+        failed = ({"number": number, "reason": why} for number, why in sorted(failures.items()))
+        write_json_lines(self.root / "failures.jsonl", failed)
 
 
 @contextmanager
@@ -83,45 +77,5 @@ def open_folder(root: str | os.PathLike[str], made_by: Mapping[str, Any]) -> Ite
     FileError
         It is another data set's, another run writes it, it holds other files, or it cannot be written.
     """
-    place = Path(root).absolute()
-    about = place / "dataset.json"
-    with _written(place):
-        place.mkdir(parents=True, exist_ok=True)
-        lock = os.open(place, os.O_RDONLY) if fcntl is not None else None
-    try:
-        if lock is not None:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise FileError(f"another run writes {root}", "wait for its end, or give another folder") from None
-        if about.is_file():
-            _check_same(root, about, made_by)
-        elif any(one.name != "samples" and not one.name.endswith(".partial") for one in place.iterdir()):
-            raise FileError(f"{root} holds other files", "give an empty folder, or a new one")
-        with replacing(about) as file:
-            file.write(json_bytes(dict(made_by), indent=2))
+    with open_job_folder(root, "dataset.json", made_by, kind="data set", own=("samples",)) as place:
         yield SampleFolder(place)
-    finally:
-        if lock is not None:
-            os.close(lock)
-
-
-def _check_same(root: object, about: Path, made_by: Mapping[str, Any]) -> None:
-    """Raise FileError where a folder was made by other settings."""
-    try:
-        before = msgspec.json.decode(about.read_bytes())
-    except (OSError, msgspec.DecodeError):
-        before = {}
-    wanted = msgspec.json.decode(json_bytes(dict(made_by)))
-    other = [name for name in wanted if not isinstance(before, dict) or before.get(name) != wanted[name]]
-    if other:
-        what = f"{root} is a data set of another {' and '.join(other).replace('_', ' ')}"
-        raise FileError(what, "give another folder, or what it was begun with")
-
-
-@contextmanager
-def _written(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise cannot("write", path, error) from error

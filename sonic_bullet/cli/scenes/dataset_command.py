@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from sonic_bullet.cli.parameters import json_option
+from sonic_bullet.cli.parameters import cores, json_option
 
 DATASET_EPILOG = """\b
 Examples:
@@ -53,14 +53,12 @@ def dataset(
     json_to: str | None,
 ) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
-    import os
     from dataclasses import asdict
 
     from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
 
     (to,) = places(json_to)
     root = folder_place(folder)
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     with clean_stdout(to) as say, status(recipe) as tell:
         with quiet_stderr():
             from sonic_bullet.dataset.making import make_dataset
@@ -68,7 +66,7 @@ def dataset(
             from sonic_bullet.dataset.recipes import read_recipe
         made = make_dataset(
             read_recipe(recipe), root, count=count, first=first, seed=seed, sr=sr,
-            workers=workers or cores or 1, limit_s=limit_s, formats=formats,
+            workers=workers or cores(), limit_s=limit_s, formats=formats,
             shares=as_shares(shares), scheduler=scheduler, say=tell,
         )  # fmt: skip
         for line in made.lines():

@@ -1,6 +1,6 @@
 """Jobs on a Dask cluster: as many at once as it has workers, each of one thread; results come back as they are done.
 
-    numbers -> tasks of the scheduler -> a worker -> Sample, or the reason -> three tries -> (number, Sample or reason)
+    items -> tasks of the scheduler -> a worker -> result, or the reason -> three tries -> (item, result or reason)
 
 A worker that dies takes its job's try with it: the scheduler gives the job to another one, and gives it up when it has
 killed more workers than its setting allowed-failures says. A job that takes too long ends its worker so.
@@ -20,11 +20,12 @@ from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
-from sonic_bullet.dataset.job_processes import TRIES, Failed, attempt
+from sonic_bullet.jobs.job_processes import TRIES, Failed, attempt
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.records.errors import FileError, exception_words
 from sonic_bullet.session.keeping import package_versions
 
+Item = TypeVar("Item")
 Made = TypeVar("Made")
 ANSWER_S = 10.0
 """Of a scheduler, when it is called and while it works."""
@@ -68,16 +69,16 @@ def _without_log() -> Iterator[None]:
 
 
 def run_on_cluster(
-    client: Any, do: Callable[[int], Made], numbers: Iterable[int], limit_s: float, say: Say
-) -> Iterator[tuple[int, Made | Failed]]:
-    """Yield (number, do(number)) as they are done, or `Failed` after three tries; a try ends after limit_s seconds.
+    client: Any, do: Callable[[Item], Made], items: Iterable[Item], limit_s: float, say: Say
+) -> Iterator[tuple[Item, Made | Failed]]:
+    """Yield (item, do(item)) as they are done, or `Failed` after three tries; a try ends after limit_s seconds.
 
     Parameters
     ----------
     client : distributed.Client
         Of the cluster. Its workers import this package from an installation of the same versions.
     do : callable
-        Depends on its number alone, and can be pickled.
+        Depends on its item alone; both can be pickled.
 
     Raises
     ------
@@ -86,9 +87,9 @@ def run_on_cluster(
     """
     look_s = 0.5  # between two looks at the scheduler and its workers
     versions = package_versions()
-    todo, again = iter(numbers), deque[tuple[int, int]]()
+    todo, again = ((item, 1) for item in items), deque[tuple[Item, int]]()
     done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    running: dict[str, tuple[int, int, Any]] = {}
+    running: dict[str, tuple[Item, int, Any]] = {}
     try:
         workers, looked_s, answered_s = 0, 0.0, time.monotonic()
         while True:
@@ -102,12 +103,13 @@ def run_on_cluster(
                 if not workers:
                     say("no worker yet")
             while len(running) < workers:
-                number, nth = again.popleft() if again else (next(todo, -1), 1)
-                if number < 0:
+                following = again.popleft() if again else next(todo, None)
+                if following is None:
                     break
-                key = f"sonic-bullet-{number}-{nth}-{os.urandom(8).hex()}"
-                task = client.submit(_work, do, number, limit_s, versions, key=key, pure=False)
-                running[key] = (number, nth, task)
+                item, nth = following
+                key = f"sonic-bullet-{os.urandom(16).hex()}"
+                task = client.submit(_work, do, item, limit_s, versions, key=key, pure=False)
+                running[key] = (item, nth, task)
                 task.add_done_callback(done.put)
             if not running and workers:
                 return
@@ -115,12 +117,12 @@ def run_on_cluster(
                 task = done.get(timeout=look_s)
             except queue.Empty:
                 continue
-            number, nth, _ = running.pop(task.key)
+            item, nth, _ = running.pop(task.key)
             made = _received(client, task)
             if isinstance(made, Failed) and task.status == "finished" and nth < TRIES:
-                again.append((number, nth + 1))
+                again.append((item, nth + 1))
             else:
-                yield number, made
+                yield item, made
     finally:
         with suppress(Exception):
             client.cancel([task for _, _, task in running.values()])
@@ -169,14 +171,14 @@ def _received(client: Any, task: Any) -> Any:
             return Failed(f"a worker could not run it: {exception_words(error)}")
 
 
-def _work(do: Callable[[int], Made], number: int, limit_s: float, versions: dict[str, str]) -> Made | Failed:
+def _work(do: Callable[[Item], Made], item: Item, limit_s: float, versions: dict[str, str]) -> Made | Failed:
     """Run one job in a worker, which ends where it takes too long."""
     mine = package_versions()
     if mine != versions:
         other = ", ".join(f"{name} {mine[name]} for {versions[name]}" for name in mine if mine[name] != versions[name])
         return Failed(f"a worker has other versions: {other}")
     with _deadline(limit_s):
-        return attempt(do, number)
+        return attempt(do, item)
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """A process a job: a job that crashes, hangs or eats its memory ends alone, and leaves nothing to the next.
 
-numbers -> up to N processes, each a fork with machine code and recipe loaded (elsewhere than on Linux: a new one)
-    -> pipe -> Sample, or the reason -> three tries -> (number, Sample or reason), as they end
+items -> up to N processes, each a fork with all that is loaded (elsewhere than on Linux: a new one)
+    -> pipe -> result, or the reason -> three tries -> (item, result or reason), as they end
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from sonic_bullet.machine.progress import clear_stage
 from sonic_bullet.machine.worker import end_with
 from sonic_bullet.records.errors import SonicBulletError, exception_words
 
+Item = TypeVar("Item")
 Made = TypeVar("Made")
 TRIES = 3
 _CONTEXT = "fork" if sys.platform == "linux" else "spawn"
@@ -29,40 +30,41 @@ _CONTEXT = "fork" if sys.platform == "linux" else "spawn"
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """Why there is no sample: a line."""
+    """Why there is no result: a line."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Running:
-    number: int
+    item: Any
     nth: int
     process: Any
     until_s: float
 
 
 def run_jobs(
-    do: Callable[[int], Made], numbers: Iterable[int], workers: int, limit_s: float, *, tries: int = TRIES
-) -> Iterator[tuple[int, Made | Failed]]:
-    """Yield (number, do(number)) as they are done, or `Failed` after ``tries`` of at most limit_s seconds each.
+    do: Callable[[Item], Made], items: Iterable[Item], workers: int, limit_s: float, *, tries: int = TRIES
+) -> Iterator[tuple[Item, Made | Failed]]:
+    """Yield (item, do(item)) as they are done, or `Failed` after ``tries`` of at most limit_s seconds each.
 
-    ``do`` depends on its number alone.
+    ``do`` depends on its item alone.
     """
     context: Any = get_context(_CONTEXT)
-    todo, again = iter(numbers), deque[tuple[int, int]]()
+    todo, again = ((item, 1) for item in items), deque[tuple[Item, int]]()
     running: dict[Connection, _Running] = {}
     try:
         while True:
             while len(running) < workers:
-                number, nth = again.popleft() if again else (next(todo, -1), 1)
-                if number < 0:
+                following = again.popleft() if again else next(todo, None)
+                if following is None:
                     break
+                item, nth = following
                 ours, theirs = context.Pipe(duplex=False)
-                process = context.Process(target=_work, args=(do, number, theirs, os.getpid()), daemon=True)
+                process = context.Process(target=_work, args=(do, item, theirs, os.getpid()), daemon=True)
                 process.start()
                 theirs.close()
-                running[ours] = _Running(number, nth, process, time.monotonic() + limit_s)
+                running[ours] = _Running(item, nth, process, time.monotonic() + limit_s)
             if not running:
                 return
             pause_s = max(0.0, min(job.until_s for job in running.values()) - time.monotonic())
@@ -77,9 +79,9 @@ def run_jobs(
                 clear_stage(job.process.pid)
                 pipe.close()
                 if isinstance(found, Failed) and job.nth < tries:
-                    again.append((job.number, job.nth + 1))
+                    again.append((job.item, job.nth + 1))
                 else:
-                    yield job.number, found
+                    yield job.item, found
     finally:
         for job in running.values():
             job.process.kill()
@@ -96,20 +98,20 @@ def _received(pipe: Connection, job: _Running) -> Any:
         return Failed(f"its process ended by {how}" + ("; the memory may not suffice" if code == -9 else ""))
 
 
-def _work(do: Callable[[int], Any], number: int, out: Connection, parent: int) -> None:
+def _work(do: Callable[[Item], Any], item: Item, out: Connection, parent: int) -> None:
     """Run one job in its process and send what it gives."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     end_with(parent)
-    found = attempt(do, number)
+    found = attempt(do, item)
     with suppress(OSError):
         out.send(found)
 
 
-def attempt(do: Callable[[int], Made], number: int) -> Made | Failed:
-    """Return do(number), or the reason why it fails."""
+def attempt(do: Callable[[Item], Made], item: Item) -> Made | Failed:
+    """Return do(item), or the reason why it fails."""
     try:
-        return do(number)
+        return do(item)
     except SonicBulletError as error:
         return Failed(str(error))
     except Exception as error:
