@@ -51,7 +51,7 @@ test: .venv/dev.stamp
 	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
-test-all: check
+test-all: check .venv/lerobot.stamp
 	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m pytest -n $(WORKERS)
 
@@ -84,6 +84,13 @@ clean:
 	@echo "installing into .venv with the tools (once)"
 	@$(PIP) --editable '.[dev]'
 	@touch $@ .venv/run.stamp
+
+# LeRobot's library brings PyTorch, 8 GB in all, and old versions of what others need: it has an environment of its own
+.venv/lerobot.stamp: pyproject.toml .venv/python.stamp
+	@echo "installing LeRobot's library into .venv/lerobot (once)"
+	@$(BIN)/python -m venv .venv/lerobot
+	@.venv/lerobot/$(PIP:.venv/%=%) --editable '.[lerobot]'
+	@touch $@
 
 .venv/docs.stamp: .venv/dev.stamp
 	@echo "installing what builds the site into .venv (once)"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -128,12 +130,75 @@ def test_hugging_face_reads_the_audio_folder(place: Path, monkeypatch: pytest.Mo
             assert row["contacts"] == one["contacts"] and row["parameters"] == one["parameters"]
 
 
+READER = """
+import json, sys
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+told = {}
+for split in sys.argv[1:]:
+    read = LeRobotDataset("sonic_bullet/" + split, root="out/lerobot/" + split)
+    rows = [read[number] for number in range(len(read))]
+    mics = sorted(name for name in rows[0] if name.startswith("observation.audio."))
+    told[split] = {
+        "fps": read.fps, "episodes": read.num_episodes, "version": read.meta.info["codebase_version"],
+        "episode": [int(row["episode_index"]) for row in rows], "task": [row["task"] for row in rows],
+        "timestamp": [float(row["timestamp"]) for row in rows],
+        "sound": [[row[mic].tolist() for row in rows] for mic in mics],
+    }
+print(json.dumps(told))
+"""
+
+
+def python_with_lerobot() -> str:
+    """The interpreter of the environment that `make test-all` makes for LeRobot's library, or this one."""
+    own = Path(__file__).resolve().parents[2] / ".venv" / "lerobot" / "bin" / "python"
+    for python in (str(own), sys.executable):
+        if own.exists() or python == sys.executable:
+            found = "import importlib.util as u; raise SystemExit(u.find_spec('lerobot') is None)"
+            if subprocess.run([python, "-c", found], check=False).returncode == 0:
+                return python
+    pytest.skip("could not import lerobot: `make .venv/lerobot.stamp` makes its environment, 8 GB")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_lerobot_reads_what_its_own_library_wrote(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = python_with_lerobot()
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    monkeypatch.setenv("HF_HOME", str(place / "hf"))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
+    words = [python, "-m", "sonic_bullet", "dataset", "fall.py", "--count", "8", "--sr", str(SR), "--format", "lerobot"]
+    for folder in ("out", "again"):
+        subprocess.run([*words, "-o", folder], check=True)
+    assert contents("out") == contents("again")
+    by_split: dict[str, list[dict[str, Any]]] = {}
+    for one in manifest():
+        by_split.setdefault(one["split"], []).append(one)
+    assert len(by_split) > 1
+    read = subprocess.run([python, "-c", READER, *by_split], check=True, capture_output=True, text=True)
+    told = json.loads(read.stdout.splitlines()[-1])
+    for split, samples in by_split.items():
+        got = told[split]
+        assert (got["version"], got["fps"], got["episodes"]) == ("v3.0", 60, len(samples))
+        lines = Path("out", "lerobot", f"{split}.jsonl").read_text().splitlines()
+        assert [json.loads(line)["number"] for line in lines] == [one["number"] for one in samples]
+        episode = np.array(got["episode"])
+        for number, one in enumerate(samples):
+            rows = np.flatnonzero(episode == number)
+            assert {got["task"][row] for row in rows} == {one["object"]}
+            assert np.allclose([got["timestamp"][row] for row in rows], np.arange(len(rows)) / 60)
+            for heard, channel in zip(np.array(got["sound"], np.float32), sound_of(one), strict=True):
+                whole = heard[rows].ravel()
+                assert np.array_equal(whole[: len(channel)], channel.astype(np.float32))
+                assert not whole[len(channel) :].any() and len(whole) - len(channel) < SR // 60
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("parquet", "there is no format parquet; one of audiofolder"),
+        ("parquet", "there is no format parquet; one of audiofolder, lerobot"),
         ("zar", "did you mean zarr"),
-        ("lerobot", "lerobot"),
+        ("lerobots", "did you mean lerobot"),
     ],
 )
 def test_an_unknown_format_is_one_line_and_makes_nothing(

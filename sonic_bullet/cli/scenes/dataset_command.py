@@ -32,7 +32,7 @@ The same command again makes what is missing. Exit 1: some samples could not be 
 )  # fmt: skip
 @click.option(
     "--format", "formats", multiple=True, metavar="NAME",
-    help="A layout for loaders, in DIR/NAME beside the samples: audiofolder, webdataset or zarr. Repeatable.",
+    help="A layout for loaders, in DIR/NAME beside the samples: audiofolder, lerobot, webdataset or zarr.",
 )  # fmt: skip
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Of a Dask cluster whose workers make the samples.")
 @click.option("--shares", metavar="A,B,C", help="Of the objects in train, validation, test. [default: 8,1,1]")

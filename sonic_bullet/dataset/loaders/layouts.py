@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.dataset.loaders.audio_folder import write_audio_folder
+from sonic_bullet.dataset.loaders.lerobot_rows import write_lerobot
 from sonic_bullet.dataset.loaders.maniwav import write_replay_buffers
 from sonic_bullet.dataset.loaders.tar_shards import write_tar_shards
 from sonic_bullet.dataset.sample_folder import LabelledSounds, SampleFolder
@@ -37,6 +38,7 @@ class LoaderFormat:
 
 FORMATS: Mapping[str, LoaderFormat] = {
     "audiofolder": LoaderFormat(write_audio_folder),
+    "lerobot": LoaderFormat(write_lerobot, "lerobot"),
     "webdataset": LoaderFormat(write_tar_shards, "webdataset"),
     "zarr": LoaderFormat(write_replay_buffers, "zarr"),
 }
@@ -45,9 +47,6 @@ FORMATS: Mapping[str, LoaderFormat] = {
 def check_formats(names: Iterable[str]) -> None:
     """Raise FileError for a format that there is not, or whose library is not installed."""
     for name in names:
-        if name == "lerobot":
-            what = "there is no format lerobot: its writer is lerobot itself, which needs PyTorch, diffusers and OpenCV"
-            raise FileError(what, "write zarr, and convert where LeRobot is installed")
         if name not in FORMATS:
             raise FileError(f"there is no format {name}", nearest(name, list(FORMATS)))
         FORMATS[name].check_library()

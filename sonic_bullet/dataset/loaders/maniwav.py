@@ -18,39 +18,27 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.dataset.loaders.audio_rows import ROWS_PER_S, audio_rows, count_rows, one_kind
 from sonic_bullet.dataset.sample_folder import LabelledSounds
-from sonic_bullet.files import read_audio
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
-from sonic_bullet.records.errors import FileError
-
-ROWS_PER_S = 60
-"""Frames of its camera."""
 
 
 def write_replay_buffers(samples: LabelledSounds, to: Path) -> None:
     """Write all samples; FileError where their rates or channels differ, or a row is no whole number of samples."""
-    rows: dict[str, list[int]] = {}
-    kinds = set[tuple[int, int]]()
-    for labels, _ in samples():
-        sr = labels["sr"]
-        kinds.add((sr, labels["channels"]))
-        rows.setdefault(labels["split"], []).append(-(-round(labels["seconds"] * sr) * ROWS_PER_S // sr))
-    if not kinds:
+    kind = one_kind("zarr", (labels for labels, _ in samples()))
+    if kind is None:
         return
-    if len(kinds) > 1:
-        listed = ", ".join(f"{channels} at {sr} Hz" for sr, channels in sorted(kinds))
-        raise FileError(f"zarr holds one rate and number of channels; these are {listed}", "choose another format")
-    ((sr, channels),) = kinds
-    if sr % ROWS_PER_S:
-        raise FileError(f"zarr has {ROWS_PER_S} rows a second, which {sr} Hz does not fill", "make it at --sr 48000")
+    rows: dict[str, list[int]] = {}
+    for labels, _ in samples():
+        rows.setdefault(labels["split"], []).append(count_rows(labels))
     for split, counts in rows.items():
         _write_split(
             to,
             split,
             (one for one in samples() if one[0]["split"] == split),
             np.cumsum(counts, dtype=np.int64),
-            (sr, channels),
+            kind,
         )
 
 
@@ -74,11 +62,8 @@ def _write_split(
     channel = [data.create_array(f"mic_{number}", **size, **how) for number in range(channels)]
     with (to / f"{split}.jsonl").open("wb") as lines:
         for (labels, path), start, end in zip(samples, np.append(0, ends), ends, strict=False):
-            sound, _ = read_audio(path)
-            padded = np.zeros((channels, (end - start) * width), np.float32)
-            padded[:, : sound.shape[1]] = sound
-            for of, row in zip(channel, padded, strict=True):
-                of[start:end] = row.reshape(-1, width)
+            for of, row in zip(channel, audio_rows(path, sr), strict=True):
+                of[start:end] = row
             lines.write(json_bytes({key: value for key, value in labels.items() if key != "audio"}) + b"\n")
     _zip(folder, to / f"{split}.zarr.zip")
     shutil.rmtree(folder)
