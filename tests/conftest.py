@@ -71,5 +71,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         ("shared data", "shared data not found"),
         ("another library", "could not import"),
         ("a Chromium", "no Chromium on PATH"),
+        ("a disk of one's own", "no mount namespace"),
     ):
         terminalreporter.write_line(f"{sum(said in one for one in skipped)} tests skipped for want of {what}")

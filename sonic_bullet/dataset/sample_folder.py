@@ -24,6 +24,7 @@ from sonic_bullet.files.atomic import replacing
 from sonic_bullet.files.audio import write_audio
 from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines, written
 from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.records.errors import FileError
 
 LabelledSounds = Callable[[], Iterator[tuple[dict[str, Any], Path]]]
 """Labels and sound file of each sample, by number, from the first at each call."""
@@ -51,8 +52,12 @@ class SampleFolder:
         with written(audio):
             audio.parent.mkdir(parents=True, exist_ok=True)
         write_audio(audio, sample.sound.astype(float), sample.sr, subtype="FLOAT")
-        with replacing(self.place(sample.number, ".json")) as file:
-            file.write(json_bytes({"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}))
+        try:
+            with replacing(self.place(sample.number, ".json")) as file:
+                file.write(json_bytes({"audio": str(audio.relative_to(self.root)), "split": split, **sample.labels}))
+        except FileError:
+            audio.unlink(missing_ok=True)  # a full disk then has room for the lists
+            raise
 
     def labels(self, numbers: range) -> Iterator[dict[str, Any]]:
         """Yield the labels of those of the samples that are kept, by number."""

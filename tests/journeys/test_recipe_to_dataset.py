@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -163,6 +164,36 @@ def test_a_full_disk_keeps_what_is_whole_and_is_gone_on_from(
     assert dataset(*how) == 0
     assert dataset("fall.py", "-o", "two", "--count", 3) == 0
     assert contents("one") == contents("two")
+
+
+ON_A_SMALL_DISK = """
+mount -t tmpfs -o size=72k tmpfs small || exit 77
+"$@"; code=$?
+cp -r small cut
+mount -o remount,size=20m small
+"$@" && cp -r small finished && exit $code
+"""
+
+
+@pytest.mark.slow
+def test_a_disk_that_is_really_full_is_one_line_and_the_same_command_gives_the_same_bytes(place: Path) -> None:
+    Path("small").mkdir()
+    words = [sys.executable, "-m", "sonic_bullet", "dataset", "fall.py", "--count", "5", "--sr", "12000", "-o"]
+    unshare = shutil.which("unshare")
+    if unshare is None or subprocess.run([unshare, "-m", "true"], check=False, capture_output=True).returncode:
+        pytest.skip("no mount namespace")
+    on_it = [unshare, "-m", "bash", "-c", ON_A_SMALL_DISK, "bash", *words, "small"]
+    done = subprocess.run(on_it, check=False, capture_output=True, text=True)
+    if done.returncode == 77:
+        pytest.skip("no mount namespace")
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert "disk full; free space or choose another place" in done.stderr
+    # what was finished is kept and listed, nothing half-written has a name
+    listed = [one["audio"] for one in manifest("cut")]
+    assert 0 < len(listed) < 5
+    assert sorted(listed) == sorted(str(one.relative_to("cut")) for one in Path("cut").rglob("*.wav"))
+    assert subprocess.run([*words, "whole"], check=False).returncode == 0
+    assert contents("finished") == contents("whole")
 
 
 def test_what_fails_is_listed_and_the_rest_goes_on(place: Path, capfd: pytest.CaptureFixture[str]) -> None:

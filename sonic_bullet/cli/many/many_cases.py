@@ -119,15 +119,20 @@ def _is_done(place: Path, case: CaseFolder) -> bool:
 
 
 def _keep(folder: Path, found: CaseResult) -> None:
+    """Write a case's results, the mark that they are whole last; leave none of them where that fails."""
+    marked = {**found.files, DONE: json_bytes({"case_sha256": found.case_sha256})}
     with written(folder):
         (folder / DONE).unlink(missing_ok=True)
-        for name in found.files:
+        for name in marked:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-    for name, content in found.files.items():
-        with replacing(folder / name) as file:
-            file.write(content)
-    with replacing(folder / DONE) as file:
-        file.write(json_bytes({"case_sha256": found.case_sha256}))
+    try:
+        for name, content in marked.items():
+            with replacing(folder / name) as file:
+                file.write(content)
+    except FileError:
+        for name in marked:
+            (folder / name).unlink(missing_ok=True)
+        raise
 
 
 def _write_lists(command: str, place: Path, cases: Iterable[CaseFolder], failed: Mapping[CaseFolder, str]) -> None:

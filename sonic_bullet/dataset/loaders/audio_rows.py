@@ -21,7 +21,7 @@ ROWS_PER_S = 60
 def count_rows(labels: Mapping[str, Any]) -> int:
     """Return how many rows a sample has."""
     sr = int(labels["sr"])
-    return -(-round(labels["seconds"] * sr) * ROWS_PER_S // sr)
+    return -(-int(labels["seconds"] * sr + 0.5) * ROWS_PER_S // sr)
 
 
 def one_kind(name: str, labels: Iterable[Mapping[str, Any]]) -> tuple[int, int] | None:

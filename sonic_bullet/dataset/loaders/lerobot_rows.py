@@ -10,12 +10,12 @@ What it has of a robot (state, action, cameras) a data set of sounds has not.
 
 from __future__ import annotations
 
-import json
 import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import msgspec
 import numpy as np
 
 from sonic_bullet.dataset.loaders.audio_rows import ROWS_PER_S, audio_rows, one_kind
@@ -56,4 +56,8 @@ def write_lerobot(samples: LabelledSounds, to: Path) -> None:
 
 def _sort_keys(path: Path) -> None:
     """Sort the keys of a JSON file: the library takes them from a set, whose order differs from process to process."""
-    path.write_text(json.dumps(json.loads(path.read_text()), indent=4, sort_keys=True))
+    path.write_bytes(json_bytes(_sorted(msgspec.json.decode(path.read_bytes())), indent=4))
+
+
+def _sorted(value: Any) -> Any:
+    return {name: _sorted(value[name]) for name in sorted(value)} if isinstance(value, dict) else value
