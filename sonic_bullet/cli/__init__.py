@@ -202,14 +202,9 @@ def features(**options: Any) -> None:
 @many_options
 def fit(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
     """Fit a material to recorded strikes: E/density, Poisson's ratio, damping, gain, with spreads and a verdict."""
-    if len(sources) > 1 or many.given:
-        from sonic_bullet.cli.many.many_cases import run_many
+    from sonic_bullet.cli.many import run_one_or_many
 
-        run_many("fit", sources, many, **options)
-    else:
-        from sonic_bullet.cli.fit_command import run_fit
-
-        run_fit(sources[0], **options)
+    run_one_or_many("fit", sources, many, **options)
 
 
 @cli.command(epilog=RESIDUAL_EPILOG)
@@ -271,14 +266,9 @@ def residual(**options: Any) -> None:
 @many_options
 def diagnose(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
     """Find which physical effect the fitted model lacks, judged on strikes it was not fitted to."""
-    if len(sources) > 1 or many.given:
-        from sonic_bullet.cli.many.many_cases import run_many
+    from sonic_bullet.cli.many import run_one_or_many
 
-        run_many("diagnose", sources, many, **options)
-    else:
-        from sonic_bullet.cli.diagnose_command import run_diagnose
-
-        run_diagnose(sources[0], **options)
+    run_one_or_many("diagnose", sources, many, **options)
 
 
 @cli.group(epilog=CASE_EPILOG)

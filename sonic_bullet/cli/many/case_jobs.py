@@ -146,8 +146,11 @@ def _fit(source: str, out: Path, options: Mapping[str, Any]) -> None:
 def _diagnose(source: str, out: Path, options: Mapping[str, Any]) -> None:
     from sonic_bullet.cli.diagnose_command import run_diagnose
 
-    given = {name: _inside(out, options[name]) for name in ("predict", "report")}
-    run_diagnose(source, output=str(out / PRESET), json_to=str(out / VALUES), seed=options["seed"], **given)
+    predict, report = (_inside(out, options[name]) for name in ("predict", "report"))
+    run_diagnose(
+        source, output=str(out / PRESET), json_to=str(out / VALUES), predict=predict, report=report,
+        seed=options["seed"], propose=options["propose"],
+    )  # fmt: skip
 
 
 def _inside(out: Path, name: str | None) -> str | None:
