@@ -32,7 +32,7 @@ from benchmarks.recorded_presets import STANDARD_ERRORS
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.band_limit import without_drift
 from sonic_bullet.estimator.lines.extraction import ATTACK_S
-from sonic_bullet.estimator.lines.joint_lines import HIGHEST
+from sonic_bullet.estimator.lines.joint_lines import HIGHEST_OF_RATE
 from sonic_bullet.estimator.lines.onset import span
 from sonic_bullet.estimator.lines.standing_hum import find_standing_hum
 from sonic_bullet.records import Array
@@ -77,7 +77,7 @@ def lines_of_takes(takes: Sequence[Piece]) -> list[DecayLine]:
     heard = [impact_of(piece) for piece in takes]
     sr, count = heard[0][1], min(len(signal) for signal, _ in heard)
     signals = np.array([signal[:count] for signal, _ in heard])
-    found = ringing_lines(signals, sr, (100.0, min(12_000.0, HIGHEST * sr)), signed=False)
+    found = ringing_lines(signals, sr, (100.0, min(12_000.0, HIGHEST_OF_RATE * sr)), signed=False)
     decays = found.decay_per_s >= STANDARD_ERRORS * found.decay_sd_per_s
     size = np.sqrt((np.abs(found.amplitude[:, decays]) ** 2).mean(axis=0))
     columns = (found.freq_hz[decays], np.log(1000) / found.decay_per_s[decays], size)

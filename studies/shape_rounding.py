@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import model as solved
-from sonic_bullet.records.mode_shapes import BITS, rounded
+from sonic_bullet.records.mode_shapes import SHAPE_BITS, rounded
 from sonic_bullet.render import render_log
 from sonic_bullet.scene import render_scene
 
@@ -64,10 +64,10 @@ def main() -> int:
             for bits in asked.bits:
                 coarse = with_bits(log, bits)
                 found = difference_db(render_log(coarse), exact)
-                worst = max(worst, found if bits == BITS else -np.inf)
+                worst = max(worst, found if bits == SHAPE_BITS else -np.inf)
                 cells.append(f"{found:5.1f} dB {size_mb(coarse):6.2f}")
             print(f"{name:10} {size_mb(log):6.2f}   " + "  ".join(cells), flush=True)
-    print(f"{BITS} bits: {worst:.1f} dB at most; must hold: <= -60 dB")
+    print(f"{SHAPE_BITS} bits: {worst:.1f} dB at most; must hold: <= -60 dB")
     return int(worst > -60)
 
 

@@ -24,7 +24,7 @@ from sonic_bullet.bake.c_bank import identifier
 from sonic_bullet.bake.strike_playback import CONTACT_S, IMPULSE_N_S, LONGEST_CONTACT_S, point_normals, pressure_of
 from sonic_bullet.files.atomic import replacing
 
-HEAD = """\
+FAUST_HEAD = """\
 // {modes} modes at {points} points of {material}, by sonic_bullet.
 // Output: pressure at 1 m in Pa over "full scale". Needs the Faust standard libraries.
 import("stdfaust.lib");
@@ -84,7 +84,7 @@ def faust_bank_text(model: BakedModel) -> str:
     pressure = pressure_of(model)
     gain = -np.einsum("px,pxm->mp", point_normals(model), model.shape.astype(float))
     loudest = int(np.argmax((gain**2).T @ (np.abs(pressure) ** 2 / np.maximum(model.decay_per_s, 1e-3))))
-    head = HEAD.format(
+    head = FAUST_HEAD.format(
         modes=model.mode_count,
         points=len(model.point_m),
         material=re.sub(r"[\r\n]", " ", model.material.name) or "a body",

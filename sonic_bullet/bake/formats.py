@@ -15,15 +15,17 @@ from sonic_bullet.files.reading import reading
 from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import FileError
 
-SEVERAL = (".glb", ".gltf", ".json")
-ONE = (".dsp", ".h", ".wav")
+SEVERAL_MODELS = (".glb", ".gltf", ".json")
+ONE_MODEL = (".dsp", ".h", ".wav")
 
 
 def check_baked_name(path: str | os.PathLike[str]) -> str:
     """Check that a name has the ending of a baked model, and return it. Raises FileError."""
     end = Path(as_path(path, "path", "name a file, such as bowl.glb")).suffix.lower()
-    if end not in SEVERAL + ONE:
-        raise FileError(f"cannot bake to {path}: {shown(end)} is no format known here", nearest(end, SEVERAL + ONE))
+    if end not in SEVERAL_MODELS + ONE_MODEL:
+        raise FileError(
+            f"cannot bake to {path}: {shown(end)} is no format known here", nearest(end, SEVERAL_MODELS + ONE_MODEL)
+        )
     return end
 
 
@@ -44,7 +46,7 @@ def write_baked(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> N
         Where a format needs radiation and nothing says how the model radiates.
     """
     end = check_baked_name(path)
-    if not models or (len(models) > 1 and end in ONE):
+    if not models or (len(models) > 1 and end in ONE_MODEL):
         names = ", ".join(shown(model.name) for model in models[:8]) or "none"
         raise FileError(f"cannot bake {len(models)} bodies to {path}: {end} holds one", f"name one of {names}")
     if end == ".json":
@@ -86,8 +88,8 @@ def read_baked(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
         One line that names what does not fit.
     """
     end = Path(as_path(path, "path", "name a file, such as bowl.glb")).suffix.lower()
-    if end not in SEVERAL:
-        raise FileError(f"cannot read {path} as a baked model", f"give a file that ends in {', '.join(SEVERAL)}")
+    if end not in SEVERAL_MODELS:
+        raise FileError(f"cannot read {path} as a baked model", f"give a file that ends in {', '.join(SEVERAL_MODELS)}")
     with reading(path, "baked model", FileError, "bake it again"):
         if end == ".json":
             from sonic_bullet.bake.json_models import read_json_models

@@ -29,7 +29,7 @@ from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.session.gltf_in.own_words import EXTRAS
 
-REMEDY = "write it again as glTF 2.0 with that extension"
+NOT_SO_BAKED = "write it again as glTF 2.0 with that extension"
 
 
 def write_gltf_models(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> None:
@@ -54,7 +54,7 @@ def write_gltf_models(path: str | os.PathLike[str], models: Sequence[BakedModel]
 
 def read_gltf_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     """Read the models of a .gltf or .glb with KHR_audio_rigid_bodies, in its order. Raises FileError, RecordError."""
-    tree = read_tree(Path(path), FileError, REMEDY)
+    tree = read_tree(Path(path), FileError, NOT_SO_BAKED)
     audio = tree.tree.get("extensions", {}).get(EXTENSION, {})
     found = audio.get("modalModels", ())
     if not found:
@@ -114,7 +114,7 @@ def _material(audio: Mapping[str, Any], entry: Mapping[str, Any], name: str) -> 
     if index is None:
         return BakedMaterial()
     if not isinstance(index, int) or not 0 <= index < len(known):
-        raise FileError(f"{name}: material is {shown(index)} of {len(known)}", REMEDY)
+        raise FileError(f"{name}: material is {shown(index)} of {len(known)}", NOT_SO_BAKED)
     it = known[index]
     numbers = {ours: it.get(theirs) for theirs, ours in BULK.items()}
     young, poisson = numbers["youngs_pa"], numbers["poisson"]
@@ -128,7 +128,7 @@ def _mass(said: Mapping[str, Any] | None, name: str) -> MassProperties | None:
     if said is None:
         return None
     if "mass" not in said:
-        raise FileError(f"{name}: massProperties without a mass", REMEDY)
+        raise FileError(f"{name}: massProperties without a mass", NOT_SO_BAKED)
     turn = Rotation.from_quat(said.get("inertiaOrientation", (0.0, 0.0, 0.0, 1.0))).as_matrix()
     moment = turn @ np.diag(np.array(said.get("inertiaDiagonal", (0.0, 0.0, 0.0)), float)) @ turn.T
     return MassProperties(said["mass"], np.array(said.get("centerOfMass", (0.0, 0.0, 0.0)), float), moment)

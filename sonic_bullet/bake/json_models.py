@@ -16,7 +16,7 @@ from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-REMEDY = "bake it again, or mend that field; docs/reference/baked.md describes the file"
+BAKED_REMEDY = "bake it again, or mend that field; docs/reference/baked.md describes the file"
 
 
 def write_json_models(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> None:
@@ -46,7 +46,7 @@ def read_json_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     place = Path(path)
     if place.stat().st_size > largest_bytes:
         raise FileError(f"{path} is larger than a gigabyte", "bake fewer modes or points")
-    form = decode_json(place.read_bytes(), BakedFile, f"baked model {path}", FileError, REMEDY)
+    form = decode_json(place.read_bytes(), BakedFile, f"baked model {path}", FileError, BAKED_REMEDY)
     if form.format != FORMAT:
         raise FileError(f"{path} has format '{form.format}', wanted '{FORMAT}'", "bake it again")
     return tuple(_model(body) for body in form.bodies)
@@ -56,9 +56,11 @@ def _model(body: BodyForm) -> BakedModel:
     points, modes = len(body.point_m), len(body.modes.freq_hz)
     for number, rows in enumerate(body.shape_per_sqrt_kg, 1):
         if len(rows) != points:
-            raise FileError(f"{body.name}: shape of mode {number} is at {len(rows)} of {points} points", REMEDY)
+            raise FileError(f"{body.name}: shape of mode {number} is at {len(rows)} of {points} points", BAKED_REMEDY)
     if len(body.shape_per_sqrt_kg) != modes:
-        raise FileError(f"{body.name} has shapes of {len(body.shape_per_sqrt_kg)} modes, but {modes} modes", REMEDY)
+        raise FileError(
+            f"{body.name} has shapes of {len(body.shape_per_sqrt_kg)} modes, but {modes} modes", BAKED_REMEDY
+        )
     shape = np.array(body.shape_per_sqrt_kg, float).reshape(modes, points, 3)
     return model_of(
         body,

@@ -24,7 +24,7 @@ from sonic_bullet.synth.bank import audible
 from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST
 
 NODES_PER_SAMPLE = 2
-BLOCK = 256
+PLAYED_BLOCK = 256
 IMPULSE_N_S, CONTACT_S = 0.01, 1e-4
 """Of a strike without given impulse and length: a light tap, as long as steel on steel."""
 LONGEST_CONTACT_S = 0.05
@@ -195,9 +195,9 @@ def render_strike(model: BakedModel, strike: BakedStrike, sr: int = 48_000, seco
             z = z + weight[j] * amplitude * np.exp(step * (n - node[j]))
         done = until
         out[n] = z.real.sum()
-    starts = np.arange(during, count, BLOCK) - (during - 1)
+    starts = np.arange(during, count, PLAYED_BLOCK) - (during - 1)
     free = np.exp(np.multiply.outer(starts, step)) * z
-    tail = (free @ np.exp(np.multiply.outer(step, np.arange(BLOCK)))).real.ravel()
+    tail = (free @ np.exp(np.multiply.outer(step, np.arange(PLAYED_BLOCK)))).real.ravel()
     out[during:] = tail[: count - during]
     return out
 

@@ -20,9 +20,9 @@ from sonic_bullet.cli.output import places, table, warn
 from sonic_bullet.cli.responses import RESPONSE_COLUMNS, UFF, ResponseTakes, with_responses, write_takes
 from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
 from sonic_bullet.files import read_channel, replacing
-from sonic_bullet.files.case_fields import LARGEST
+from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.case_schema import case_schema
-from sonic_bullet.files.cases import FORMAT, UNITS, Case, read_case
+from sonic_bullet.files.cases import CASE_FORMAT, LENGTH_UNITS, Case, read_case
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.counts import format_count
@@ -68,7 +68,7 @@ def run_case_new(
     if mesh is not None:
         from sonic_bullet.modal import read_mesh
 
-        read_mesh(mesh, UNITS[units])
+        read_mesh(mesh, LENGTH_UNITS[units])
     thing = _object(mesh, units, material)
     with temporary_folder() as takes:
         if split:
@@ -164,10 +164,10 @@ def _check_options(
     """Raise FileError where an option of `case new` is out of range or lacks another."""
     if hold_out is not None and hold_out < 2:
         raise FileError(f"--hold-out is {hold_out}", "give 2 or more: some takes are to be fitted")
-    if force_newton is not None and (force_channel is None or not 0 < force_newton <= LARGEST):
+    if force_newton is not None and (force_channel is None or not 0 < force_newton <= LARGEST_NUMBER):
         raise FileError(
             f"--force-newton is {force_newton:g}" + " without --force-channel" * (force_channel is None),
-            f"name the force's channel, counted from 0, and newton at full scale, above 0, at most {LARGEST:g}",
+            f"name the force's channel, counted from 0, and newton at full scale, above 0, at most {LARGEST_NUMBER:g}",
         )
     if mesh is not None and material is None:
         raise FileError(
@@ -244,7 +244,7 @@ def _described(
     strike = {"position": None, "direction": None, "impulse": None}
     of = {"object": "object"} if thing else {}
     return {
-        "format": FORMAT,
+        "format": CASE_FORMAT,
         "case": Path(os.path.realpath(place)).name,
         "objects": {"object": thing} if thing else {},
         "support": {"fixed": []},

@@ -14,7 +14,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 
-NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
+LINE_NUMBERS = ("freq_hz", "decay_per_s", "amplitude", "freq_sd_hz", "decay_sd_per_s", "amplitude_sd")
 
 
 def run_features(
@@ -48,7 +48,7 @@ def run_features(
             _draw(picture, observed, sr, found)
         say(_summary(recording, found))
     warn(f"{recording}: {note}" for note in [found.note] if note)
-    write_csv(csv_to, feature_rows(found), (*NUMBERS, *decays))
+    write_csv(csv_to, feature_rows(found), (*LINE_NUMBERS, *decays))
     write_json(json_to, described(found, notes, doubtful=bool(found.note) or (bool(which) and channel is None)))
 
 
@@ -68,9 +68,9 @@ def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
 
 def feature_rows(found: Features) -> list[dict[str, float | int | None]]:
     """Return a row a feature, strongest first, with T60, η and Q of its decay; None for a spread not known."""
-    columns = [getattr(found, name) for name in NUMBERS]
+    columns = [getattr(found, name) for name in LINE_NUMBERS]
     return [
-        {name: finite(column[k]) for name, column in zip(NUMBERS, columns, strict=True)}
+        {name: finite(column[k]) for name, column in zip(LINE_NUMBERS, columns, strict=True)}
         | decay_values(found.freq_hz[k], found.decay_per_s[k], found.decay_sd_per_s[k])
         for k in range(len(found.freq_hz))
     ]

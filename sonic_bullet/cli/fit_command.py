@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, take_tables, write_csv
 from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
-from sonic_bullet.files.case_fields import LARGEST
+from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
 from sonic_bullet.files.uff.writer import uff_name, write_uff
 from sonic_bullet.records import Array
@@ -22,7 +22,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
-COLUMNS = (
+FIT_COLUMNS = (
     "object",
     "freq_hz",
     "freq_sd_hz",
@@ -36,7 +36,7 @@ COLUMNS = (
     "q_sd",
     "mode_hz",
 )
-ONE = (
+OF_ONE_TAKE = (
     "mesh",
     "strike",
     "direction",
@@ -92,7 +92,7 @@ def run_fit(
             write_fit_picture(picture, found)
         say(_summary(found, preset))
     warn(found.warnings)
-    write_csv(csv_to, line_rows(found), COLUMNS)
+    write_csv(csv_to, line_rows(found), FIT_COLUMNS)
     write_json(json_to, described(found))
     if found.worse_than_silence:
         raise click.exceptions.Exit(1)
@@ -117,7 +117,7 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     """
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
-        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in ONE if one[name] not in (None, ())]
+        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in OF_ONE_TAKE if one[name] not in (None, ())]
         if given:
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)
@@ -128,8 +128,8 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     for name in ("impulse", "scale", "onset_s"):
         if one[name] is not None and not np.isfinite(one[name]):
             raise FileError(f"--{name.replace('_s', '')} is {one[name]}", "give a finite number")
-    if one["impulse"] is not None and one["impulse"] > LARGEST:
-        raise FileError(f"--impulse is {one['impulse']:g} N·s", f"give it in N·s, at most {LARGEST:g}")
+    if one["impulse"] is not None and one["impulse"] > LARGEST_NUMBER:
+        raise FileError(f"--impulse is {one['impulse']:g} N·s", f"give it in N·s, at most {LARGEST_NUMBER:g}")
     missing = [f"--{name}" for name in ("mesh", "strike", "material") if one[name] is None]
     if missing:
         raise FileError(

@@ -3,8 +3,9 @@
 responses -> those of one sensor, as a case has one -> recordings (impulse_response.py), one common factor
     -> NAME-01.wav and so on, strike {place, direction, impulse}, sensor, onset, band
 
-Responses per force are written as struck with J N·s, J such that the loudest take peaks at PEAK: then files are in m/s
-or Pa. For responses at many points to one exciter, both ends are exchanged: H_ij = H_ji of motion.     [Maxwell-Betti]
+Responses per force are written as struck with J N·s, J such that the loudest take peaks at RESPONSE_PEAK: then files
+are in m/s or Pa. For responses at many points to one exciter, both ends are exchanged: H_ij = H_ji of motion.
+[Maxwell-Betti]
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files import write_audio
-from sonic_bullet.files.case_fields import LARGEST
+from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.uff.impulse_response import as_recording
 from sonic_bullet.files.uff.reader import Freedom, Point, Response, read_uff
 from sonic_bullet.records.errors import FileError
 
 UFF = frozenset({".uff", ".unv"})
 RESPONSE_COLUMNS = ("take", "struck at", "measured at", "of", "")
-PEAK = 0.5
+RESPONSE_PEAK = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
     if not loudest > 0:
         raise FileError(f"{files[0]} holds zeros alone", "export what was measured")
     first = kept[0]
-    impulse = min(float(f"{PEAK / loudest:.5g}"), LARGEST) if first.per_force else None
+    impulse = min(float(f"{RESPONSE_PEAK / loudest:.5g}"), LARGEST_NUMBER) if first.per_force else None
     sounds, strikes, rows = [], [], []
     number: dict[Path, int] = defaultdict(int)
     for (file, response), (sound, sr, _) in zip(chosen, recordings, strict=True):

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
-from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ, band_levels, level_words, onsets_s, t60_s
+from sonic_bullet.comparing.outcome.sound_effects import HEARD_OCTAVES_HZ, band_levels, level_words, onsets_s, t60_s
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.comparing.tolerance import (
@@ -39,8 +39,8 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
 
-FOLDER = "sonic_baselines"
-FORMAT = "sonic_bullet baseline 1"
+BASELINE_FOLDER = "sonic_baselines"
+BASELINE_FORMAT = "sonic_bullet baseline 1"
 Tell = Callable[[str], None]
 
 
@@ -115,7 +115,7 @@ class Checked:
 
 def baseline_place(scene: str | Path) -> Path:
     """Return the default place of a scene's baseline, in a folder beside the scene."""
-    return Path(scene).resolve().parent / FOLDER / f"{Path(scene).stem}.json"
+    return Path(scene).resolve().parent / BASELINE_FOLDER / f"{Path(scene).stem}.json"
 
 
 def samples_digest(sound: KeptSound) -> str:
@@ -133,9 +133,10 @@ def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) 
     x, place = side.sound.samples(), Path(scene).resolve()
     levels = band_levels(x, side.sr)
     made = SceneBaseline(
-        FORMAT, place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
+        BASELINE_FORMAT,
+        place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
         side.sr, len(x), x.shape[1], samples_digest(side.sound), onsets_s(x, side.sr), t60_s(x, side.sr),
-        list(OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
+        list(HEARD_OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
     )  # fmt: skip
     if defines_build(place) and runs:
         known = ensemble(SceneSide(scene), tell, runs)
@@ -160,7 +161,7 @@ def read_baseline(path: str | Path) -> SceneBaseline:
     if len(data) > most_bytes:
         raise FileError(f"{path} is no baseline: it is too large", remedy)
     version = decode_json(data, dict[str, Any], f"{path} is no baseline", FileError, remedy).get("format")
-    if version != FORMAT:
+    if version != BASELINE_FORMAT:
         raise CompareError(f"{path} is a baseline of another version ({str(version)[:40]})", remedy)
     return decode_json(data, SceneBaseline, f"{path} is no baseline", FileError, remedy)
 

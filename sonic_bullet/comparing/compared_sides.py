@@ -33,7 +33,7 @@ from sonic_bullet.session.scene_file import defines_build
 
 Given = str | Path | SceneSide | ContactLog | Side
 Tell = Callable[[str], None]
-ORDER = {True: 0, None: 1, False: 2}
+CAUSES_FIRST = {True: 0, None: 1, False: 2}
 
 
 @says_so(text="say")
@@ -146,7 +146,7 @@ def _of_logs(
             causes, found=tuple(can[i] for i in causes.found), shares={can[i]: x for i, x in shares.items()}
         )
     made = [_difference(x.who, logged_words(x), x, i, causes, same) for i, x in enumerate(logged)]
-    order = sorted(range(len(made)), key=lambda i: (ORDER[made[i].cause], _rank(logged[i], first), i))
+    order = sorted(range(len(made)), key=lambda i: (CAUSES_FIRST[made[i].cause], _rank(logged[i], first), i))
     return [made[i] for i in order], causes
 
 
@@ -172,7 +172,7 @@ def _difference(who: str, words: str, one: Asked | Logged, number: int, causes: 
 
 
 def _in_order(differences: list[Difference]) -> list[Difference]:
-    return sorted(differences, key=lambda one: (ORDER[one.cause], -(one.share or 0)))
+    return sorted(differences, key=lambda one: (CAUSES_FIRST[one.cause], -(one.share or 0)))
 
 
 def _contact_effect(first: FirstDifference) -> list[Consequence]:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing.outcome.sound_effects import OCTAVES_HZ
+from sonic_bullet.comparing.outcome.sound_effects import HEARD_OCTAVES_HZ
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Call, Who, with_leaves
@@ -29,7 +29,7 @@ from sonic_bullet.session.scene_file import defines_build
 
 RUNS = 99
 """Fewest runs in which a rank can be at the 1 % level."""
-LEVEL = 0.01
+SIGNIFICANCE = 0.01
 SHIFT_M = 1e-4
 FLOOR_DB = -90.0
 REST_M = 1e-5
@@ -192,7 +192,9 @@ def _band_spectra(x: Array, sr: int) -> Array:
     frames = x[:, : n * slices].reshape(len(x), slices, n)
     power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
     freq = np.fft.rfftfreq(n, 1 / sr)
-    bands = [power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in OCTAVES_HZ if f < sr / 2**1.5]
+    bands = [
+        power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in HEARD_OCTAVES_HZ if f < sr / 2**1.5
+    ]
     table = np.array(bands).T
     return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (FLOOR_DB / 10)) + 1e-12))
 
@@ -209,7 +211,7 @@ def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
     statistic = np.square(table @ axes[:, kept] / np.sqrt(values[kept])).sum(axis=1)
     rank = 1 + int((statistic[:-1] >= statistic[-1]).sum())
     note = "" if known.rests else "the scene does not come to rest: its end is cut in every run"
-    return Audibility(float(statistic[-1]), rank, n - 1, rank / n, rank / n <= LEVEL, note)
+    return Audibility(float(statistic[-1]), rank, n - 1, rank / n, rank / n <= SIGNIFICANCE, note)
 
 
 def audible(a: Side, b: Side, tell: Tell, known: Ensemble | None = None) -> Audibility:

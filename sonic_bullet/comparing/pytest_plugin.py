@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-PASSED = "sonic_bullet passed"
+PASSED_PROPERTY = "sonic_bullet passed"
 """Property of a test that holds what was compared."""
 
 
@@ -52,7 +52,7 @@ def sonic_scene(request: pytest.FixtureRequest) -> Callable[..., Any]:
         said, compared = _in_child(lambda: _checked(scene, here, results, config, allowed))
         if said:
             pytest.fail(said, pytrace=False)
-        request.node.user_properties.append((PASSED, f"{path}: {compared}"))
+        request.node.user_properties.append((PASSED_PROPERTY, f"{path}: {compared}"))
 
     return check
 
@@ -60,7 +60,7 @@ def sonic_scene(request: pytest.FixtureRequest) -> Callable[..., Any]:
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """List what was compared in tests that passed."""
     passed = terminalreporter.stats.get("passed", [])
-    lines = [value for one in passed for name, value in one.user_properties if name == PASSED]
+    lines = [value for one in passed for name, value in one.user_properties if name == PASSED_PROPERTY]
     if lines:
         terminalreporter.section("scenes that sound as they did")
         for line in lines:
@@ -106,7 +106,7 @@ def _checked(
     if ref is not None:
         return _against(scene, ref, [], results, tolerance_db)
     from sonic_bullet.comparing.baselines import (
-        FOLDER,
+        BASELINE_FOLDER,
         baseline_place,
         check_baseline,
         make_baseline,
@@ -115,7 +115,7 @@ def _checked(
     )
 
     baseline = baseline_place(scene)
-    with_test = here / FOLDER / baseline.name
+    with_test = here / BASELINE_FOLDER / baseline.name
     if not baseline.is_file() and with_test.is_file():  # put there by `baseline -o`
         baseline = with_test
     if config.getoption("--sonic-update"):

@@ -17,7 +17,7 @@ from sonic_bullet.listener.calls import Call, InputFile, Who, same
 if TYPE_CHECKING:
     from sonic_bullet.comparing.comparison_record import Comparison
 
-UNITS = {
+QUANTITY_UNITS = {
     "mass": "kg",
     "start position": "m",
     "start velocity": "m/s",
@@ -41,7 +41,7 @@ UNITS = {
     "thickness_m": "m",
     "sound_speed_m_s": "m/s",
 }
-PLAIN = {
+PLAIN_WORDS = {
     "density_kg_m3": "density",
     "stiffness_pa": "stiffness",
     "roughness_m": "roughness",
@@ -86,8 +86,8 @@ def logged_words(one: Logged) -> str:
 def change_words(what: str, a: Any, b: Any) -> str:
     """Describe a change: "density 7850 → 7929 kg/m³ (+1.0 %)"."""
     last = what.rsplit(maxsplit=1)[-1]
-    key = last if last in PLAIN else what
-    name, unit = PLAIN.get(key, what), UNITS.get(key, "")
+    key = last if last in PLAIN_WORDS else what
+    name, unit = PLAIN_WORDS.get(key, what), QUANTITY_UNITS.get(key, "")
     unit = f" {unit}" if unit else ""
     if a is None or b is None:
         return f"{name} {shown(a)} → {shown(b)}{unit}"

@@ -1,6 +1,6 @@
 """Ready recipe: one body falls on a floor. Random shape, size, material, height and orientation, two microphones.
 
-Make it yours by a changed file: OBJECTS, MATERIALS and the ranges in `sample`.
+Make it yours by a changed file: OBJECTS, IMPACT_MATERIALS and the ranges in `sample`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from sonic_bullet.presets import load_material
 from sonic_bullet.records import Shape
 from sonic_bullet.session.known_shapes import KnownShape, known_shape
 
-MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
-FLOOR = "concrete"
+IMPACT_MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
+FLOOR_MATERIAL = "concrete"
 SIZES = (0.6, 1.4)
 
 
@@ -78,7 +78,7 @@ def sample(rng: np.random.Generator) -> DatasetScene:
     drawn = {
         "object": name,
         "size": float(np.exp(rng.uniform(*np.log(SIZES)))),
-        "material": str(rng.choice(MATERIALS)),
+        "material": str(rng.choice(IMPACT_MATERIALS)),
         "height_m": float(rng.uniform(*heights_m)),
         "quaternion_xyzw": rng.normal(size=4).tolist(),
         "spin_rad_s": rng.normal(0, 3, 3).tolist(),
@@ -110,16 +110,19 @@ def build(
         baseOrientation=np.array(quaternion_xyzw) / np.linalg.norm(quaternion_xyzw),
     )
     client.resetBaseVelocity(body, angularVelocity=spin_rad_s)
-    for one, of in ((floor, load_material(FLOOR)), (body, made)):
+    for one, of in ((floor, load_material(FLOOR_MATERIAL)), (body, made)):
         client.changeDynamics(one, -1, restitution=of.restitution, lateralFriction=0.5, linearDamping=0)
     keep_restitution(client)
-    return {floor: {"material": FLOOR, "name": "floor"}, body: {"material": made, "model": model, "name": object}}
+    return {
+        floor: {"material": FLOOR_MATERIAL, "name": "floor"},
+        body: {"material": made, "model": model, "name": object},
+    }
 
 
 def known(object: str, material: str) -> KnownShape:
     """Solve an object once for all its sizes and materials; apart for slow ones, which have several times the modes."""
     slow = ("plastic",)
-    group = [name for name in MATERIALS if (name in slow) == (material in slow)]
+    group = [name for name in IMPACT_MATERIALS if (name in slow) == (material in slow)]
     return known_shape(OBJECTS[object], group, largest=SIZES[1])
 
 

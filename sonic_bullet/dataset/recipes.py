@@ -28,8 +28,8 @@ from sonic_bullet.session.scene_file import user_code
 
 READY = {"impacts": Path(__file__).with_name("impacts.py")}
 """Recipes of the package, by name."""
-MICROPHONE = (0.0, -1.0, 0.5)
-SECONDS = 2.0
+RECIPE_MICROPHONE = (0.0, -1.0, 0.5)
+SAMPLE_SECONDS = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +54,8 @@ class DatasetScene:
     build: Callable[[Any], Mapping[Any, Any]]
     parameters: Mapping[str, Any] = field(default_factory=dict)
     object: str = "object"
-    seconds: float = SECONDS
-    microphones: MicrophoneLike = MICROPHONE
+    seconds: float = SAMPLE_SECONDS
+    microphones: MicrophoneLike = RECIPE_MICROPHONE
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -111,8 +111,8 @@ class Recipe:
             lambda client: module.build(client, **drawn),
             drawn,
             str(drawn.get("object", Path(self.path).stem)),
-            getattr(module, "SECONDS", SECONDS),
-            getattr(module, "MICROPHONE", MICROPHONE),
+            getattr(module, "SECONDS", SAMPLE_SECONDS),
+            getattr(module, "MICROPHONE", RECIPE_MICROPHONE),
         )
 
 

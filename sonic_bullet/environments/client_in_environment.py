@@ -14,7 +14,7 @@ from typing import Any
 from sonic_bullet.listener.opening import bullet_client, connected_number, is_mujoco, mujoco_pair
 from sonic_bullet.records.errors import SceneError
 
-REMEDY = "give client=, a BulletClient, the pybullet module, a client id or MuJoCo's (model, data)"
+GIVE_CLIENT = "give client=, a BulletClient, the pybullet module, a client id or MuJoCo's (model, data)"
 
 
 def client_in(env: Any) -> Any:
@@ -55,7 +55,7 @@ def client_in(env: Any) -> Any:
 
 def _only(found: list[Any], what: str) -> Any:
     if len(found) > 1:
-        raise SceneError(f"the environment has {len(found)} {what}", REMEDY)
+        raise SceneError(f"the environment has {len(found)} {what}", GIVE_CLIENT)
     return found[0]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import gymnasium
 
-from sonic_bullet.environments.client_in_environment import REMEDY, client_in
+from sonic_bullet.environments.client_in_environment import GIVE_CLIENT, client_in
 from sonic_bullet.environments.episode_steps import EpisodeWorld
 from sonic_bullet.listener.opening import is_mujoco
 from sonic_bullet.listener.quiet import quiet_stdout
@@ -66,7 +66,9 @@ def connected_client(env: gymnasium.Env[Any, Any], client: Any) -> Any:
     """Return the client given, or the environment's own; SceneError where it has none."""
     found = client_in(env) if client is None else client
     if found is None:
-        raise SceneError(f"the environment {env.unwrapped} has no PyBullet client and no MuJoCo model and data", REMEDY)
+        raise SceneError(
+            f"the environment {env.unwrapped} has no PyBullet client and no MuJoCo model and data", GIVE_CLIENT
+        )
     return found
 
 
@@ -94,5 +96,5 @@ def _measured(env: gymnasium.Env[Any, Any], client: Any) -> Fraction:
     finally:
         world.unhook()
     if not world.steps:
-        raise SceneError("an env.step made no physics step", REMEDY + ", of the world that it steps")
+        raise SceneError("an env.step made no physics step", GIVE_CLIENT + ", of the world that it steps")
     return sum((exact_step(step.dt_s) for step in world.steps), Fraction())

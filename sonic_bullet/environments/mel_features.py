@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_flag, as_number, as_whole
 from sonic_bullet.records.errors import AudioError
 
-RATE_HZ, N_FFT, HOP, MELS = 16_000, 400, 160, 64
+RATE_HZ, N_FFT, MEL_HOP, MELS = 16_000, 400, 160, 64
 FLOOR_PA2 = 1e-12
 """Least power of a band: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there, far
 below hearing (2e-5 Pa)."""
@@ -31,7 +31,7 @@ def log_mel(
     rate_hz: int = RATE_HZ,
     mels: int = MELS,
     n_fft: int = N_FFT,
-    hop: int = HOP,
+    hop: int = MEL_HOP,
     center: bool = False,
     floor: float = FLOOR_PA2,
 ) -> Array:

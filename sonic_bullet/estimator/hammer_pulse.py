@@ -15,7 +15,10 @@ from sonic_bullet.records import Array
 
 PART = 0.1  # of the peak: what exceeds it is contact; two such stretches further apart than GAP_S are two hits
 GAP_S = 2e-4
-FLAT, FLAT_PART = 3, 0.05  # samples at the ceiling; of the contact: 0.02 of a half-sine in 16 bits is its flat top
+FLAT_SAMPLES, FLAT_FRACTION = (
+    3,
+    0.05,
+)  # samples at the ceiling; of the contact: 0.02 of a half-sine in 16 bits is its flat top
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,5 +59,5 @@ def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
     start = int(before[-1]) + 1 if len(before) else 0
     stop = hit[-1] + int(after[0]) if len(after) else len(rest)
     top = int(np.count_nonzero(rest[start:stop] >= peak * (1 - 1e-6)))
-    flat = top if top >= max(FLAT, FLAT_PART * len(hit)) else 0
+    flat = top if top >= max(FLAT_SAMPLES, FLAT_FRACTION * len(hit)) else 0
     return HammerPulse(float(rest[start:stop].sum()) / sr, peak, len(parts), bool(turned), flat)

@@ -20,12 +20,12 @@ import msgspec
 
 from sonic_bullet.files.container import read_container, write_container
 from sonic_bullet.machine.kept_files import bounded, computed, limit_bytes, touch
-from sonic_bullet.machine.user_folder import START, cache_folder
+from sonic_bullet.machine.user_folder import START_FOLDER, cache_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 
 Place = Path | Literal["default"] | None
-FORMAT = "sonic-bullet-cache/2"
+CACHE_FORMAT = "sonic-bullet-cache/2"
 
 
 class _Header(msgspec.Struct):
@@ -40,7 +40,7 @@ def folder(place: Place) -> Path | None:
     if place != "default":
         return Path(place)
     given = os.environ.get("SONIC_BULLET_CACHE")
-    return START / given if given else cache_folder("modal")
+    return START_FOLDER / given if given else cache_folder("modal")
 
 
 def holds(place: Place, name: str) -> bool:
@@ -56,7 +56,7 @@ def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
         return None
     path = where / f"{name}.npz"
     try:
-        header, arrays = read_container(path, _Header, FORMAT, "cached model")
+        header, arrays = read_container(path, _Header, CACHE_FORMAT, "cached model")
     except (FileError, LogError):
         return None
     touch(path)
@@ -76,7 +76,7 @@ def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
         return
     with suppress(OSError, FileError):
         where.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_container(where / f"{name}.npz", _Header(FORMAT, note), arrays)
+        write_container(where / f"{name}.npz", _Header(CACHE_FORMAT, note), arrays)
     bound(where)
 
 

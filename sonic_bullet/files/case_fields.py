@@ -9,8 +9,8 @@ from typing import Annotated
 
 import msgspec
 
-LARGEST = 1e6  # metres, or N·s: no place, size or impulse is larger, and squares of such numbers stay finite
-Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
+LARGEST_NUMBER = 1e6  # metres, or N·s: no place, size or impulse is larger, and squares of such numbers stay finite
+Number = Annotated[float, msgspec.Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 Magnitude = Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)]
 Hertz = Annotated[float, msgspec.Meta(le=1e7)]
 Channel = Annotated[int, msgspec.Meta(le=4096)]
@@ -21,7 +21,7 @@ class ElasticFields(msgspec.Struct, frozen=True):
     """Estimated elastic constants."""
 
     youngs_modulus: float | None = None
-    density: Annotated[float, msgspec.Meta(ge=1e-3, le=LARGEST)] | None = None
+    density: Annotated[float, msgspec.Meta(ge=1e-3, le=LARGEST_NUMBER)] | None = None
     poisson_ratio: float | None = None
 
 
@@ -71,7 +71,7 @@ class StrikeFields(msgspec.Struct, frozen=True):
 
     position: Vector | None = None
     direction: Vector | None = None
-    impulse: Annotated[float, msgspec.Meta(ge=1e-12, le=LARGEST)] | None = None
+    impulse: Annotated[float, msgspec.Meta(ge=1e-12, le=LARGEST_NUMBER)] | None = None
     force: ForceFields | None = None
 
 

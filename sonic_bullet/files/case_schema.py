@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from sonic_bullet.files.case_fields import CaseFields
-from sonic_bullet.files.cases import FORMAT
+from sonic_bullet.files.cases import CASE_FORMAT
 from sonic_bullet.machine.json_text import json_bytes
 
 ABOUT: dict[str, tuple[str, dict[str, str]]] = {
@@ -140,7 +140,7 @@ def case_schema() -> dict[str, Any]:
         part["properties"] = {
             field: {"description": fields[field], **form} for field, form in part["properties"].items()
         }
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": FORMAT, **whole, "$defs": parts}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": CASE_FORMAT, **whole, "$defs": parts}
 
 
 def _public(name: str) -> str:

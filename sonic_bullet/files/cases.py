@@ -34,13 +34,13 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, excerpt
 
 __all__ = [
+    "CASE_FORMAT",
     "DIMENSION_TOLERANCE",
-    "FORMAT",
     "IN_AIR",
+    "LENGTH_UNITS",
     "MEDIA",
     "MOST_TOLERANCE",
     "SPLITS",
-    "UNITS",
     "Case",
     "CaseObject",
     "CaseRecording",
@@ -51,8 +51,8 @@ __all__ = [
     "read_case",
 ]
 
-FORMAT = "sonic-bullet-case/1"
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+CASE_FORMAT = "sonic-bullet-case/1"
+LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none", "unknown")
 IN_AIR = ("velocity", "pressure")
@@ -159,9 +159,10 @@ def read_case(folder: str | os.PathLike[str]) -> Case:
             raise FileError(f"case {path} is over 16 MiB", "give a case.json")
         raw = decode_json(content, CaseFields, f"case {path}", FileError, remedy)
         unread = unread_fields(msgspec.json.decode(content), CaseFields, f"case {path}")
-        if raw.format != FORMAT:
+        if raw.format != CASE_FORMAT:
             raise FileError(
-                f"case {path} has format '{raw.format}', wanted '{FORMAT}'", "use a sonic_bullet that knows that format"
+                f"case {path} has format '{raw.format}', wanted '{CASE_FORMAT}'",
+                "use a sonic_bullet that knows that format",
             )
         if not raw.recordings:
             raise FileError(f"case {path} has no recordings", "list at least one strike")
@@ -227,8 +228,8 @@ def dimension_tolerance(given: float | None, name: str, default: float = DIMENSI
 def _object(
     name: str, thing: ObjectFields, folder: Path, clamps: tuple[FixedFields, ...], tolerance: float
 ) -> CaseObject:
-    if thing.units not in UNITS:
-        raise FileError(f"object '{name}': unit '{thing.units}' is not known", f"use one of {', '.join(UNITS)}")
+    if thing.units not in LENGTH_UNITS:
+        raise FileError(f"object '{name}': unit '{thing.units}' is not known", f"use one of {', '.join(LENGTH_UNITS)}")
     guess = thing.elastic_guess
     for key, value in (("youngs_modulus", guess.youngs_modulus), ("density", guess.density)):
         if value is not None and not 0 < value < 1e16:
@@ -241,7 +242,7 @@ def _object(
     mesh = inside(folder, thing.mesh) if thing.mesh is not None else None
     own = dimension_tolerance(thing.dimension_tolerance, f"object '{name}': dimension_tolerance", tolerance)
     constants = guess.youngs_modulus, guess.density, guess.poisson_ratio
-    return CaseObject(name, mesh, UNITS[thing.units], thing.material, *constants, fixed, own)
+    return CaseObject(name, mesh, LENGTH_UNITS[thing.units], thing.material, *constants, fixed, own)
 
 
 def _recording(

@@ -21,10 +21,10 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_whole, shown
 from sonic_bullet.records.errors import AudioError
 
-RISE_DB, MOST_RISE_DB = 6.0, 36.0
+GAIN_RISE_DB, MOST_RISE_DB = 6.0, 36.0
 """Rise of g above the gain without a limiter: a step, and the limit beyond which a sound gets no flatter."""
 LUFS_WITHIN = 0.01
-LOOKS, MOST_STEPS = 6, 20
+LIMITER_LOOKS, MOST_STEPS = 6, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +91,7 @@ def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceil
     if peak_db.max() <= ceiling_dbtp:
         return FileLevel(gain, sound.curve)
     goal_db = ceiling_dbtp - MARGIN_DB
-    for _ in range(LOOKS):  # a varying factor creates new peaks between samples: tenths of a dB
+    for _ in range(LIMITER_LOOKS):  # a varying factor creates new peaks between samples: tenths of a dB
         rise, factor = _rise(sound.scaled(gain), sr, peak_db, lufs, goal_db)
         left = sound.limited(factor)
         excess_db = 20 * math.log10(gain * rise * find_true_peak(left)) - (ceiling_dbtp - MARGIN_DB)
@@ -124,7 +124,7 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
         low_db = high_db = 0.0
         factor, missed = limited(0.0, release_db_s)
         while missed < -LUFS_WITHIN and high_db < MOST_RISE_DB:
-            low_db, high_db = high_db, high_db + RISE_DB
+            low_db, high_db = high_db, high_db + GAIN_RISE_DB
             factor, missed = limited(high_db, release_db_s)
         if missed >= -LUFS_WITHIN:
             break

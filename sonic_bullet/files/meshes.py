@@ -21,7 +21,7 @@ from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.errors import FileError, MeshError
 
 MeshSurface = tuple[Array, Array]
-REMEDY = "repair the mesh, or export it again"
+MESH_REMEDY = "repair the mesh, or export it again"
 
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
@@ -36,7 +36,7 @@ def read_surfaces(path: Path) -> list[MeshSurface]:
     MeshError
         Its kind is unknown, it is broken, or a face names a missing vertex (line or number of the face).
     """
-    with reading(path, "mesh", MeshError, REMEDY):
+    with reading(path, "mesh", MeshError, MESH_REMEDY):
         if not path.is_file():
             raise FileError(f"mesh file '{path}' does not exist", "check the path")
         surfaces = list(_obj(path) if path.suffix.lower() == ".obj" else _other(path))
@@ -58,7 +58,7 @@ def read_own_vertices(path: Path) -> MeshSurface:
         offsets = np.cumsum([0] + [len(vertex) for vertex, _ in parts[:-1]])
         faces = [face + offset for (_, face), offset in zip(parts, offsets, strict=True)]
         return np.concatenate([vertex for vertex, _ in parts]), np.concatenate(faces)
-    with reading(path, "mesh", MeshError, REMEDY):
+    with reading(path, "mesh", MeshError, MESH_REMEDY):
         if not path.is_file():
             raise FileError(f"mesh file '{path}' does not exist", "check the path")
         points, objects = _parsed_obj(path)
@@ -72,7 +72,7 @@ def _check(path: Path, vertex: Array, face: Array) -> None:
         raise MeshError(
             f"mesh file {path}: triangle {triangle + 1} names vertex {face[triangle, corner]} of 0 to "
             f"{len(vertex) - 1}",
-            REMEDY,
+            MESH_REMEDY,
         )
 
 
@@ -113,10 +113,10 @@ def _parsed_obj(path: Path) -> tuple[Array, list[list[tuple[int, int, int]]]]:
                 elif objects[-1]:
                     objects.append([])
             except ValueError as error:
-                raise MeshError(f"mesh file {path}, line {number}: {error}", REMEDY) from error
+                raise MeshError(f"mesh file {path}, line {number}: {error}", MESH_REMEDY) from error
     if largest > len(vertex):  # known at the end only: a face may come before its vertices
         raise MeshError(
-            f"mesh file {path}, line {largest_line}: a face names vertex {largest} of {len(vertex)}", REMEDY
+            f"mesh file {path}, line {largest_line}: a face names vertex {largest} of {len(vertex)}", MESH_REMEDY
         )
     return np.array(vertex, float).reshape(-1, 3), objects
 
@@ -163,7 +163,7 @@ def _other(path: Path) -> Iterator[MeshSurface]:
             content = io.BytesIO(path.read_bytes())
             scene = trimesh.load_scene(content, file_type=kind, process=False, maintain_order=True, skip_materials=True)
     except ImportError:  # a parser of text asks for a package to guess its encoding: the file is not of its kind
-        raise MeshError(f"mesh file {path} is no {kind} file", REMEDY) from None
+        raise MeshError(f"mesh file {path} is no {kind} file", MESH_REMEDY) from None
     for part in scene.geometry.values():  # before they are placed: placing may follow a face's indices
         if isinstance(part, trimesh.Trimesh):
             _check(path, np.asarray(part.vertices), np.asarray(part.faces).reshape(-1, 3))
@@ -186,7 +186,7 @@ def _check_off(path: Path) -> None:
         for word in words[1 : 1 + int(words[0])]:
             if not 0 <= int(word) < vertices:
                 raise MeshError(
-                    f"mesh file {path}, line {number}: a face names vertex {word} of 0 to {vertices - 1}", REMEDY
+                    f"mesh file {path}, line {number}: a face names vertex {word} of 0 to {vertices - 1}", MESH_REMEDY
                 )
 
 
@@ -199,4 +199,4 @@ def _check_counts(path: Path, kind: str) -> None:
     tree = json.loads(text)
     for accessor in tree.get("accessors", ()):
         if "bufferView" not in accessor and accessor.get("count", 0) > len(content):
-            raise MeshError(f"mesh file {path} claims {accessor['count']} numbers that it does not hold", REMEDY)
+            raise MeshError(f"mesh file {path} claims {accessor['count']} numbers that it does not hold", MESH_REMEDY)

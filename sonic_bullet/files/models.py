@@ -25,7 +25,7 @@ from sonic_bullet.files.atomic import cannot
 from sonic_bullet.files.container import REMEDY, distinct, read_container, take, write_container
 from sonic_bullet.files.reading import reading
 from sonic_bullet.machine.json_text import json_bytes
-from sonic_bullet.machine.kept_files import LIMIT, touch
+from sonic_bullet.machine.kept_files import LIMIT_VARIABLE, touch
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import FileError, LogError, excerpt
@@ -178,7 +178,9 @@ def _keep_models(models: Sequence[ModalModel]) -> list[str]:
             write_model(_kept_at(place, key), model)
     cache.bound(place)
     if not all(_kept_at(place, key).is_file() for key in keys):
-        raise FileError("the cache is too small for the models of this log", f"raise {LIMIT}, or leave them in the log")
+        raise FileError(
+            "the cache is too small for the models of this log", f"raise {LIMIT_VARIABLE}, or leave them in the log"
+        )
     return keys
 
 

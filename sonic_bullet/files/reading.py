@@ -17,7 +17,7 @@ from sonic_bullet.files.atomic import cannot
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 
 # most characters from a file: in all; in the fault and in the remedy, where it would be more
-QUOTED, WHAT, REMEDY = 200, 120, 80
+QUOTED, WHAT, REMEDY_LETTERS = 200, 120, 80
 
 
 @contextmanager
@@ -72,6 +72,6 @@ def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError])
     return kind(
         what,
         error.remedy
-        if len(error.remedy) <= max(REMEDY, QUOTED - len(before) - len(after))
-        else excerpt(error.remedy, REMEDY),
+        if len(error.remedy) <= max(REMEDY_LETTERS, QUOTED - len(before) - len(after))
+        else excerpt(error.remedy, REMEDY_LETTERS),
     )

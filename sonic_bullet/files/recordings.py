@@ -27,7 +27,7 @@ READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a 
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
 DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
 # a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
-SILENT, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
+SILENT_PEAK, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
 UNBROKEN = "give an unbroken audio file"
 T = TypeVar("T")
 
@@ -181,7 +181,7 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
     if not np.isfinite(observed).all():
         raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
     others = f"{'channel' if live.sum() == 1 else 'channels'} {_listed(np.flatnonzero(live))}"
-    if level[used] < SILENT or (level[used] < QUIET and len(np.unique(observed)) < FEWEST_LEVELS):
+    if level[used] < SILENT_PEAK or (level[used] < QUIET and len(np.unique(observed)) < FEWEST_LEVELS):
         if live[used] or not live.any():
             raise AudioError(f"{name} is silent", "record an impact, or leave it out")
         raise AudioError(f"channel {used} of {name} is silent", f"sound is in {others}")

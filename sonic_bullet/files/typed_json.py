@@ -23,7 +23,7 @@ T = TypeVar("T")
 Key = str | int
 ANY = "..."
 """Step into an object of free names, which msgspec does not name."""
-NAMES = {
+TYPE_WORDS = {
     "object": "an object {…}",
     "array": "a list [...]",
     "str": "a text",
@@ -162,7 +162,7 @@ def _wanted(said: str) -> str:
     kinds, rest = found[1], found[2].strip()
     if length := re.fullmatch("of length (.*)", rest):
         return f"a list of {length[1]}"
-    words = " or ".join(NAMES.get(kind, kind) for kind in kinds.split(" | "))
+    words = " or ".join(TYPE_WORDS.get(kind, kind) for kind in kinds.split(" | "))
     sign, _, bound = rest.partition(" ")
     return f"{words} {bounds[sign]} {bound.removesuffix('.0')}" if sign in bounds else f"{words} {rest}".strip()
 

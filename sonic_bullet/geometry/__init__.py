@@ -4,7 +4,7 @@ from sonic_bullet.geometry.nearest_point import SurfaceIndex, closest_point, nea
 from sonic_bullet.geometry.solids import shape_volume_m3, solid_of
 from sonic_bullet.geometry.triangles import (
     CREASE_RAD,
-    HEAVIEST_KG,
+    HEAVIEST_STRUCK_KG,
     LARGEST_M,
     corner_normals,
     face_areas_m2,
@@ -19,7 +19,7 @@ from sonic_bullet.geometry.triangles import (
 
 __all__ = [
     "CREASE_RAD",
-    "HEAVIEST_KG",
+    "HEAVIEST_STRUCK_KG",
     "LARGEST_M",
     "SurfaceIndex",
     "closest_point",

@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LARGEST_M, HEAVIEST_KG = 10.0, 202e3
+LARGEST_M, HEAVIEST_STRUCK_KG = 10.0, 202e3
 """Of what is struck to sound: the largest bell ever cast, the Tsar Bell, is 6.6 m wide and weighs 202 t.
 
 A mesh in millimetres is a thousand times its size, so that all above a centimetre exceeds the first, and a steel ball
@@ -76,7 +76,7 @@ def oversize(vertex_m: Array, mass_kg: float) -> str:
     meant.
     """
     long_m = float(np.ptp(vertex_m, axis=0).max()) if len(vertex_m) else 0.0
-    if long_m <= LARGEST_M and mass_kg <= HEAVIEST_KG:
+    if long_m <= LARGEST_M and mass_kg <= HEAVIEST_STRUCK_KG:
         return ""
     return f"is {long_m:.3g} m long and would weigh {mass_kg:.3g} kg, larger than anything that is struck to sound"
 

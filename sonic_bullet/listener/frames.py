@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-MOTION = np.dtype(
+LINK_STATE = np.dtype(
     [
         ("position_m", "f8", (3,)),
         ("quaternion_xyzw", "f8", (4,)),
@@ -25,7 +25,7 @@ MOTION = np.dtype(
 
 MOTION_NUMBERS = 13
 LINK_SPAN = 1 << 20
-BEYOND = 1e9
+INVALID_BEYOND = 1e9
 """Bound of valid numbers in m, m/s, rad/s, N·s: no scene reaches it, and products of smaller ones stay finite."""
 NO_NUMBER = "a pose or speed that is not a number, or beyond 1e9"
 
@@ -62,10 +62,10 @@ class Motion:
     Parameters
     ----------
     roster
-    row : Array of MOTION, shape (n,)
+    row : Array of LINK_STATE, shape (n,)
         position_m (n, 3), quaternion_xyzw (n, 4), velocity_m_s (n, 3) of the centre of mass, spin_rad_s (n, 3).
     broken
-        Ids of the bodies of which a number, as read, is NaN or `BEYOND`.
+        Ids of the bodies of which a number, as read, is NaN or `INVALID_BEYOND`.
     """
 
     roster: Roster
@@ -77,9 +77,9 @@ class Motion:
         cls, roster: Roster, position_m: Array, quaternion_xyzw: Array, velocity_m_s: Array, spin_rad_s: Array
     ) -> Motion:
         """Build a motion from its columns."""
-        row = np.empty(len(position_m), MOTION)
+        row = np.empty(len(position_m), LINK_STATE)
         for name, column in zip(
-            MOTION.names or (), (position_m, quaternion_xyzw, velocity_m_s, spin_rad_s), strict=True
+            LINK_STATE.names or (), (position_m, quaternion_xyzw, velocity_m_s, spin_rad_s), strict=True
         ):
             row[name] = column
         return cls(roster, row)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.frames import MOTION, Motion, Roster
+from sonic_bullet.listener.frames import LINK_STATE, Motion, Roster
 from sonic_bullet.listener.known_bodies import KnownBodies
 from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
 from sonic_bullet.listener.rows import STRANGERS, UNKNOWN, contact_rows, place_bodies, take_step
@@ -178,7 +178,7 @@ def _room(bodies: int) -> Poses:
 def make_ready() -> None:
     """Compile, or load, the machine code of a step, for which the first step would else wait."""
     memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
-    motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, MOTION))
+    motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, LINK_STATE))
     touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)
     known.enter(start)
     memory.unusual(known, start, *memory.made(known, start, touches, touches, dt_s), dt_s, gravity)

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener.frames import BEYOND, LINK_SPAN
+from sonic_bullet.listener.frames import INVALID_BEYOND, LINK_SPAN
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -96,7 +96,7 @@ class Touches:
     def usable(self) -> Array:
         """Mask (k,): False where a force or place is NaN or `BEYOND`."""
         number = self.row.view(np.float64).reshape(len(self.row), -1)[:, 2:]
-        return np.asarray((np.abs(number) < BEYOND).all(axis=1))
+        return np.asarray((np.abs(number) < INVALID_BEYOND).all(axis=1))
 
     def kept(self, mask: Array) -> Touches:
         """Select the rows where mask (k,) is True."""
@@ -176,14 +176,14 @@ def all_usable(touch, count):
     """Tell whether all numbers of the first `count` contacts are within `BEYOND` and none is NaN."""
     for i in range(count):
         row = touch[i]
-        if not abs(row.gap_m) < BEYOND:
+        if not abs(row.gap_m) < INVALID_BEYOND:
             return False
         for x in range(3):
             if not (
-                abs(row.point_a_m[x]) < BEYOND
-                and abs(row.point_b_m[x]) < BEYOND
-                and abs(row.normal[x]) < BEYOND
-                and abs(row.impulse_n_s[x]) < BEYOND
+                abs(row.point_a_m[x]) < INVALID_BEYOND
+                and abs(row.point_b_m[x]) < INVALID_BEYOND
+                and abs(row.normal[x]) < INVALID_BEYOND
+                and abs(row.impulse_n_s[x]) < INVALID_BEYOND
             ):
                 return False
     return True

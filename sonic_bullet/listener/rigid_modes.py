@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LEAST = 1e-12
+LEAST_MASS = 1e-12
 """Fraction of the largest eigenvalue of M below which a motion moves no mass, as of a point mass that turns."""
 
 
@@ -76,11 +76,11 @@ def rigid_modes(body: JointedBody) -> tuple[Array, Array]:
     weight = np.concatenate([np.repeat(body.mass_kg[:, None], 3, axis=1), body.inertia_kg_m2], axis=1)
     mass = np.einsum("lxd,lx,lxe->de", j, weight, j)
     size, axes = np.linalg.eigh(mass)
-    axes, size = axes[:, size > LEAST * size.max(initial=0.0)], size[size > LEAST * size.max(initial=0.0)]
+    axes, size = axes[:, size > LEAST_MASS * size.max(initial=0.0)], size[size > LEAST_MASS * size.max(initial=0.0)]
     whitened = axes / np.sqrt(size)
     stiffness = np.zeros(mass.shape[0])
     stiffness[: len(body.stiffness)] = body.stiffness
     square, turned = np.linalg.eigh(whitened.T @ (stiffness[:, None] * whitened))
     rate = np.sqrt(np.maximum(square, 0.0))
-    rate[square <= LEAST * square.max(initial=0.0)] = 0.0
+    rate[square <= LEAST_MASS * square.max(initial=0.0)] = 0.0
     return np.einsum("lxd,de->elx", j, whitened @ turned), rate

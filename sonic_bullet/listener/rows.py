@@ -15,7 +15,7 @@ from sonic_bullet.listener.polling import all_usable, load
 from sonic_bullet.listener.start import LEFT_OUT, begin
 from sonic_bullet.listener.sweep import TraceTables, sort_pairs, sweep
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.records.arrays import LARGEST
+from sonic_bullet.records.arrays import LARGEST_SI
 
 SPAWN_DEPTH_M = 1e-4
 
@@ -86,13 +86,13 @@ def fill(row, touch, fresh, slip, approach):
     """Fill a CONTACT row except its bodies and sweep; return whether all numbers are within `LARGEST`."""
     row.approach_m_s = approach
     row.gap_m = touch.gap_m + max(approach, 0.0) * touch.elapsed_s
-    fine = abs(approach) <= LARGEST and abs(row.gap_m) <= LARGEST  # False for NaN too
-    fine = fine and abs(row.sweep_m_s[0]) <= LARGEST and abs(row.sweep_m_s[1]) <= LARGEST
+    fine = abs(approach) <= LARGEST_SI and abs(row.gap_m) <= LARGEST_SI  # False for NaN too
+    fine = fine and abs(row.sweep_m_s[0]) <= LARGEST_SI and abs(row.sweep_m_s[1]) <= LARGEST_SI
     for x in range(3):
         row.point_a_m[x], row.point_b_m[x] = fresh.point_a_m[x], fresh.point_b_m[x]
         row.normal[x], row.impulse_n_s[x], row.slip_m_s[x] = touch.normal[x], touch.impulse_n_s[x], slip[x]
-        fine = fine and abs(fresh.point_a_m[x]) <= LARGEST and abs(fresh.point_b_m[x]) <= LARGEST
-        fine = fine and abs(slip[x]) <= LARGEST
+        fine = fine and abs(fresh.point_a_m[x]) <= LARGEST_SI and abs(fresh.point_b_m[x]) <= LARGEST_SI
+        fine = fine and abs(slip[x]) <= LARGEST_SI
     return fine
 
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_SPAN, MOTION, Motion, Roster, rows_of
+from sonic_bullet.listener.frames import LINK_SPAN, LINK_STATE, Motion, Roster, rows_of
 from sonic_bullet.listener.kinematics import rotation_between
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.machine.compiled import njit
@@ -27,7 +27,7 @@ DRIVEN_SPEED_M_S = 10.0
 
 START = np.dtype(
     [
-        *((name, MOTION[name]) for name in MOTION.names or ()),
+        *((name, LINK_STATE[name]) for name in LINK_STATE.names or ()),
         ("code", "i8"),  # frames.encode
         ("static", "i8"),  # 1 where its mass is 0
         ("index", "i8"),  # into the bodies of the log; -1 without a contact yet, LEFT_OUT
@@ -168,7 +168,7 @@ def polled_start(past: Motion, now: Motion, touches: Touches, dt_s: float, *, un
 
 def set_motion(start: Array, row: Array, mask: Array | slice) -> None:
     """Copy poses and twists of row (n,) of MOTION to START rows where mask (n,) is True."""
-    for name in MOTION.names or ():
+    for name in LINK_STATE.names or ():
         start[name][mask] = row[name][mask]
 
 

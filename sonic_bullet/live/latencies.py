@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 BIN_S = 1e-4
-BINS = 20_000  # two seconds: longer latencies count as that
+LATENCY_BINS = 20_000  # two seconds: longer latencies count as that
 
 
 class Latencies:
     """Counts of latencies. worst_s: the longest, exactly; 0 before any."""
 
     def __init__(self) -> None:
-        self._count = np.zeros(BINS, np.int64)
+        self._count = np.zeros(LATENCY_BINS, np.int64)
         self.worst_s = 0.0
 
     def add(self, latency_s: float) -> None:
         """Count a latency."""
-        self._count[min(max(int(latency_s / BIN_S), 0), BINS - 1)] += 1
+        self._count[min(max(int(latency_s / BIN_S), 0), LATENCY_BINS - 1)] += 1
         self.worst_s = max(self.worst_s, latency_s)
 
     def __len__(self) -> int:

@@ -14,8 +14,8 @@ import numpy as np
 
 from sonic_bullet.live.playback import Fill
 
-BLOCK = 256  # samples: 5.3 ms at 48 kHz
-HELD = 2  # blocks between the call and the sound
+CARD_BLOCK = 256  # samples: 5.3 ms at 48 kHz
+HELD_BLOCKS = 2  # blocks between the call and the sound
 
 
 class NullCard:
@@ -34,10 +34,10 @@ class NullCard:
         self._thread.start()
 
     def _run(self, fill: Fill) -> None:
-        out, asked_s, late = np.zeros((BLOCK, self.channels), np.float32), time.perf_counter(), False
-        block_s = BLOCK / self.sr
+        out, asked_s, late = np.zeros((CARD_BLOCK, self.channels), np.float32), time.perf_counter(), False
+        block_s = CARD_BLOCK / self.sr
         while not self._stop.wait(max(asked_s - time.perf_counter(), 0.0)):
-            sounds_s = asked_s + HELD * block_s
+            sounds_s = asked_s + HELD_BLOCKS * block_s
             fill(out, sounds_s, late)
             over_s = time.perf_counter() - sounds_s
             late = over_s > 0
@@ -47,6 +47,6 @@ class NullCard:
         """Call for no more; return when the blocks taken would have sounded, or at once."""
         self._stop.set()
         if not abort:
-            threading.Event().wait((HELD + 1) * BLOCK / self.sr)
+            threading.Event().wait((HELD_BLOCKS + 1) * CARD_BLOCK / self.sr)
         if self._thread is not None:
             self._thread.join(1.0)

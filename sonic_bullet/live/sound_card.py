@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AudioError
 
-CLOSE_S = 1.0
+CARD_CLOSE_S = 1.0
 """Longest time to close a stream: a hundred times what it plays then."""
 
 
@@ -81,7 +81,7 @@ class SoundCard:
 
         closing = threading.Thread(target=close, daemon=True)
         closing.start()
-        closing.join(CLOSE_S)
+        closing.join(CARD_CLOSE_S)
         if closing.is_alive():
             with suppress(AttributeError):  # sounddevice's own exit handler would wait as well
                 atexit.unregister(self._library._exit_handler)

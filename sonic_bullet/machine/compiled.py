@@ -20,7 +20,7 @@ from typing import Any
 
 import numba
 
-from sonic_bullet.machine.user_folder import START, cache_folder, private_folder
+from sonic_bullet.machine.user_folder import START_FOLDER, cache_folder, private_folder
 
 KNOWN_NUMBA = ["0", "68"]
 """The release of numba whose inner parts `linked_once` uses. With any other, numba's own compilation is used: the same
@@ -59,5 +59,5 @@ def folder() -> Path | None:
     """Return the folder of machine code; None for none."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
-        return private_folder(START / given / "sonic_bullet")
+        return private_folder(START_FOLDER / given / "sonic_bullet")
     return cache_folder("compiled")

@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 from sonic_bullet.records.errors import FileError
 
-LIMIT = "SONIC_BULLET_CACHE_LIMIT"
-NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
+LIMIT_VARIABLE = "SONIC_BULLET_CACHE_LIMIT"
+ENTRY_NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
 CODE = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
 SIZE = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
 OF_LOGS, CODE_KIND = "models of logs", "machine code"
-KINDS = {"radiation": "radiation", "model": OF_LOGS}
+ENTRY_KINDS = {"radiation": "radiation", "model": OF_LOGS}
 """Kind of an entry by the first word of its name; all others are modes, and what they are made of."""
 
 
@@ -47,16 +47,16 @@ def as_bytes(size: str, name: str) -> int:
 def limit_bytes() -> int:
     """Return how much may be cached: SONIC_BULLET_CACHE_LIMIT, else 2 GB. Raises FileError."""
     default_limit_bytes = 2 * 10**9  # of modes: 5 to 10 MB for a body; hundreds of bodies
-    given = os.environ.get(LIMIT)
-    return as_bytes(given, LIMIT) if given else default_limit_bytes
+    given = os.environ.get(LIMIT_VARIABLE)
+    return as_bytes(given, LIMIT_VARIABLE) if given else default_limit_bytes
 
 
 def computed(folder: Path) -> list[KeptFile]:
     """List the computed models in a folder."""
     return [
-        KeptFile(path, KINDS.get(found[1], "modes"), size, used)
+        KeptFile(path, ENTRY_KINDS.get(found[1], "modes"), size, used)
         for path, size, used in _files(folder)
-        if (found := NAME.fullmatch(path.name))
+        if (found := ENTRY_NAME.fullmatch(path.name))
     ]
 
 

@@ -25,7 +25,7 @@ try:
 except ImportError:  # Windows: nothing is locked there, and nothing swept
     fcntl = None  # type: ignore[assignment]
 
-NAME = re.compile(r"sonic-bullet-[0-9a-f]{16}\.partial")
+PARTIAL_NAME = re.compile(r"sonic-bullet-[0-9a-f]{16}\.partial")
 OPEN_FLAGS = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -90,7 +90,7 @@ def sweep(folder: Path) -> None:
         return
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if NAME.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+            if PARTIAL_NAME.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
                 _remove_if_free(Path(entry.path))
 
 

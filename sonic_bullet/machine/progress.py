@@ -28,7 +28,7 @@ Made = TypeVar("Made")
 
 EVERY_S = 4.0
 """Between lines of one stage: below the 5 s after which a user takes a program for dead."""
-LEAST_S = 1.0
+BETWEEN_STAGES_S = 1.0
 """Between lines of stages that follow each other fast."""
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 """A command, a call from Python that takes less shows nothing."""
@@ -87,7 +87,7 @@ class ProgressLines:
     def due(self, now_s: float) -> str:
         """Return the line to be written now; "": none."""
         stages = tuple(DETAIL.split(text)[0] for _, text in self._said.values())
-        pause_s = LEAST_S if stages and stages != self._stages else EVERY_S
+        pause_s = BETWEEN_STAGES_S if stages and stages != self._stages else EVERY_S
         if not (self.command or self._said):
             return ""
         if now_s - self.begin_s < self.quiet_s or now_s - self._last_s < pause_s:

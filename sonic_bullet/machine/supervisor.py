@@ -54,7 +54,7 @@ CLOSE_S = 20.0
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
 STAND_INS = f"{PACKAGE}/listener/pybullet/"
 """Functions that a script calls in place of PyBullet's: their time is the script's own."""
-LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
+TRACE_LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
 _FORKS_EARLY_ONLY = sys.platform != "linux"
 """Whether libraries forbid a fork once they are loaded (macOS)."""
 
@@ -293,14 +293,14 @@ def _how_it_ended(child: _Worker) -> str:
         line = _line_in(lines, child.scene)
         where = f" line {line}" if line else ""
         return f"scene '{Path(child.scene).name}'{where}: {what}; {remedy or 'take out what ends the process'}"
-    last = LINE.search(lines)
+    last = TRACE_LINE.search(lines)
     where = f" in {Path(last['file']).name} line {last['line']}" if last else ""
     return f"{what}{where}; {remedy or 'a fault of the program or a library: report it with the input'}"
 
 
 def _line_in(lines: str, scene: str) -> int:
     """Find the line of the scene that was reached last; 0: none."""
-    return next((int(one["line"]) for one in LINE.finditer(lines) if one["file"] == escaped(scene)), 0)
+    return next((int(one["line"]) for one in TRACE_LINE.finditer(lines) if one["file"] == escaped(scene)), 0)
 
 
 def _judgement(trace: str, scene: str) -> str:
@@ -308,7 +308,7 @@ def _judgement(trace: str, scene: str) -> str:
 
     trace: its calls, the latest first, which come piece by piece.
     """
-    for one in LINE.finditer(trace):
+    for one in TRACE_LINE.finditer(trace):
         if one["file"] == escaped(scene):
             return "own"
         ours = one["file"].startswith(f"{PACKAGE}/") and not one["file"].startswith(STAND_INS)

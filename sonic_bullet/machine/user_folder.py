@@ -25,7 +25,7 @@ def _start() -> Path:
         return Path("/")
 
 
-START = _start()
+START_FOLDER = _start()
 """Working folder when this module was imported: a scene may change it, and relative paths of the environment mean this
 one."""
 

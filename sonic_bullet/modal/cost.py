@@ -1,6 +1,6 @@
 """Cost of a finite-element solution, predicted from counts of its mesh: no clock decides a result.
 
-    work = unknowns (unknowns / FULL + START + modes)         factor; a Lanczos basis of START + modes vectors
+    work = unknowns (unknowns / FULL + START_COST + modes)         factor; a Lanczos basis of START_COST + modes vectors
         [measured on a gong of 57 000 unknowns: 1.2 µs of processor a unit]
 
 `MOST_WORK` bounds the work over all element sizes that one body is solved with. With filling and radiation that is at
@@ -14,19 +14,19 @@ import numpy as np
 from sonic_bullet.modal.sectors import Wanted
 
 MOST_WORK = 30e6
-START = 75.0
+START_COST = 75.0
 FULL = {(2, True): 900.0, (3, True): 590.0, (2, False): 300.0, (3, False): 200.0}
 """By degree, and by whether the body is thin or a lump, whose factor is fuller."""
 
 
 def work(unknowns: float, modes: int, degree: int, thin: bool) -> float:
     """Predict the work of one solution."""
-    return unknowns * (unknowns / FULL[degree, thin] + START + modes)
+    return unknowns * (unknowns / FULL[degree, thin] + START_COST + modes)
 
 
 def most_unknowns(spare: float, modes: int, degree: int, thin: bool, coarser: float = 0.0) -> float:
     """Return how many unknowns the work ``spare`` allows, a coarser body of ``coarser`` times as many included."""
-    square, line = (1 + coarser**2) / FULL[degree, thin], (1 + coarser) * (START + modes)
+    square, line = (1 + coarser**2) / FULL[degree, thin], (1 + coarser) * (START_COST + modes)
     return float((np.sqrt(line**2 + 4 * square * max(spare, 0.0)) - line) / (2 * square))
 
 

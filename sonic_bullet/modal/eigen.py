@@ -22,7 +22,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
 
-BLOCK = 8
+EIGEN_BLOCK = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ def solve(
     tolerance = 1e-7  # of the residual bound, relative to θ
     size = stiffness.shape[0]
     factor = factorise(stiffness - shift * mass)
-    block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(BLOCK, size))), mass)
+    block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(EIGEN_BLOCK, size))), mass)
     width = block.shape[1]
     longest = min(size // width * width, 4 * (most + rigid) + 64 * width)
     basis, images = np.zeros((size, longest), order="F"), np.zeros((size, longest), order="F")

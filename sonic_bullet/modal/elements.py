@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.modal import cost, eigen, fem, lagrange
-from sonic_bullet.modal.meshing.filling import LATTICE, Filler
+from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import MOST_MODES, SHIFT, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, SHIFT, Sector, Shown, Wanted
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
@@ -28,15 +28,15 @@ from sonic_bullet.records.errors import MeshError, ModalError
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
-FINER = 0.7  # from one edge to the next: half the elements of a wall
-ALIKE, LARGER = 1.2, 3
+FINER_EDGE = 0.7  # from one edge to the next: half the elements of a wall
+ALIKE_EDGES, LARGER = 1.2, 3
 """Ratio of a coarser body's edge to a finer one's below which the two are too similar to compare; how often a coarser
 body is tried: creases keep elements small.
 """
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
-LIMIT = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
-TRIES = 2
+CUBIC_UNKNOWNS = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
+COARSER_TRIES = 2
 WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
 OVER = 1.4  # × MOST_UNKNOWNS: a surface with more detail than its volume and area predict takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
@@ -68,7 +68,7 @@ class Elements:
     thin: bool
     edge_m: float
     at_size: Callable[[float, Filler], Filled] | None
-    modes: int = MOST_MODES
+    modes: int = MOST_SECTOR_MODES
     spare: float = cost.MOST_WORK
     simple: bool = False
     coarser: Elements | None = None
@@ -203,7 +203,7 @@ class Elements:
         Too many are by far more than ``MOST_UNKNOWNS``, or more than ``most``, which is what its work allows.
         """
         made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
-        for _ in range(TRIES):
+        for _ in range(COARSER_TRIES):
             if made._unknowns < min(OVER * MOST_UNKNOWNS[self.thin], most):
                 break
             larger = made._refilled(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
@@ -231,7 +231,7 @@ class Elements:
             if other is not None:
                 other = replace(other, simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
-        if made._unknowns > min(LIMIT, most(3)):
+        if made._unknowns > min(CUBIC_UNKNOWNS, most(3)):
             made = made._with_degree(2)
         if made._unknowns > most(2):
             raise MeshError(
@@ -243,7 +243,7 @@ class Elements:
     def finer(self) -> Elements | None:
         """Return the body with smaller elements, None where they would be too similar or a clamp holds other nodes.
 
-        Edges are `FINER` times as long, or what `MOST_UNKNOWNS` and the work left allow.
+        Edges are `FINER_EDGE` times as long, or what `MOST_UNKNOWNS` and the work left allow.
         """
         if self.at_size is None or len(self.clamp):
             return None
@@ -256,9 +256,9 @@ class Elements:
             return None
         most = cost.most_unknowns(spare, modes, self.degree, self.thin)
         least = (self._unknowns / min(MOST_UNKNOWNS[self.thin], most)) ** (1 / self._growth)
-        if least * ALIKE <= 1:
-            made = self._of_size(self.edge_m * max(FINER, least), self._filler("any")).within(most)
-            if made._unknowns <= min(OVER * MOST_UNKNOWNS[self.thin], most) and made._smaller_than(self) >= ALIKE:
+        if least * ALIKE_EDGES <= 1:
+            made = self._of_size(self.edge_m * max(FINER_EDGE, least), self._filler("any")).within(most)
+            if made._unknowns <= min(OVER * MOST_UNKNOWNS[self.thin], most) and made._smaller_than(self) >= ALIKE_EDGES:
                 return replace(made, coarser=self, spare=spare)
         if self.degree == 2:
             return None
@@ -273,7 +273,7 @@ class Elements:
 
         None where the user gave their size, or no coarser body can be made.
         """
-        times = 1 / FINER
+        times = 1 / FINER_EDGE
         for _ in range(LARGER):
             if self.coarser is None and self.at_size is None:
                 break
@@ -281,9 +281,9 @@ class Elements:
             if made is None or made._lattice != self._lattice:  # cached by a fill with filler "any"
                 break
             larger = self._smaller_than(made)
-            if larger > ALIKE:
+            if larger > ALIKE_EDGES:
                 return made, larger
-            times /= FINER
+            times /= FINER_EDGE
         return None, np.nan
 
     @property
@@ -301,7 +301,7 @@ class Elements:
 
     @property
     def _lattice(self) -> bool:
-        return self.body.solid.note.startswith(LATTICE)
+        return self.body.solid.note.startswith(LATTICE_NOTE)
 
     @property
     def _unknowns(self) -> float:
@@ -339,7 +339,7 @@ class Elements:
 
 def coarse(thin: bool) -> float:
     """Return about what fraction of its unknowns a coarser body has."""
-    return float(FINER ** (2 if thin else 3))
+    return float(FINER_EDGE ** (2 if thin else 3))
 
 
 def _as_long(values: Array, count: int) -> Array:

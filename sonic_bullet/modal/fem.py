@@ -22,7 +22,7 @@ from sonic_bullet.modal.meshing.solid import TET_EDGE, Solid, corner_volume_m3
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-CHUNK = 1000  # elements at a time: keeps their (k, k) blocks out of memory
+ELEMENTS_AT_ONCE = 1000  # elements at a time: keeps their (k, k) blocks out of memory
 VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
@@ -69,8 +69,8 @@ def assemble(
     stiff, mass = np.zeros((9, len(pair))), np.zeros(len(pair))
     bent = _bent(solid)
     for which, curved in ((np.flatnonzero(~bent), False), (np.flatnonzero(bent), True)):
-        for start in range(0, len(which), CHUNK):
-            mine = which[start : start + CHUNK]
+        for start in range(0, len(which), ELEMENTS_AT_ONCE):
+            mine = which[start : start + ELEMENTS_AT_ONCE]
             blocks, masses = _blocks(solid, solid.tet[mine], stiffness_pa, field.degree, curved=curved)
             where = slot[mine].ravel()
             for component in range(9):
@@ -115,8 +115,8 @@ def volume_m3(solid: Solid) -> float:
     point, weight = _rule(6)
     return float(
         sum(
-            (_geometry(solid, solid.tet[s : s + CHUNK], point)[0] * weight).sum()
-            for s in range(0, len(solid.tet), CHUNK)
+            (_geometry(solid, solid.tet[s : s + ELEMENTS_AT_ONCE], point)[0] * weight).sum()
+            for s in range(0, len(solid.tet), ELEMENTS_AT_ONCE)
         )
     )
 

@@ -19,13 +19,13 @@ from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.model import diagonal_m, solid_key
-from sonic_bullet.modal.sectors import MOST_MODES, ModalMethod, Wanted
+from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, ModalMethod, Wanted
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
-APART = 0.05  # of ν₁ and ν₂ from the guess
-POISSON = (-0.5, 0.485)
+APART_POISSON = 0.05  # of ν₁ and ν₂ from the guess
+POISSON_RANGE = (-0.5, 0.485)
 
 
 @one_thread()
@@ -70,7 +70,7 @@ def family(
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
-    wanted = Wanted(limit, MOST_MODES, beyond)
+    wanted = Wanted(limit, MOST_SECTOR_MODES, beyond)
     method = chosen(
         (shape,),
         length,
@@ -99,8 +99,8 @@ def family(
 
 
 def _poissons(poisson: float) -> tuple[float, float]:
-    low, high = (float(np.clip(poisson + apart, *POISSON)) for apart in (-APART, APART))
-    if high - low < APART / 2:
+    low, high = (float(np.clip(poisson + apart, *POISSON_RANGE)) for apart in (-APART_POISSON, APART_POISSON))
+    if high - low < APART_POISSON / 2:
         raise ModalError(f"Poisson's ratio {poisson} is no isotropic solid's", "guess one between -0.5 and 0.48")
     return low, high
 
@@ -160,7 +160,7 @@ def _reduced(
         shown.face,
         length,
         method.volume * length**3,
-        min(MOST_MODES, *counts),
+        min(MOST_SECTOR_MODES, *counts),
         f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
         method.meshed,
         error,

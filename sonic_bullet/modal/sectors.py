@@ -12,7 +12,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-MOST_MODES = 200
+MOST_SECTOR_MODES = 200
 SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
 
 

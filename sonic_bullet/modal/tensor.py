@@ -21,7 +21,7 @@ from sonic_bullet.files import cache as store
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.model import diagonal_m
-from sonic_bullet.modal.sectors import MOST_MODES, SHIFT
+from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, SHIFT
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
@@ -43,7 +43,7 @@ ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ..
     ((1, 1, 1), (1, 1, 0.3)),
 )
 """E along x, y, z over the largest; G_yz, G_xz, G_xy over those that go with it, √(E_i E_j)/2(1+ν)."""
-FEWER = (0, 4, 5, 6, 11, 12, 13)  # anchors used where each costs a solution by elements
+FEWER_ANCHORS = (0, 4, 5, 6, 11, 12, 13)  # anchors used where each costs a solution by elements
 SPARE = 1.3  # modes at each anchor over those wanted: one that lies above them at an anchor may be among them between
 
 
@@ -132,7 +132,7 @@ def tensor_family(
     """
     say = progress or (lambda _: None)
     length = diagonal_m((shape,))
-    count = min(count, MOST_MODES)
+    count = min(count, MOST_SECTOR_MODES)
     clamp = np.array(fixed, float).reshape(-1, 4)
     name = key(
         "tensor",
@@ -145,7 +145,7 @@ def tensor_family(
         poisson,
         count,
         repr(ANCHORS),
-        repr(FEWER),
+        repr(FEWER_ANCHORS),
     )
     found = store.load(cache, name)
     if found is not None:
@@ -311,12 +311,12 @@ def _of_elements(
         matrix, mass = fem.assemble(unit, tensor, 1.0)
         stiff.append(matrix[free][:, free] if held.any() else matrix)
     mass = mass[free][:, free] if held.any() else mass
-    most = min(MOST_MODES, max(1, len(free) // 3 - rigid))
+    most = min(MOST_SECTOR_MODES, max(1, len(free) // 3 - rigid))
     shift = -SHIFT * (2 * volume / area) ** 2 / 10
     vectors = []
     wanted = min(int(SPARE * count), most)
-    for number, anchor in enumerate([ANCHORS[i] for i in FEWER]):
-        say(f"tensor {number + 1} of {len(FEWER)}")
+    for number, anchor in enumerate([ANCHORS[i] for i in FEWER_ANCHORS]):
+        say(f"tensor {number + 1} of {len(FEWER_ANCHORS)}")
         whole = sum(c * matrix for c, matrix in zip(constants_of(anchored(*anchor, poisson)), stiff, strict=True))
         modes = eigen.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
         vectors.append(modes.vector)
@@ -326,7 +326,7 @@ def _of_elements(
     vector = np.zeros((3 * len(held), basis.shape[1]), np.float32)
     vector[free] = basis
     skin = np.ascontiguousarray(vector.reshape(len(held), 3, -1)[body.skin.node])
-    note = f"{body.solid.note}; {len(free)} unknowns; {len(FEWER)} tensors about nu {poisson:g}"
+    note = f"{body.solid.note}; {len(free)} unknowns; {len(FEWER_ANCHORS)} tensors about nu {poisson:g}"
     numbers = (length, volume * length**3, min(count, wanted), True)
     ends = np.array([0, basis.shape[1]])
     return _joined(

@@ -23,7 +23,7 @@ from sonic_bullet.records.errors import FileError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WINDOW = 1024
+SPECTRUM_WINDOW = 1024
 
 
 def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
@@ -141,6 +141,6 @@ def circle(freq_hz: Array, alpha_per_s: float, beta_s: float) -> Array:
 
 
 def _levels(sound: Array) -> Array:
-    window = min(WINDOW, len(sound))
+    window = min(SPECTRUM_WINDOW, len(sound))
     frames = np.lib.stride_tricks.sliding_window_view(sound, window)[:: max(1, window // 4)]
     return np.asarray(20 * np.log10(np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)).T + 1e-12))

@@ -55,7 +55,9 @@ class SurfaceTerms(NamedTuple):
 
 
 EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
-UNEVEN = np.array([0.8, 0.6, 0.4])  # a: along no axis and in no plane between axes, so even bodies' modes do not cancel
+UNEVEN_AXIS = np.array(
+    [0.8, 0.6, 0.4]
+)  # a: along no axis and in no plane between axes, so even bodies' modes do not cancel
 
 
 def radiation(model: ModalModel, air: Air) -> tuple[Array, Array]:
@@ -96,7 +98,7 @@ def radiation_and_note(model: ModalModel, air: Air, near_field: NearField | None
         left = pressure * np.exp(-1j * k[now, None] * reach)
         loud = (np.abs(left) / np.maximum(np.abs(left).max(axis=1, keepdims=True), 1e-300)) ** louder
         phase = _unit(np.sqrt((loud * left**2) @ every))
-        sense = ((loud * left) @ (every * np.exp(both @ UNEVEN)) * phase.conj()).real
+        sense = ((loud * left) @ (every * np.exp(both @ UNEVEN_AXIS)) * phase.conj()).real
         weight[now] = np.sqrt(mean) * np.where(sense < 0, -phase, phase)
     return weight, _damping(weight, air), ""
 

@@ -76,7 +76,7 @@ def pattern_of(model: ModalModel, air: Air, cache: store.Place = "default") -> A
     parts = model.freq_hz, model.shape, model.vertex_m, model.face, air.density_kg_m3, air.sound_speed_m_s
     name = key("pattern", *parts, code=code)
     found = store.load(cache, name)
-    if found is None or found[0]["real"].shape != (pattern.ROWS * pattern.TURNS, model.mode_count):
+    if found is None or found[0]["real"].shape != (pattern.PATTERN_ROWS * pattern.PATTERN_TURNS, model.mode_count):
         made = pattern.radiation_pattern(model, air)
         if made is None:
             return None

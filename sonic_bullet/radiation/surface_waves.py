@@ -26,7 +26,7 @@ from sonic_bullet.records import Array
 
 RESOLVED = 2 * np.pi / 3
 """k times a triangle's edge: three edges a wavelength. Spheres are within 0.7 dB there, plates within 1.5."""
-NUMBERS = np.array(
+SERIES_NUMBERS = np.array(
     [1, 2, 0.5, 0.5 / np.pi, np.pi, 1e-30, 0.25 / np.pi]
     + [1 / sign for sign in (-6, 120, -5040, 362880, -39916800, 24, -720, 40320, -3628800, 479001600)],
     np.float32,
@@ -63,7 +63,7 @@ class SurfaceWaves:
         for mine in _alike(k * self._radius_m):
             mean = float(k[mine].mean())
             b = -1 / max(mean, 1 / self._equal_radius_m)
-            both = _at(np.float32(mean), np.float32(b), self._place, self._static, NUMBERS)
+            both = _at(np.float32(mean), np.float32(b), self._place, self._static, SERIES_NUMBERS)
             left, right = (one.view(np.complex64)[:, :, 0] for one in both)
             given = (speed[:, mine].T.astype(np.complex64) @ right).T
             factor = lu_factor(left.T, overwrite_a=True, check_finite=False)
@@ -97,7 +97,8 @@ def _alike(turns: Array) -> list[Array]:
 def _at(k, b, place, static, numbers):
     """½ - K - βD and S + β(½ + K') at k, each (f, f, 2), [j, i]: real and imaginary parts; β = ib.
 
-    place (f, 7): centroids, normals, areas. All in single precision, `NUMBERS` too, and few arrays: it runs in vectors.
+    place (f, 7): centroids, normals, areas. All in single precision, `SERIES_NUMBERS` too, and few arrays: it runs in
+    vectors.
     """
     count = len(place)
     left, right = np.empty((count, count, 2), np.float32), np.empty((count, count, 2), np.float32)

@@ -13,7 +13,7 @@ from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import RecordError
 
 Array = NDArray[Any]
-LARGEST = 1e30
+LARGEST_SI = 1e30
 """Largest length, force, stiffness or frequency in SI units; fourth powers of such numbers are still finite."""
 
 
@@ -25,7 +25,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
     dtype, shape
         Of the result; None in shape: any length.
     finite
-        Whether to refuse NaN, infinite numbers and numbers beyond `LARGEST`.
+        Whether to refuse NaN, infinite numbers and numbers beyond `LARGEST_SI`.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
     if (
         finite
         and array.dtype.kind == "f"
-        and not (array.max(initial=0) <= LARGEST and array.min(initial=0) >= -LARGEST)
+        and not (array.max(initial=0) <= LARGEST_SI and array.min(initial=0) >= -LARGEST_SI)
     ):
         what = (
             f"a number of {float(np.abs(array).max()):.3g}" if np.isfinite(array).all() else "NaN or infinite numbers"

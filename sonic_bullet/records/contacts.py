@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.records import Array, frozen_array
-from sonic_bullet.records.arrays import LARGEST, joined
+from sonic_bullet.records.arrays import LARGEST_SI, joined
 from sonic_bullet.records.coerce import as_items, as_kind, as_number, shown
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
@@ -174,7 +174,7 @@ class Contacts:
         row = row if kept else np.array(row, CONTACT)
         number = row.view(np.float64).reshape(len(row), CONTACT.itemsize // 8)[:, 1:]
         # False for NaN too
-        if not (number.max(initial=0) <= LARGEST and number.min(initial=0) >= -LARGEST):
+        if not (number.max(initial=0) <= LARGEST_SI and number.min(initial=0) >= -LARGEST_SI):
             return cls(**{name: row[name] for name in ROW_FIELDS})  # which names the field
         row.setflags(write=False)
         return cls.trusted(row)

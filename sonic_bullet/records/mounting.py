@@ -22,16 +22,16 @@ MOUNTINGS = ("free", "placed", "on floor")
 MOST_LOSS = 1.0
 """Largest loss factor of a mode."""
 Mounting = str | float
-REMEDY = f"give 'free', 'placed', 'on floor' or a loss factor, 0 … {MOST_LOSS:g}"
+MOUNTING_REMEDY = f"give 'free', 'placed', 'on floor' or a loss factor, 0 … {MOST_LOSS:g}"
 
 
 def as_mounting(value: object, name: str = "mounting", error: type[SonicBulletError] = RecordError) -> Mounting:
     """Return one of MOUNTINGS, or a loss factor, or raise ``error``."""
     if isinstance(value, str):
         if value not in MOUNTINGS:
-            raise error(f"{name} is {shown(value)}", REMEDY)
+            raise error(f"{name} is {shown(value)}", MOUNTING_REMEDY)
         return value
-    return as_number(value, name, REMEDY, least=0, most=MOST_LOSS, error=error)
+    return as_number(value, name, MOUNTING_REMEDY, least=0, most=MOST_LOSS, error=error)
 
 
 def usual_mounting(mass_kg: float) -> Mounting:

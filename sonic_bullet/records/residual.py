@@ -8,7 +8,7 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 
-SLOWEST_HZ = 0.01
+SLOWEST_LINE_HZ = 0.01
 LOUDER = 1.1
 """A preset's levels are kept to a quarter of a decibel."""
 
@@ -87,7 +87,7 @@ class Residual:
         low = min(float(getattr(self, name).min(initial=0.0)) for name in shapes)
         slow = min(float(self.mode_freq_hz[0]), float(self.line_freq_hz.min(initial=1.0)))
         require(low >= 0 and slow > 0, "a residual with numbers below zero", "take it anew")
-        require(slow >= SLOWEST_HZ, f"a residual's line at {slow:.3g} Hz", "take it anew: nothing rings there")
+        require(slow >= SLOWEST_LINE_HZ, f"a residual's line at {slow:.3g} Hz", "take it anew: nothing rings there")
         for name in shapes:
             value, most = (
                 float(getattr(self, name).max(initial=0.0)),

@@ -20,7 +20,7 @@ from sonic_bullet.records.mounting import Mounting, as_mounting
 
 CombineRule = Literal["average", "minimum", "maximum", "multiply"]
 JointKind = Literal["fixed", "point", "hinge", "slider"]
-HEAVIEST_KG, FASTEST = 1e9, 1e6
+HEAVIEST_RIGID_KG, FASTEST_M_S_RIGID = 1e9, 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class RigidBody:
             store(self, **{name: frozen_array(getattr(self, name), float, (width,), f"{where}: {name}")})
         store(
             self,
-            mass_kg=as_number(self.mass_kg, f"{where}: mass", "give kilograms", least=0, most=HEAVIEST_KG),
+            mass_kg=as_number(self.mass_kg, f"{where}: mass", "give kilograms", least=0, most=HEAVIEST_RIGID_KG),
             gravity_factor=as_number(self.gravity_factor, f"{where}: gravityFactor", "give a number"),
             mounting=as_mounting(self.mounting, f"{where}: mounting"),
             gain=as_number(self.gain, f"{where}: gain", "give a factor, 0 or more", least=0, most=1e10),
@@ -92,7 +92,9 @@ class RigidBody:
         require(len(self.shapes) > 0, f"{where} has no collider", "give it one")
         require(bool((self.inertia_kg_m2 >= 0).all()), f"{where}: a moment of inertia is below 0", "give moments")
         speeds = np.concatenate([self.velocity_m_s, self.spin_rad_s])
-        require(bool((np.abs(speeds) <= FASTEST).all()), f"{where} is faster than anything", "give m/s and rad/s")
+        require(
+            bool((np.abs(speeds) <= FASTEST_M_S_RIGID).all()), f"{where} is faster than anything", "give m/s and rad/s"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

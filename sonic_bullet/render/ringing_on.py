@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TAIL_DB = -60.0
 """Default end of a tail: the fall of level that reverberation times are stated for [ISO 3382-1:2009, sec. 3.2]."""
 MOST_S = 10.0
-BLOCK_S = 0.1
+CHECKED_S = 0.1
 """Length checked at once: longer than beats of neighbouring modes that a listener hears as one decay."""
 STEP_S = 1 / 240
 """Steps of a tail are no shorter: nothing happens in them."""
@@ -57,7 +57,7 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
     state.changed()
     step = replace(still, dt_s=max(still.dt_s, STEP_S))
     while True:
-        yield advance(setup, state, [step] * max(1, round(BLOCK_S / step.dt_s)))
+        yield advance(setup, state, [step] * max(1, round(CHECKED_S / step.dt_s)))
 
 
 def with_tail(
@@ -73,10 +73,10 @@ def with_tail(
     travel_s = max(
         (float(np.linalg.norm(last.position_m - m, axis=1).max(initial=0.0)) for m in microphone_m), default=0.0
     )
-    quiet_s = BLOCK_S + travel_s / setup.air.sound_speed_m_s
+    quiet_s = CHECKED_S + travel_s / setup.air.sound_speed_m_s
     weakest, peak = 10 ** (tail_db / 20), sound.peaks()
     frames = sound.shape[1]
-    loud = bool((_peak(sound.read(max(0, frames - math.ceil(BLOCK_S * setup.sr)), frames)) > weakest * peak).any())
+    loud = bool((_peak(sound.read(max(0, frames - math.ceil(CHECKED_S * setup.sr)), frames)) > weakest * peak).any())
     kept: list[Array] = []
     waiting: list[Array] = []
     room, silent = round((MOST_S + longer_s) * setup.sr), 0

@@ -30,7 +30,7 @@ SLIDES_M_S = 1e-3
 """Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
 (synth.strikes).
 """
-NAMED, MANY = 3, 20
+NAMED_SILENT, MANY_SILENT = 3, 20
 UNTOUCHED = "touched by nobody, so silent"
 
 
@@ -77,11 +77,11 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
     notes = []
     if alone and log.steps:
-        notes.append(f"{UNTOUCHED}: {_names(alone, MANY)}")
+        notes.append(f"{UNTOUCHED}: {_names(alone, MANY_SILENT)}")
     for still, said in ((False, "they click but do not ring"), (True, "they do not move either, so they are silent")):
         mute = [body for body in dull if (body.mass_kg == 0) == still]
         if mute:
-            notes.append(f"no mode below {min(20_000.0, log.sr / 2):g} Hz: {_names(mute, MANY)}; {said}")
+            notes.append(f"no mode below {min(20_000.0, log.sr / 2):g} Hz: {_names(mute, MANY_SILENT)}; {said}")
     here = {(body.body_id, body.link) for body in log.bodies if body.material is not None}
     off = [one for one in log.sensors if isinstance(one, Vibrometer) and (one.body_id, one.link) not in here]
     if off and here:
@@ -90,7 +90,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     if any(isinstance(sensor, Microphone) for sensor in log.sensors):
         simple = [body for body, model in models if radiation_note(model, log.air)]
         if simple:
-            notes.append(f"{COMPACT}: {_names(simple, MANY)}")
+            notes.append(f"{COMPACT}: {_names(simple, MANY_SILENT)}")
     return tuple(notes)
 
 
@@ -218,6 +218,6 @@ def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     )
 
 
-def _names(bodies: Iterable[Body], most: int = NAMED) -> str:
+def _names(bodies: Iterable[Body], most: int = NAMED_SILENT) -> str:
     names = [with_body_id(body.name, body.body_id) for body in bodies]
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

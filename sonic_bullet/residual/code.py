@@ -19,10 +19,10 @@ import numpy as np
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import MaterialError, RecordError
 
-STEP_DB = 0.5
-MOST = 4096
+CODE_STEP_DB = 0.5
+MOST_NUMBERS = 4096
 
-Numbers = Annotated[tuple[float, ...], msgspec.Meta(max_length=MOST)]
+Numbers = Annotated[tuple[float, ...], msgspec.Meta(max_length=MOST_NUMBERS)]
 
 
 class ResidualForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
@@ -52,7 +52,7 @@ def form_of(residual: Residual) -> ResidualForm:
             else np.full(residual.power_per_hz.shape, -np.inf)
         )
     level = np.where(np.isfinite(level), level, -1e9)
-    byte = np.clip(np.round(255 + level / STEP_DB), 0, 255).astype(np.uint8)
+    byte = np.clip(np.round(255 + level / CODE_STEP_DB), 0, 255).astype(np.uint8)
     parts = {
         f"{part}_{name}": _short(getattr(residual, f"{part}_{name}"))
         for part in ("mode", "line")
@@ -78,7 +78,7 @@ def residual_of(form: ResidualForm, where: str = "preset") -> Residual:
             "take the residual anew",
         )
     byte = np.frombuffer(content, np.uint8).reshape(shape).astype(float)
-    power = np.where(byte > 0, form.loudest_per_hz * 10 ** (STEP_DB * (byte - 255) / 10), 0.0)
+    power = np.where(byte > 0, form.loudest_per_hz * 10 ** (CODE_STEP_DB * (byte - 255) / 10), 0.0)
     names = (
         "mode_freq_hz",
         "mode_decay_per_s",

@@ -20,17 +20,17 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.residual.spectrogram import WINDOW, Power, checked, power, transform
+from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
 from sonic_bullet.residual.transfer import StruckModes
 
 FINE_WINDOW = 4096
 LINE_FLOOR = 1e-4
 """Lines with less than this fraction of the loudest line's energy (40 dB) and of the clip's are left out."""
 BAND_OCTAVES = 1 / 6
-ABOVE = 2.0
+ABOVE_FLOOR = 2.0
 """Cells whose mean is less than this times the floor are the floor."""
 LINE_WIDTHS = 6.0
-ROOM = 1.25
+LINE_ROOM = 1.25
 """Six half widths hold nine tenths of a damped sinusoid's energy."""
 
 
@@ -55,7 +55,7 @@ def _damped(pole: Array, amplitude: Array, length: Array, out: Array) -> None:  
 
 
 def clip_residual(
-    recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = WINDOW
+    recorded: Array, represented: Array, sr: int, represented_sr: int | None = None, window: int = RESIDUAL_WINDOW
 ) -> tuple[Power, Array]:
     """Compute P_residual of a recording (n,), and the complex transform of recorded - represented (m, k).
 
@@ -102,7 +102,7 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     np.add.at(total, (band[:, None], frame[None]), left.per_hz[:, :last])
     np.add.at(quiet, band, floor_per_hz)
     mean, quiet = total / np.maximum(count, 1), quiet / np.maximum(np.bincount(band), 1)
-    observed = mean > quiet[:, None] * (ABOVE + 3 / np.sqrt(count + 1e-9))
+    observed = mean > quiet[:, None] * (ABOVE_FLOOR + 3 / np.sqrt(count + 1e-9))
     centre_hz = np.bincount(band, left.freq_hz) / np.maximum(np.bincount(band), 1)
     centre_s = np.bincount(frame, left.time_s[:last]) / np.bincount(frame)
     return centre_hz[kept], centre_s, np.where(observed, mean - quiet[:, None], 0.0)[kept]
@@ -161,7 +161,7 @@ def line_room(
     decay = np.maximum(decay_per_s, 1e-3)
     energy = amplitude**2 / (4 * decay) * -np.expm1(-2 * decay * seconds)
     wanted = (np.abs(freq_hz[:, None] - freq_hz[None]) <= half[:, None]) @ energy
-    return np.asarray(np.minimum(1.0, ROOM * room / np.maximum(wanted, 1e-300)))
+    return np.asarray(np.minimum(1.0, LINE_ROOM * room / np.maximum(wanted, 1e-300)))
 
 
 def residual_record(

@@ -23,7 +23,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.invert import OVERLAP, invert, magnitude_of, noise_phases
-from sonic_bullet.residual.spectrogram import WINDOW, axes
+from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, axes
 from sonic_bullet.residual.transfer import (
     ModePairs,
     ResidualLines,
@@ -38,8 +38,8 @@ from sonic_bullet.residual.transfer import (
     transfer_lines,
 )
 
-LONGEST_S = 0.5
-STEP_DB = 2.0
+LONGEST_GRAIN_S = 0.5
+GRAIN_STEP_DB = 2.0
 SEEDS = (0x5EED, 0xF00D)
 
 
@@ -68,7 +68,7 @@ class Voice:
     cache: dict[bytes, Array] = field(default_factory=dict)
 
 
-def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: float = LONGEST_S) -> Voice:
+def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: float = LONGEST_GRAIN_S) -> Voice:
     """Make a body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
     source = source_modes(residual)
     pairs = pair(source, target)
@@ -77,7 +77,7 @@ def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: floa
     freq, time = axes(n, sr, overlap=OVERLAP)
     here, slope, rate = come_from(pairs, freq)
     magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
-    size = 1 << int(np.ceil(np.log2(n + 4 * WINDOW)))
+    size = 1 << int(np.ceil(np.log2(n + 4 * RESIDUAL_WINDOW)))
     shape = faded(n, sr)
     base = (
         [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in SEEDS]
@@ -101,7 +101,7 @@ def duration(residual: Residual, pairs: ModePairs, sr: int, longest_s: float) ->
     """Count the samples until the end of a residual's noise, stretched onto the pairs; a window at least."""
     sounding = np.flatnonzero(residual.power_per_hz.any(axis=0))
     last = float(residual.time_s[min(int(sounding[-1]) + 1, len(residual.time_s) - 1)]) if len(sounding) else 0.0
-    return max(2 * WINDOW, round(sr * min(longest_s, last / float(pairs.rate.min()))))
+    return max(2 * RESIDUAL_WINDOW, round(sr * min(longest_s, last / float(pairs.rate.min()))))
 
 
 @lru_cache(maxsize=16)
@@ -153,7 +153,9 @@ def placed(voice: Voice, struck_power: Array, tau_s: float, flat: bool, pulse: P
     key = step.tobytes()
     found = voice.cache.get(key)
     if found is None:
-        gain = response(voice, 10 ** (step[:-2] * STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat))
+        gain = response(
+            voice, 10 ** (step[:-2] * GRAIN_STEP_DB / 10), pulse(axes(0, voice.sr)[0] * 2 ** (octave / 8), flat)
+        )
         found = filtered(voice, gain)
         while len(voice.cache) >= cached:
             voice.cache.pop(next(iter(voice.cache)))
@@ -190,7 +192,7 @@ def _steps(power: Array, most: float, step: Array) -> None:  # pragma: no cover 
     least_db = -60.0
     least = most * 10.0 ** (least_db / 10.0)
     for p in range(len(power)):
-        step[p] = round(10.0 * np.log10(max(power[p], least) / most) / STEP_DB)
+        step[p] = round(10.0 * np.log10(max(power[p], least) / most) / GRAIN_STEP_DB)
 
 
 @njit(nogil=True)
@@ -218,7 +220,9 @@ def angles(number: int) -> Array:
     state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     knot = (state ^ (state >> np.uint64(31))) / 2.0**64
-    return np.asarray(2 * np.pi * np.interp(np.arange(WINDOW // 2 + 1), np.linspace(0, WINDOW // 2, knots), knot))
+    return np.asarray(
+        2 * np.pi * np.interp(np.arange(RESIDUAL_WINDOW // 2 + 1), np.linspace(0, RESIDUAL_WINDOW // 2, knots), knot)
+    )
 
 
 @njit(nogil=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
-from sonic_bullet.residual.spectrogram import WINDOW, frame_count, hann, inverse, transform
+from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, frame_count, hann, inverse, transform
 
 ITERATIONS = 4
 MOST_ITERATIONS = 10
@@ -33,7 +33,7 @@ def invert(
     *,
     iterations: int = ITERATIONS,
     momentum: float = MOMENTUM,
-    window: int = WINDOW,
+    window: int = RESIDUAL_WINDOW,
     overlap: int = OVERLAP,
 ) -> Array:
     """Compute samples (n,) float32 of magnitudes |S| (m, k), from complex ``start`` (m, k) whose phases alone count.
@@ -52,7 +52,7 @@ def invert(
     return inverse(now, n, window, overlap)
 
 
-def noise_phases(n: int, seed: int, window: int = WINDOW, overlap: int = OVERLAP) -> Array:
+def noise_phases(n: int, seed: int, window: int = RESIDUAL_WINDOW, overlap: int = OVERLAP) -> Array:
     """Return the transform (m, k) complex64 of white noise, whose phases are consistent with each other.
 
     A longer grain's are the same, as far as both go.
@@ -70,7 +70,7 @@ def _noise(n: int, seed: int, window: int, overlap: int) -> Array:
     return phases
 
 
-def magnitude_of(per_hz: Array, sr: int, window: int = WINDOW) -> Array:
+def magnitude_of(per_hz: Array, sr: int, window: int = RESIDUAL_WINDOW) -> Array:
     """Compute |S| (m, k) of powers per Hz (k, m)."""
     return np.asarray(np.sqrt(per_hz.T * (sr * float((hann(window).astype(float) ** 2).sum()))), np.float32)
 

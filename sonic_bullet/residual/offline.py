@@ -17,7 +17,7 @@ from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.grains import filtered, make_voice, mixed_number, response, varied
 from sonic_bullet.residual.invert import MOST_ITERATIONS, invert, magnitude_of
-from sonic_bullet.residual.spectrogram import WINDOW, axes
+from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, axes
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
 
 
@@ -42,8 +42,8 @@ def transferred_clip(
     freq, time = axes(n, sr)
     here, _, rate = come_from(pairs, freq)
     there_s = np.minimum(rate * time[:, None], left.time_s[-1])
-    row = np.round(there_s * sr * looking / WINDOW).astype(np.int64)
-    column = np.clip(np.round(here * WINDOW / sr).astype(np.int64), 0, WINDOW // 2)
+    row = np.round(there_s * sr * looking / RESIDUAL_WINDOW).astype(np.int64)
+    column = np.clip(np.round(here * RESIDUAL_WINDOW / sr).astype(np.int64), 0, RESIDUAL_WINDOW // 2)
     # phases are counted from a frame's beginning, half a window before its time
     flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)
     turned = np.exp(2j * np.pi * (freq * time[:, None] - here * there_s)) * flip

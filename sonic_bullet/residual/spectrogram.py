@@ -19,7 +19,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.errors import AudioError
 
-WINDOW = 512
+RESIDUAL_WINDOW = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,19 +55,19 @@ def hann(length: int) -> Array:
     return window
 
 
-def frame_count(n: int, window: int = WINDOW, overlap: int = 4) -> int:
+def frame_count(n: int, window: int = RESIDUAL_WINDOW, overlap: int = 4) -> int:
     """Count the frames that contain any of n samples, window/overlap apart."""
     return (n + window // 2) // (window // overlap) + 1
 
 
-def axes(n: int, sr: int, window: int = WINDOW, overlap: int = 4) -> tuple[Array, Array]:
+def axes(n: int, sr: int, window: int = RESIDUAL_WINDOW, overlap: int = 4) -> tuple[Array, Array]:
     """Return frequencies (window/2 + 1,) in Hz and times (m,) in s of `transform`."""
     return np.arange(window // 2 + 1) * sr / window, np.arange(frame_count(n, window, overlap)) * (
         window // overlap
     ) / sr
 
 
-def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
+def transform(sample: Array, window: int = RESIDUAL_WINDOW, overlap: int = 4) -> Array:
     """Compute S (m, window/2 + 1) complex64 of samples (n,).
 
     Frame m is centred on sample m·window/overlap, with zeros before and after the samples.
@@ -79,7 +79,7 @@ def transform(sample: Array, window: int = WINDOW, overlap: int = 4) -> Array:
     return np.asarray(rfft(frames, axis=1, overwrite_x=True))
 
 
-def inverse(spectrum: Array, n: int, window: int = WINDOW, overlap: int = 4) -> Array:
+def inverse(spectrum: Array, n: int, window: int = RESIDUAL_WINDOW, overlap: int = 4) -> Array:
     """Compute the samples (n,) float32 whose transform is nearest to S in squares."""
     from scipy.fft import irfft
 
@@ -109,7 +109,7 @@ def _synthesis(window: int, overlap: int) -> Array:
     return np.asarray(made)
 
 
-def power(sample: Array, sr: int, window: int = WINDOW) -> Power:
+def power(sample: Array, sr: int, window: int = RESIDUAL_WINDOW) -> Power:
     """Compute the power spectrogram of samples (n,) at sr Hz. Raises AudioError on nothing, NaN or a bad rate."""
     sample = checked(sample, sr)
     frequency, time = axes(len(sample), sr, window)

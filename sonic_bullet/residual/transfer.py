@@ -29,7 +29,7 @@ from sonic_bullet.residual.spectrogram import Power
 
 DOMINANT = 24
 """Most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1."""
-FAINT = 1e-6
+FAINT_POWER = 1e-6
 LEAST_DECAY_PER_S = 0.1
 TINY = 1e-300
 
@@ -203,7 +203,7 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
         np.asarray(freq_hz, float),
         pairs.source_hz,
         skirt * width,
-        source_power + FAINT * float(source_power.max()) + TINY,
+        source_power + FAINT_POWER * float(source_power.max()) + TINY,
         target_power,
         out,
     )
@@ -302,7 +302,7 @@ def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
     below = scale(
         pairs,
         np.ones(len(pairs.source)),
-        source.amplitude[pairs.source] ** 2 + FAINT * float((source.amplitude**2).max()),
+        source.amplitude[pairs.source] ** 2 + FAINT_POWER * float((source.amplitude**2).max()),
         residual.line_freq_hz,
     )
     decay = residual.line_decay_per_s * pairs.rate[follows]

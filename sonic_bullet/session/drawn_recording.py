@@ -23,7 +23,7 @@ from sonic_bullet.render.surface.sensor_chain import filter_rows, response_taps,
 from sonic_bullet.session.variation import draw_factors, vary_body
 
 Range = tuple[float, float]
-OCTAVES_HZ = 62.5 * 2.0 ** np.arange(9)
+NOISE_OCTAVES_HZ = 62.5 * 2.0 ** np.arange(9)
 """Where a drawn response has its levels: octaves from 62.5 Hz to 16 kHz."""
 MOST_JITTER = 3.0
 """Standard deviations of the jitter at most."""
@@ -78,10 +78,10 @@ class ChainSpread:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingChain:
-    """One recording's numbers; see `ChainSpread`. levels_db (9,): of `OCTAVES_HZ`. seed: of noise and jitter."""
+    """One recording's numbers; see `ChainSpread`. levels_db (9,): of `NOISE_OCTAVES_HZ`. seed: of noise and jitter."""
 
     gain_db: float = 0.0
-    levels_db: Array = field(default_factory=lambda: np.zeros(len(OCTAVES_HZ)))
+    levels_db: Array = field(default_factory=lambda: np.zeros(len(NOISE_OCTAVES_HZ)))
     noise_rthz: float = 0.0
     latency_s: float = 0.0
     jitter_s: float = 0.0
@@ -91,7 +91,7 @@ class RecordingChain:
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        levels = frozen_array(self.levels_db, float, (len(OCTAVES_HZ),), "recording chain: levels_db")
+        levels = frozen_array(self.levels_db, float, (len(NOISE_OCTAVES_HZ),), "recording chain: levels_db")
         seed = as_whole(self.seed, "recording chain: seed", "give a whole number, 0 or more", least=0)
         store(self, levels_db=levels, seed=seed)
 
@@ -102,7 +102,7 @@ class RecordingChain:
 
 def draw_chain(draw: np.random.Generator, spread: ChainSpread) -> RecordingChain:
     """Draw a chain; the same numbers of the generator are used whatever the spread."""
-    u, levels, seed = draw.random(6), draw.normal(size=len(OCTAVES_HZ)), int(draw.integers(2**63))
+    u, levels, seed = draw.random(6), draw.normal(size=len(NOISE_OCTAVES_HZ)), int(draw.integers(2**63))
     ranges = spread.gain_db, spread.latency_s, spread.jitter_s, spread.robot_db
     gain, latency, jitter, robot = (low + x * (high - low) for x, (low, high) in zip(u, ranges, strict=False))
     return RecordingChain(
@@ -163,7 +163,7 @@ def _taps(chain: RecordingChain, sr: int) -> Array:
     gain = 10 ** (chain.gain_db / 20)
     if not chain.levels_db.any():
         return np.array([gain])
-    return gain * response_taps(SensorResponse(OCTAVES_HZ, 10 ** (chain.levels_db / 20)), sr)
+    return gain * response_taps(SensorResponse(NOISE_OCTAVES_HZ, 10 ** (chain.levels_db / 20)), sr)
 
 
 def _behind(held: Array, channels: int, size: int) -> Array:

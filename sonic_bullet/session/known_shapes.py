@@ -31,7 +31,7 @@ from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 from sonic_bullet.session.arguments import as_material
 
-MARGIN = 1.02
+FREQUENCY_MARGIN = 1.02
 """Of to_hz: a mode above it at one of the family's Poisson's ratios may lie below it at another."""
 
 
@@ -128,6 +128,10 @@ def known_shape(
     gamma = min(one.youngs_pa / one.density_kg_m3 for one in made)
     shape = mesh if isinstance(mesh, Shape) else read_mesh(mesh)
     found = family(
-        shape, gamma_m2_s2=gamma, poisson=poisson, to_hz=to_hz * largest * MARGIN, progress=progress or (lambda _: None)
+        shape,
+        gamma_m2_s2=gamma,
+        poisson=poisson,
+        to_hz=to_hz * largest * FREQUENCY_MARGIN,
+        progress=progress or (lambda _: None),
     )
     return KnownShape(found, largest, gamma, to_hz)

@@ -18,7 +18,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.soundtrack.sound_events import SOUNDING, SoundEvent
 
-COLUMNS = (
+EVENT_COLUMNS = (
     "kind",
     "start_s",
     "end_s",
@@ -49,7 +49,7 @@ def rows_of(events: Sequence[SoundEvent], log: ContactLog) -> list[dict[str, Any
                 one.kind, one.start_s, one.end_s, one.arrival_s, a.body_id, a.link, names[0], b.body_id, b.link,
                 names[1], *one.place_m.tolist(), one.impulse_n_s, one.speed_m_s, one.level_db,
             )  # fmt: skip
-            rows.append(dict(zip(COLUMNS, values, strict=True)))
+            rows.append(dict(zip(EVENT_COLUMNS, values, strict=True)))
     return rows
 
 
@@ -58,7 +58,7 @@ def write_events(path: str | os.PathLike[str], events: Sequence[SoundEvent], log
     rows = rows_of(events, log)
     if Path(path).suffix.lower() == ".csv":
         text = io.StringIO()
-        table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+        table = csv.DictWriter(text, EVENT_COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
         content = text.getvalue()

@@ -10,7 +10,7 @@ import numpy as np
 from sonic_bullet.records import Array
 
 USUAL_FPS = 30.0
-UNEVEN = 4e-4
+UNEVEN_KEYS = 4e-4
 """Relative error allowed in the median distance of keys: less than half of what is between n and n·1000/1001."""
 EXACT = 1e-5
 """Relative error allowed in a rate that was measured over all of an animation."""
@@ -43,7 +43,7 @@ def rate_of_keys(times: Sequence[Array]) -> float:
     if len(gaps) < 8:
         return USUAL_FPS
     longest = max(times, key=len)
-    rate, within = 1 / float(np.median(gaps)), UNEVEN
+    rate, within = 1 / float(np.median(gaps)), UNEVEN_KEYS
     own = np.diff(longest)
     if len(own) >= 8 and np.abs(own - own.mean()).max() <= 2 * np.spacing(np.float32(longest[-1])):
         rate, within = 1 / float(own.mean()), EXACT

@@ -39,7 +39,7 @@ SOUNDING = (IMPACT, ROLL, SLIDE)
 LEVEL_S = 0.05
 """Time after an impact's arrival in which its peak is searched: the ear's integration time for loudness is of that
 order, and the latest mode's first swing is over."""
-CARRIES = "it carries weight: nothing strikes, and no surface sweeps past"
+CARRIES_WEIGHT = "it carries weight: nothing strikes, and no surface sweeps past"
 NO_CAUSE = "nothing approached faster than gravity brings it while it rests"
 NO_VOICE = "neither body has modes, nor moves freely"
 
@@ -82,7 +82,7 @@ class _Touch(NamedTuple):
     approach_m_s: float
 
 
-_NOWHERE = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+_NO_TOUCH = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 class _Moment(NamedTuple):
@@ -152,7 +152,7 @@ class EventWitness:
             ahead = int(pulse["ahead"])
             of, start_s = (there, after_s) if ahead else (here, begin_s)
             start_s += float(pulse["start_s"])
-            touch = of.get((low, high)) or here.get((low, high)) or _NOWHERE
+            touch = of.get((low, high)) or here.get((low, high)) or _NO_TOUCH
             self._struck[low, high] = number + ahead
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
             speed, own = max(touch.approach_m_s, 0), self._peak_pa(state, number + ahead, start_s, at, (low, high))
@@ -170,7 +170,7 @@ class EventWitness:
         bodies = state.body[pair["body"]].tolist()
         for i in np.flatnonzero(driven | leaps | carries).tolist():
             who = bodies[i][0], bodies[i][1]
-            touch = there.get(who) or here.get(who) or _NOWHERE
+            touch = there.get(who) or here.get(who) or _NO_TOUCH
             load, speed = float(force[i]) * (after_s - begin_s), touch.sweep_m_s
             if driven[i]:
                 slides = touch.slip_m_s > max(SWEEP_FLOOR_M_S, 0.5 * speed)
@@ -178,7 +178,7 @@ class EventWitness:
             elif leaps[i] and number - self._struck.get(who, -SPAN) >= SPAN:
                 kind, speed, reason = UNCAUSED, max(touch.approach_m_s, 0), NO_CAUSE
             elif carries[i]:
-                kind, reason = SUPPORT, CARRIES
+                kind, reason = SUPPORT, CARRIES_WEIGHT
             else:
                 continue
             reason = NO_VOICE if mute[i] else reason

@@ -77,4 +77,4 @@ def test_a_home_that_is_missing_is_not_made(tmp_path: Path, monkeypatch: pytest.
 def test_a_relative_cache_means_the_folder_the_run_began_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SONIC_BULLET_CACHE", "models")
     monkeypatch.chdir(tmp_path)
-    assert cache.folder("default") == user_folder.START / "models"
+    assert cache.folder("default") == user_folder.START_FOLDER / "models"

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 import trimesh
 
-from sonic_bullet.machine.progress import CALL_QUIET_S, EVERY_S, LEAST_S, ProgressLines, status
+from sonic_bullet.machine.progress import BETWEEN_STAGES_S, CALL_QUIET_S, EVERY_S, ProgressLines, status
 from tests.few_cases import parametrize_few
 
 REPO = Path(__file__).resolve().parents[2]
@@ -231,7 +231,7 @@ def test_lines_are_neither_late_nor_many(messages: list[tuple[float, str]]) -> N
     assert times[0] == pytest.approx(1.0, abs=0.06)
     gaps = [b - a for a, b in zip(times, [*times[1:], 60.0], strict=True)]
     assert max(gaps) < EVERY_S + 0.1
-    assert min(gaps[:-1]) > LEAST_S - 0.01
+    assert min(gaps[:-1]) > BETWEEN_STAGES_S - 0.01
 
 
 def test_a_line_says_who_does_what_and_how_far() -> None:

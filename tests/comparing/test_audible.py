@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.comparing.ensemble import LEVEL, RUNS, SHIFT_M, Ensemble, Shifted, judged
+from sonic_bullet.comparing.ensemble import RUNS, SHIFT_M, SIGNIFICANCE, Ensemble, Shifted, judged
 from sonic_bullet.listener.calls import Call, Who
 
 
@@ -17,7 +17,7 @@ def test_chance_alarms_in_one_of_a_hundred() -> None:
     rng = np.random.default_rng(35)
     alarms = [judged(known(rng), rng.normal(size=11), rng.normal(size=96)).beyond_chance for _ in range(400)]
     assert 0 <= sum(alarms) <= 12  # 4 expected; more than 12 of 400 at 1 % has a chance of 1e-4
-    assert (RUNS + 1) * LEVEL == 1  # the first of all runs alone
+    assert (RUNS + 1) * SIGNIFICANCE == 1  # the first of all runs alone
 
 
 def test_what_stands_out_alarms() -> None:

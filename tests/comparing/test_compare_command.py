@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from sonic_bullet.cli import cli
-from sonic_bullet.comparing.baselines import FORMAT, SceneBaseline, read_baseline, write_baseline
+from sonic_bullet.comparing.baselines import BASELINE_FORMAT, SceneBaseline, read_baseline, write_baseline
 from sonic_bullet.records.errors import CompareError, FileError, SonicBulletError
 from tests.comparing.made import scene
 
@@ -103,7 +103,7 @@ def test_a_baseline_comes_back_and_one_of_another_version_is_refused(tmp_path: P
     assert done.exit_code == 0, done.output
     known = read_baseline(tmp_path / "kept" / "a.json")
     assert isinstance(known, SceneBaseline)
-    assert (known.format, known.reason, known.scene) == (FORMAT, "as tuned", "a.py")
+    assert (known.format, known.reason, known.scene) == (BASELINE_FORMAT, "as tuned", "a.py")
     assert (tmp_path / "kept" / "a.json").stat().st_size < 10_000
     known.format = "sonic_bullet baseline 0"
     write_baseline(tmp_path / "old.json", known)

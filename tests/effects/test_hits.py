@@ -131,7 +131,7 @@ def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.Monk
     would have been louder than anything.
     """
     monkeypatch.setattr(line_fit, "CROWD", 0.0)
-    monkeypatch.setattr(line_fit, "FEWER", np.inf)
+    monkeypatch.setattr(line_fit, "LATE_LINES", np.inf)
     t = np.arange(2 * SR) / SR
     freq, late = np.array([952.0, 2093.0, 4095.0]), line_fit.LATE_S[0]
     ring = np.exp(-np.array([[6.0], [11.0], [20.0]]) * t) * np.sin(2 * np.pi * freq[:, None] * t)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.environments import log_mel, mel_filters
-from sonic_bullet.environments.mel_features import FLOOR_PA2, HOP, MELS, N_FFT, RATE_HZ
+from sonic_bullet.environments.mel_features import FLOOR_PA2, MEL_HOP, MELS, N_FFT, RATE_HZ
 from sonic_bullet.records.errors import AudioError
 
 
@@ -62,7 +62,7 @@ def test_bands_share_what_a_frame_holds() -> None:
     power = np.exp(log_mel(samples, RATE_HZ)[0].astype(float)).sum(axis=0)
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(N_FFT) / N_FFT)
     for frame, total in enumerate(power):
-        piece = window * samples[frame * HOP : frame * HOP + N_FFT]
+        piece = window * samples[frame * MEL_HOP : frame * MEL_HOP + N_FFT]
         np.testing.assert_allclose(total, N_FFT / 2 * np.sum(piece**2), rtol=1e-3)
 
 
@@ -70,8 +70,8 @@ def test_frames_lie_within_the_audio_or_are_centred() -> None:
     audio = noise(0.04)
     assert audio.shape == (2, 640)
     inside, centred = log_mel(audio, RATE_HZ), log_mel(audio, RATE_HZ, center=True)
-    assert inside.shape == (2, MELS, 1 + (640 - N_FFT) // HOP) == (2, MELS, 2)
-    assert centred.shape == (2, MELS, 1 + 640 // HOP)
+    assert inside.shape == (2, MELS, 1 + (640 - N_FFT) // MEL_HOP) == (2, MELS, 2)
+    assert centred.shape == (2, MELS, 1 + 640 // MEL_HOP)
     assert inside.dtype == centred.dtype == np.float32
     mirrored = np.concatenate([audio[:, 200:0:-1], audio, audio[:, -2:-202:-1]], axis=1)
     np.testing.assert_array_equal(centred, log_mel(mirrored, RATE_HZ))
@@ -115,7 +115,7 @@ def test_librosa_gives_the_same(center: bool) -> None:
         y=noise(),
         sr=RATE_HZ,
         n_fft=N_FFT,
-        hop_length=HOP,
+        hop_length=MEL_HOP,
         n_mels=MELS,
         center=center,
         pad_mode="reflect",
@@ -128,6 +128,6 @@ def test_librosa_gives_the_same(center: bool) -> None:
 @pytest.mark.parametrize("center", [False, True])
 def test_torchaudio_gives_the_same(center: bool) -> None:
     torch, torchaudio = pytest.importorskip("torch"), pytest.importorskip("torchaudio")
-    mel = torchaudio.transforms.MelSpectrogram(RATE_HZ, n_fft=N_FFT, hop_length=HOP, n_mels=MELS, center=center)
+    mel = torchaudio.transforms.MelSpectrogram(RATE_HZ, n_fft=N_FFT, hop_length=MEL_HOP, n_mels=MELS, center=center)
     power = mel(torch.from_numpy(noise().astype(np.float32))).numpy()
     np.testing.assert_allclose(log_mel(noise(), RATE_HZ, center=center), np.log(power), atol=1e-3)

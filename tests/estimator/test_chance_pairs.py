@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.chance_pairs import CLUSTER, MOVED, _moved
+from sonic_bullet.estimator.fit.chance_pairs import CLUSTER, MOVED_MOST, _moved
 from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.files.cases import read_case
@@ -57,6 +57,6 @@ def test_lines_that_are_close_move_together() -> None:
     one, row = np.ones(4), np.ones((1, 4))
     lines = Lines(hz, one, row, one, one, row, np.ones(1), one, True)
     moved = _moved(lines, np.random.default_rng(3)).freq_hz
-    assert np.abs(np.log(moved / hz)).max() <= MOVED
+    assert np.abs(np.log(moved / hz)).max() <= MOVED_MOST
     assert moved[2] / moved[1] == pytest.approx(1.01) and CLUSTER > 0.01
     assert moved[3] / moved[1] != pytest.approx(2.0, rel=1e-4)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.estimator.fit.pairing import BRIEF, _rings, heaped
+from sonic_bullet.estimator.fit.pairing import BRIEF_RATIO, _rings, heaped
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines
@@ -108,8 +108,8 @@ def test_what_loses_as_much_a_cycle_is_no_click() -> None:
         )
         return _rings(lines).tolist()
 
-    assert worth(1.2 * BRIEF * 9) == [1.0, 1.0, 1.0]
-    assert worth(1.2 * BRIEF * 20)[1] == pytest.approx(0.5)
+    assert worth(1.2 * BRIEF_RATIO * 9) == [1.0, 1.0, 1.0]
+    assert worth(1.2 * BRIEF_RATIO * 20)[1] == pytest.approx(0.5)
 
 
 def test_distance_of_a_gain_and_of_nothing() -> None:

@@ -14,7 +14,7 @@ from sonic_bullet.files.cases import read_case
 from sonic_bullet.files.reading import QUOTED, reading
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import (
-    TEXT_BYTES,
+    MESSAGE_BYTES,
     FileError,
     LogError,
     MaterialError,
@@ -75,7 +75,7 @@ def test_texts_quote_at_most_200_characters_of_a_file(
         read(tmp_path / name)
     text = str(caught.value)
     assert text.count("Q") <= QUOTED == 200
-    assert len(text.encode()) <= TEXT_BYTES < 1000
+    assert len(text.encode()) <= MESSAGE_BYTES < 1000
     assert str(tmp_path) in text
     assert "\n" not in text
 
@@ -96,7 +96,7 @@ def test_zip_names_are_quoted_short(tmp_path: Path) -> None:
 @pytest.mark.parametrize("remedy", ["", "y" * 300, "é" * 5000])
 def test_no_error_of_ours_is_longer_than_a_kilobyte(what: str, remedy: str) -> None:
     error = SonicBulletError(what, remedy)
-    assert len(str(error).encode("utf-8", "replace")) <= TEXT_BYTES
+    assert len(str(error).encode("utf-8", "replace")) <= MESSAGE_BYTES
     if len(what) + len(remedy) < 400:
         assert (error.what, error.remedy) == (what, remedy)
     assert error.what[:3] == what[:3] and error.remedy[-3:] == remedy[-3:]

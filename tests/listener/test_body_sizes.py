@@ -20,7 +20,7 @@ from pybullet_utils.bullet_client import BulletClient
 import sonic_bullet as sb
 from sonic_bullet.cli import main
 from sonic_bullet.files import meshes
-from sonic_bullet.geometry import HEAVIEST_KG, LARGEST_M, oversize, volume_m3
+from sonic_bullet.geometry import HEAVIEST_STRUCK_KG, LARGEST_M, oversize, volume_m3
 from sonic_bullet.listener import diagnose_world
 from sonic_bullet.listener.pybullet.urdf_meshes import joined
 from sonic_bullet.records.errors import MeshError, SizeWarning
@@ -170,6 +170,6 @@ def test_the_limits_are_the_largest_bells() -> None:
     bell = np.array([[-3.3, -3.3, 0], [3.3, 3.3, 6.14]])
     assert oversize(bell, 201_924) == ""
     assert oversize(bell * 10, 201_924) and oversize(bell, 4e5)
-    assert (LARGEST_M, HEAVIEST_KG) == (10.0, 202e3)
+    assert (LARGEST_M, HEAVIEST_STRUCK_KG) == (10.0, 202e3)
     ball_mm = 4.2  # the smallest steel ball that is told of when its millimetres are taken for metres
     assert oversize(np.array([[0, 0, 0], [ball_mm] * 3]), 7850 * np.pi / 6 * ball_mm**3)

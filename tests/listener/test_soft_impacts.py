@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.listener.tables.soft_impacts import LONGEST_S, SoftImpacts
+from sonic_bullet.listener.tables.soft_impacts import LONGEST_IMPACT_S, SoftImpacts
 from sonic_bullet.records.contacts import CONTACT
 
 G, DT, MASS_KG = 9.81, 0.002, 0.1
@@ -76,7 +76,7 @@ def test_a_cushion_ends_and_pairs_do_not_mix() -> None:
     for row in made:
         assert row["impulse_n_s"][row["a"] == 2, 2].sum() == 0.02
     out = [i for i, row in enumerate(made) if row["impulse_n_s"][row["a"] == 1, 2].sum() > 0.1]
-    assert out[0] * DT == pytest.approx(LONGEST_S, abs=2 * DT)
+    assert out[0] * DT == pytest.approx(LONGEST_IMPACT_S, abs=2 * DT)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -108,7 +108,7 @@ def test_nobody_waits_for_a_card_that_does_not_close(
     install: Callable[..., StandInLibrary], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     library, unregistered = install(), []
-    monkeypatch.setattr(sound_card, "CLOSE_S", 0.05)
+    monkeypatch.setattr(sound_card, "CARD_CLOSE_S", 0.05)
     monkeypatch.setattr(sound_card.atexit, "unregister", unregistered.append)
     library.hangs = True
     sound = start_playback(None, sr=SR, channels=1, lag_steps=0)

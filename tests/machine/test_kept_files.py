@@ -47,7 +47,7 @@ def test_a_save_past_the_limit_drops_what_was_unused_for_longest(
 ) -> None:
     paths = [kept(tmp_path, i, age_s=1000 - 100 * i) for i in range(5)]
     assert cache.load(tmp_path, name(0)) is not None  # used now, it is the oldest no more
-    monkeypatch.setenv(kept_files.LIMIT, str(4 * paths[0].stat().st_size))
+    monkeypatch.setenv(kept_files.LIMIT_VARIABLE, str(4 * paths[0].stat().st_size))
     new = kept(tmp_path, 9, 0)
     assert [path.exists() for path in paths] == [True, False, False, True, True] and new.exists()
 
@@ -63,7 +63,7 @@ def test_models_that_logs_refer_to_go_last(tmp_path: Path) -> None:
 def test_a_limit_that_is_no_size_is_said_after_the_result_was_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(kept_files.LIMIT, "plenty")
+    monkeypatch.setenv(kept_files.LIMIT_VARIABLE, "plenty")
     with pytest.raises(FileError, match=r"SONIC_BULLET_CACHE_LIMIT is 'plenty'.*2GB"):
         cache.save(tmp_path, name(0), {"x": np.zeros(1000)}, "")
     assert cache.load(tmp_path, name(0)) is not None

@@ -18,7 +18,7 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import cache, read_audio, replacing, write_audio
-from sonic_bullet.machine.partial_file import NAME, PartialFile
+from sonic_bullet.machine.partial_file import PARTIAL_NAME, PartialFile
 from sonic_bullet.presets import named_preset, write_preset
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
@@ -183,7 +183,7 @@ def test_nothing_but_our_own_unfinished_files_is_swept(tmp_path: Path) -> None:
 def test_an_error_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), replacing(tmp_path / "a") as file:
         file.write(b"half")
-        assert [bool(NAME.fullmatch(name)) for name in names(tmp_path)] == [True]
+        assert [bool(PARTIAL_NAME.fullmatch(name)) for name in names(tmp_path)] == [True]
         raise ZeroDivisionError
     assert names(tmp_path) == set()
 

@@ -14,7 +14,7 @@ from sonic_bullet.modal import analyse, eigen, fem
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.records import Material, Shape, isotropic_stiffness_pa
 from sonic_bullet.records.errors import MeshError, ModalError
-from sonic_bullet.records.mode_shapes import BITS, whole_multiples
+from sonic_bullet.records.mode_shapes import SHAPE_BITS, whole_multiples
 
 BAR = Shape("box", [0.2, 0.02, 0.02])
 
@@ -167,4 +167,4 @@ def test_shapes_are_rounded_when_they_are_solved_and_the_same_from_the_cache(tmp
     made = [quick(BAR, steel, cache=tmp_path) for _ in range(2)]
     assert made[0].shape.tobytes() == made[1].shape.tobytes()
     found = whole_multiples(made[0].shape)
-    assert found is not None and np.abs(found[0]).max() <= 2**BITS
+    assert found is not None and np.abs(found[0]).max() <= 2**SHAPE_BITS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.records.mode_shapes import BITS, differences, from_multiples, rounded, summed, whole_multiples
+from sonic_bullet.records.mode_shapes import SHAPE_BITS, differences, from_multiples, rounded, summed, whole_multiples
 
 
 def shapes(seed: int = 0, v: int = 50, m: int = 6) -> np.ndarray:
@@ -13,7 +13,7 @@ def shapes(seed: int = 0, v: int = 50, m: int = 6) -> np.ndarray:
     return (rng.normal(size=(v, 3, m)) * 10.0 ** rng.uniform(-6, 6, m)).astype(np.float32)
 
 
-@pytest.mark.parametrize("bits", [4, BITS, 15])
+@pytest.mark.parametrize("bits", [4, SHAPE_BITS, 15])
 def test_the_error_is_half_a_multiple_at_most(bits: int) -> None:
     exact = shapes()
     made = rounded(exact, bits)
@@ -29,7 +29,7 @@ def test_rounding_twice_is_rounding_once_and_zeros_have_no_sign() -> None:
     assert not np.signbit(made[made == 0]).any()
 
 
-@pytest.mark.parametrize("bits", [4, BITS, 14])
+@pytest.mark.parametrize("bits", [4, SHAPE_BITS, 14])
 def test_rounded_shapes_are_whole_numbers_and_come_back_as_the_same_bytes(bits: int) -> None:
     made = rounded(shapes(), bits)
     made[..., 2] = 0

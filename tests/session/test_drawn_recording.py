@@ -12,7 +12,7 @@ from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.session.drawn_recording import (
-    OCTAVES_HZ,
+    NOISE_OCTAVES_HZ,
     ChainSpread,
     RecordingChain,
     draw_chain,
@@ -75,7 +75,7 @@ def test_a_response_has_its_octaves() -> None:
     heard, _ = record(pulse, SR, RecordingChain(levels_db=levels))
     f = np.fft.rfftfreq(pulse.shape[1], 1 / SR)
     level = 20 * np.log10(np.abs(np.fft.rfft(heard[0])))
-    assert np.abs(np.interp(OCTAVES_HZ, f, level) - levels).max() < 0.3
+    assert np.abs(np.interp(NOISE_OCTAVES_HZ, f, level) - levels).max() < 0.3
 
 
 def test_jitter_bends_time_by_its_deviation() -> None:

@@ -18,7 +18,7 @@ from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import ModalModel, Shape
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.session.body_models import analyse_body
-from sonic_bullet.session.known_shapes import MARGIN, known_shape
+from sonic_bullet.session.known_shapes import FREQUENCY_MARGIN, known_shape
 from tests.few_cases import parametrize_few
 
 AIR = sb.Air()
@@ -61,7 +61,9 @@ def test_a_size_and_a_material_are_those_of_a_fresh_solution(name: str, size: fl
     # as many modes as the shape is known for, so that its surface has as many triangles: the near field on 700 of a
     # thin plate depends on them by 1 dB
     stiffer = np.sqrt(made.youngs_pa / made.density_kg_m3 / (slow.youngs_pa / slow.density_kg_m3))
-    fresh = analyse_body((resized(shape, size),), made, accuracy=0.001, to_hz=20_000 * MARGIN * 1.3 / size * stiffer)
+    fresh = analyse_body(
+        (resized(shape, size),), made, accuracy=0.001, to_hz=20_000 * FREQUENCY_MARGIN * 1.3 / size * stiffer
+    )
     count = model.mode_count
     assert 5 < count == (fresh.omega0_squared_per_s2 <= (2 * np.pi * 20_000) ** 2).sum()
     np.testing.assert_allclose(model.freq_hz[:count], fresh.freq_hz[:count], rtol=1e-3)

@@ -16,9 +16,9 @@ import sonic_bullet as sb
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
-from sonic_bullet.soundtrack.event_tables import COLUMNS, write_events
+from sonic_bullet.soundtrack.event_tables import EVENT_COLUMNS, write_events
 from sonic_bullet.soundtrack.sound_events import (
-    CARRIES,
+    CARRIES_WEIGHT,
     IMPACT,
     NO_CAUSE,
     NO_VOICE,
@@ -127,7 +127,7 @@ def test_what_rests_is_silent_and_said_to_carry_weight() -> None:
     events, stems = looked(log)
     assert not any(stem.sound.peaks().any() for stem in stems)
     assert {one.kind for one in events} <= {SUPPORT, UNCAUSED}
-    assert {one.reason for one in events} <= {CARRIES, NO_CAUSE}
+    assert {one.reason for one in events} <= {CARRIES_WEIGHT, NO_CAUSE}
     assert sum(one.end_s - one.start_s for one in events if one.kind == SUPPORT) > 0.2
     assert all(one.level_db is None for one in events)
 
@@ -192,12 +192,12 @@ def test_tables_hold_what_sounds(tmp_path: Path) -> None:
     rows = json.loads((tmp_path / "events.json").read_text())["sounding"]
     with (tmp_path / "events.csv").open(newline="") as file:
         lines = list(csv.DictReader(file))
-    assert list(lines[0]) == list(rows[0]) == list(COLUMNS)
+    assert list(lines[0]) == list(rows[0]) == list(EVENT_COLUMNS)
     assert len(lines) == len(rows) == sum(counts.values())
     assert Counter(row["kind"] for row in rows) == counts
     assert set(counts) <= {IMPACT, ROLL, SLIDE}
     for row, line in zip(rows, lines, strict=True):
-        assert [str(row[name]) if row[name] is not None else "" for name in COLUMNS] == list(line.values())
+        assert [str(row[name]) if row[name] is not None else "" for name in EVENT_COLUMNS] == list(line.values())
 
 
 def test_cues_stand_where_events_arrive() -> None:

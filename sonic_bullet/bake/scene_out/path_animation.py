@@ -17,7 +17,7 @@ from sonic_bullet.files.gltf.gltf_writer import GltfBuffer
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import BodyPath
 
-NAME = "recorded motion"
+ANIMATION_NAME = "recorded motion"
 
 
 def animation_of(paths: Sequence[BodyPath], node_of: Sequence[int], buffer: GltfBuffer) -> dict[str, Any] | None:
@@ -39,7 +39,7 @@ def animation_of(paths: Sequence[BodyPath], node_of: Sequence[int], buffer: Gltf
             sampler = {"input": known[time.tobytes()], "output": buffer.append(value[keep]), "interpolation": "LINEAR"}
             channels.append({"sampler": len(samplers), "target": {"node": node_of[path.body], "path": target}})
             samplers.append(sampler)
-    return {"name": NAME, "channels": channels, "samplers": samplers} if channels else None
+    return {"name": ANIMATION_NAME, "channels": channels, "samplers": samplers} if channels else None
 
 
 def _same_side(turn: Array) -> Array:

@@ -23,7 +23,7 @@ OPTIONS = (
     "ambisonics", "head", "facing", "directivity", "microphone_path", "microphone_on", "contact_microphone",
     "vibrometer", "contact_response", "contact_noise",
 )  # fmt: skip
-COLUMNS = (4, 8)
+PATH_COLUMNS = (4, 8)
 """Of a path's table: time and place, and, it may be, the quaternion."""
 
 
@@ -289,7 +289,7 @@ def read_path(path: str) -> Microphone:
             if line.strip() and rows:
                 raise FileError(f"{path}:{number}: no row of numbers", "give time in s, x, y, z in m") from None
             continue  # a heading, an empty line
-        if len(row) not in COLUMNS or (rows and len(row) != len(rows[0])):
+        if len(row) not in PATH_COLUMNS or (rows and len(row) != len(rows[0])):
             raise FileError(
                 f"{path}:{number}: {len(row)} numbers", "give time in s, x, y, z in m, and x, y, z, w of it"
             )

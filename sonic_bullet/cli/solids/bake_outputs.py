@@ -83,7 +83,7 @@ def run_bake(
     **strike: Any,
 ) -> None:
     """Run `bake`; raises SonicBulletError."""
-    from sonic_bullet.bake.formats import ONE, check_baked_name
+    from sonic_bullet.bake.formats import ONE_MODEL, check_baked_name
 
     end = check_baked_name(output)
     wish = _StrikeWish(**strike)
@@ -111,7 +111,7 @@ def run_bake(
             models, line, notes = write_whole_scene(to, source, WantedMaterials.read(material, ()), pruning, seconds)
             say("\n".join([*map(_line, models), line]))
         elif scene:
-            models = _scene_models(source, material, body, pruning, one=end in ONE)
+            models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL)
         else:
             models = [_mesh_model(source, material, scale, thickness_m, to_hz, pruning)]
         if end == ".wav":

@@ -71,7 +71,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
     to, contacts_to, json_to, _ = places(output, contacts, json_to, level.json_path(output))
     with clean_stdout(json_to) as say:
         with quiet_stderr():
-            from sonic_bullet.soundtrack.score.scoring import MICROPHONE, rules_of, score_animation, score_scene
+            from sonic_bullet.soundtrack.score.scoring import SCORE_MICROPHONE, rules_of, score_animation, score_scene
         rules = rules_of(options["table"])
         result: RenderResult | Replay | None = None
         try:
@@ -85,7 +85,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
                 else:
                     how |= {name: options[name] for name in ("fps", "scale")}
                     how |= {"rules": rules, "material": options["material"] or "plastic"}
-                    scored = score_animation(animation, microphones=options["microphones"] or MICROPHONE, **how)
+                    scored = score_animation(animation, microphones=options["microphones"] or SCORE_MICROPHONE, **how)
                 result = scored
                 if spatial:
                     wish = Wish(None, None, (), None, WantedMaterials(), None, None, progress, tell)

@@ -24,7 +24,7 @@ from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 
-WINDOW, FLOOR_DB = 1024, -100.0
+LEVEL_WINDOW, FLOOR_DB = 1024, -100.0
 """Log spectra: samples of a frame, and floor re the loudest value of A."""
 
 
@@ -121,6 +121,6 @@ def log_distance(a: Array, b: Array) -> float:
 
 
 def _levels(x: Array) -> Array:
-    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % WINDOW)))
-    frames = padded.reshape(len(x), -1, WINDOW) * np.hanning(WINDOW)
+    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % LEVEL_WINDOW)))
+    frames = padded.reshape(len(x), -1, LEVEL_WINDOW) * np.hanning(LEVEL_WINDOW)
     return np.asarray(10 * np.log10(np.abs(np.fft.rfft(frames, axis=2)) ** 2 + 1e-300))

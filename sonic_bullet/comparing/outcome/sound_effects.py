@@ -15,10 +15,10 @@ from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
+HEARD_OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
 QUIET_DB = -80.0
 """Level re the loudest band below which bands are not compared."""
-FRAME_S, RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
+ONSET_FRAME_S, ONSET_RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
 """Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one."""
 
 
@@ -66,7 +66,7 @@ def band_levels(x: Array, sr: int) -> Array:
     power = (np.abs(np.fft.rfft(faded, axis=1)) ** 2).sum(axis=0) * 2 / n**2
     freq = np.fft.rfftfreq(n, 1 / sr)
     edge = math.sqrt(2)
-    sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in OCTAVES_HZ if f / edge < sr / 2]
+    sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in HEARD_OCTAVES_HZ if f / edge < sr / 2]
     with np.errstate(divide="ignore"):
         return np.asarray(10 * np.log10(np.array(sums)))
 
@@ -83,8 +83,12 @@ def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
     change = other - one
     total = 10 * math.log10(float(np.square(b).mean()) / float(np.square(a).mean()))
     k = int(np.argmax(np.where(loud, np.abs(change), -1)))
-    most = f"; most in the octave at {_hz(OCTAVES_HZ[k])}: {level_words(change[k])}" if abs(change[k]) > 0.005 else ""
-    values: dict[str, Any] = {"total_db": total, "band_hz": list(OCTAVES_HZ[: len(change)])}
+    most = (
+        f"; most in the octave at {_hz(HEARD_OCTAVES_HZ[k])}: {level_words(change[k])}"
+        if abs(change[k]) > 0.005
+        else ""
+    )
+    values: dict[str, Any] = {"total_db": total, "band_hz": list(HEARD_OCTAVES_HZ[: len(change)])}
     values["band_db"] = [round(float(x), 4) if good else None for x, good in zip(change, loud, strict=True)]
     return Consequence("level", f"B is {level_words(total)} than A in all{most}", None, values)
 
@@ -97,7 +101,7 @@ def level_words(change_db: float, unit: str = "dB", digits: int = 2) -> str:
 def onsets_s(x: Array, sr: int) -> list[float]:
     """Return the times of onsets, in s."""
     floor_db = -50.0  # Lowest level of an onset re the loudest moment
-    hop = max(1, round(FRAME_S * sr / 2))
+    hop = max(1, round(ONSET_FRAME_S * sr / 2))
     square = np.square(x).sum(axis=0)
     count = len(square) // hop
     if count < 4:
@@ -109,7 +113,7 @@ def onsets_s(x: Array, sr: int) -> list[float]:
     last = -back
     for i in range(count):
         before = level[max(0, i - back) : i].max(initial=-3000.0)
-        if level[i] > level.max() + floor_db and level[i] > before + RISE_DB and i - last >= back:
+        if level[i] > level.max() + floor_db and level[i] > before + ONSET_RISE_DB and i - last >= back:
             found.append(i * hop / sr)
             last = i
     return found
@@ -119,12 +123,12 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = onsets_s(a, sr), onsets_s(b, sr)
     if len(one) != len(other):
         shared = min(len(one), len(other))
-        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > FRAME_S), None)
+        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > ONSET_FRAME_S), None)
         longer = one if len(one) > len(other) else other
         at = longer[shared] if at is None else at
         words = f"{format_count(len(one), 'onset')} in A, {len(other)} in B"
         return Consequence("onset", words, at, {"a_s": one, "b_s": other})
-    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > FRAME_S / 2]
+    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > ONSET_FRAME_S / 2]
     if not moved:
         return None
     most = max(moved, key=lambda pair: abs(pair[0]))

@@ -23,7 +23,7 @@ from sonic_bullet.records import Array
 
 PAIRED = 0.6  # share of the strong lines that are to be modes
 DRAWS = 8
-MOVED = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
+MOVED_MOST = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
 CLUSTER = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
 
 Placing = Callable[[tuple[RecordedObject, ...]], tuple[Pairs, ...]]
@@ -57,7 +57,7 @@ def _moved(lines: Lines, random: np.random.Generator) -> Lines:
     """Lines whose clusters stand elsewhere, as loud and as long as they were."""
     order = np.argsort(lines.freq_hz)
     cluster = np.cumsum(np.diff(np.log(lines.freq_hz[order]), prepend=0.0) > CLUSTER)
-    off = random.uniform(-MOVED, MOVED, len(order) + 1)[cluster]
+    off = random.uniform(-MOVED_MOST, MOVED_MOST, len(order) + 1)[cluster]
     freq = lines.freq_hz.copy()
     freq[order] *= np.exp(off)
     return replace(lines, freq_hz=freq)

@@ -12,7 +12,7 @@ from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, 
 from sonic_bullet.estimator.fit.chance_pairs import PAIRED, strong_lines
 from sonic_bullet.estimator.fit.comparison import log_spectral_of
 from sonic_bullet.estimator.fit.dimension_tolerance import add_dimension_tolerance, scale_tolerance
-from sonic_bullet.estimator.fit.pairing import DEGENERATE
+from sonic_bullet.estimator.fit.pairing import DEGENERATE_SPLIT
 from sonic_bullet.estimator.fit.rayleigh import RayleighFit
 from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.lines.line_values import MaterialFit
@@ -142,7 +142,7 @@ def _foreign(evidence: tuple[RecordedObject, ...], objects: tuple[ObjectFit, ...
         taken = np.isin(np.arange(len(lines.freq_hz)), o.line[o.line >= 0])
         double = np.array([f for f, who in zip(o.freq_hz, o.member, strict=True) if len(who) > 1])
         if len(double):  # two lines of modes that count as one
-            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * DEGENERATE
+            taken |= np.abs(np.log(lines.freq_hz[:, None] / double)).min(axis=1) < 2 * DEGENERATE_SPLIT
         hz += list(lines.freq_hz[strong & ~taken])
         good, total = good + float((strong & taken).sum()), total + float(strong.sum())
     return np.array(sorted(hz)), good / total if total else np.nan

@@ -21,14 +21,14 @@ from sonic_bullet.presets import (
     material_names,
 )
 
-NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
+FITTED_NAMES = ("alpha_per_s", "beta_s", "gamma_m2_s2", "sigma", "poisson_ratio")
 
 
 def spreads(found: CaseFit) -> dict[str, float | None]:
     """Return standard errors in the parameters' own units, None where not identifiable."""
     sd = np.sqrt(np.diag(found.fit.covariance))
     value = (found.fit.alpha_per_s, found.fit.beta_s, found.fit.gamma_m2_s2, found.fit.sigma, 1.0)
-    return {name: float(s * v) if np.isfinite(s) else None for name, s, v in zip(NAMES, sd, value, strict=True)}
+    return {name: float(s * v) if np.isfinite(s) else None for name, s, v in zip(FITTED_NAMES, sd, value, strict=True)}
 
 
 def recorded_lines(found: CaseFit) -> RecordedLines | None:
@@ -77,7 +77,7 @@ def preset_of(found: CaseFit) -> Preset:
     if lines is not None:
         assumed = (*assumed, "level (that of the body that plays the lines: the recordings' gain is not known)")
     parameters = dict(
-        zip(NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)
+        zip(FITTED_NAMES, (fit.alpha_per_s, fit.beta_s, fit.gamma_m2_s2, fit.sigma, fit.poisson_ratio), strict=True)
     )
     if not found.has_material:
         assumed = (*assumed, "elasticity and density (steel's: neither a shape nor a material is given)")

@@ -22,13 +22,13 @@ from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, 
 from sonic_bullet.estimator.fit.chance_pairs import paired_by_chance
 from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.held_out_takes import judged_by_takes
-from sonic_bullet.estimator.fit.object_fit import CORRECTION, fitted_object, gain_of, object_of
+from sonic_bullet.estimator.fit.object_fit import SHAPE_CORRECTION, fitted_object, gain_of, object_of
 from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
 from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
-from sonic_bullet.estimator.lines.joint_lines import FEWEST_LINES, HIGHEST, Lines, noise_rms
+from sonic_bullet.estimator.lines.joint_lines import HIGHEST_OF_RATE, RINGING_LINES, Lines, noise_rms
 from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.machine.progress import says_so
@@ -37,9 +37,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
 
 __all__ = [
-    "CORRECTION",
     "POISSON_IDENTIFIED",
     "POISSON_SD",
+    "SHAPE_CORRECTION",
     "CaseFit",
     "ObjectFit",
     "choose_lines",
@@ -74,7 +74,7 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
     if not shaped or not _by_chance(case, shaped, _placed(shaped, case.band_hz)[0]):
         return evidence
     after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
-    if any(len(e.lines.freq_hz) < FEWEST_LINES for e in after):
+    if any(len(e.lines.freq_hz) < RINGING_LINES for e in after):
         return evidence
     if _by_chance(case, after, _placed(after, case.band_hz)[0]):
         return evidence
@@ -85,7 +85,9 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
 def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     assert e.signals is not None
     still = without_hum(e.signals, noise_rms(e.signals, e.sr), e.sr)
-    return ringing_lines(still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST * e.sr)), signed=e.lines.signed)
+    return ringing_lines(
+        still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST_OF_RATE * e.sr)), signed=e.lines.signed
+    )
 
 
 def _by_chance(case: Case, shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...]) -> bool:

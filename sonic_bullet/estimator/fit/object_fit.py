@@ -20,7 +20,7 @@ from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Material
 
-CORRECTION = 0.01
+SHAPE_CORRECTION = 0.01
 
 
 def fitted_object(
@@ -50,7 +50,7 @@ def fitted_object(
     )
     undamped = np.sqrt((2 * np.pi * measured) ** 2 + np.nan_to_num(measured_decay) ** 2) / (2 * np.pi)
     good = np.isfinite(undamped)
-    ratio[good] = np.clip(undamped[good] / group.freq_hz[good], 1 - CORRECTION, 1 + CORRECTION)
+    ratio[good] = np.clip(undamped[good] / group.freq_hz[good], 1 - SHAPE_CORRECTION, 1 + SHAPE_CORRECTION)
     true_lam = lam * ratio**2
     decay = (damping.alpha_per_s + damping.beta_s * true_lam) / 2 + extra
     alive = decay**2 < 0.98 * np.minimum(lam, true_lam)

@@ -8,7 +8,7 @@
     solve    ln γ and ν by least squares on ln λ, outliers down-weighted
         [Cauchy's weight: Holland & Welsch 1977]
 
-Modes closer than DEGENERATE are one: their shapes within the pair are anyone's, the sum over the pair is not.
+Modes closer than DEGENERATE_SPLIT are one: their shapes within the pair are anyone's, the sum over the pair is not.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 
-DEGENERATE = 6e-4
+DEGENERATE_SPLIT = 6e-4
 MESHED = 2.5  # times as far apart where elements have split them
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
-MISSED = 0.3
+MISSED_ENERGY = 0.3
 HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
 # times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first
 # milliseconds are made of such lines, bodies' modes seldom
-BRIEF = 25.0
+BRIEF_RATIO = 25.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +62,7 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     """Return the family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
-    cut = np.flatnonzero(np.diff(np.log(freq)) > DEGENERATE * (MESHED if family.meshed else 1.0)) + 1
+    cut = np.flatnonzero(np.diff(np.log(freq)) > DEGENERATE_SPLIT * (MESHED if family.meshed else 1.0)) + 1
     member = tuple(np.split(np.arange(len(freq)), cut))
     sums = np.zeros((len(freq), len(member)))
     for g, who in enumerate(member):
@@ -128,7 +128,7 @@ def _rings(lines: Lines) -> Array:
     middle = order[np.searchsorted(share, share[-1] / 2)]
     # what loses as much a cycle ends sooner
     typical = max(float(decay[middle]), 1.0) * np.maximum(lines.freq_hz / lines.freq_hz[middle], 1.0)
-    rings = np.clip(BRIEF * typical / np.maximum(decay, 1e-9), never, 1.0)
+    rings = np.clip(BRIEF_RATIO * typical / np.maximum(decay, 1e-9), never, 1.0)
     return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, never), rings)))
 
 
@@ -212,7 +212,7 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
     # where no pattern tells modes apart, those between the lines that nobody observed count against
     if not _usable(lines, seen).any():
         between = (group.freq_hz > lines.freq_hz.min() * 0.98) & (group.freq_hz < lines.freq_hz.max() * 1.02)
-        missed = MISSED * float((between & ~np.isin(np.arange(len(between)), column)).sum())
+        missed = MISSED_ENERGY * float((between & ~np.isin(np.arange(len(between)), column)).sum())
     return row, column, float(line_worth.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
 
 

@@ -5,7 +5,7 @@ The first milliseconds of a real take hold the striker, slaps and a room, and it
     signals (s, n) -> bands of BAND_HZ about their centre, decimated, once the band's filter is full: after the attack
     -> poles of a band, of all recordings at once (ESPRIT)           [Roy & Kailath 1989, eq. 3.12-3.17]
     -> the one that takes most, of what is left the next           [Pati, Rezaiifar & Krishnaprasad 1993], while it
-         has OWN of its energy apart from those chosen: what cancels is no line
+         has OWN_SHARE of its energy apart from those chosen: what cancels is no line
          stands out of what is left about it while it rings:
              T = Σ_s |<q, r_s>|²/D_s > chance,  D = Σ |r|²|e|²/Σ |e|²             [Kay 1998, ch. 7.6]
     -> poles at the least sum of squares, amplitudes projected out             [Golub & Pereyra 1973; Kaufman 1975]
@@ -25,11 +25,16 @@ from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-SECONDS = 2.0
-BAND_HZ, PASSED, STOPPED, OVERSAMPLED = 400.0, 0.5, 1.5, 2.0  # of a band's width from its centre; rate over width
-ROWS, COLUMNS, MOST = 240, 800, 40  # of a band's data matrix; poles looked for
-OWN = 0.5
-AROUND = 7  # widths, from two on, above and below a line
+LISTENED_S = 2.0
+BAND_HZ, PASS_WIDTHS, STOP_WIDTHS, OVERSAMPLED = (
+    400.0,
+    0.5,
+    1.5,
+    2.0,
+)  # of a band's width from its centre; rate over width
+MATRIX_ROWS, MATRIX_COLUMNS, MOST_POLES = 240, 800, 40  # of a band's data matrix; poles looked for
+OWN_SHARE = 0.5
+WIDTHS_AROUND = 7  # widths, from two on, above and below a line
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +57,7 @@ def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, sign
     from scipy.special import chdtri
 
     late = round(attack_s * sr)
-    rest = signals[:, late : late + int(SECONDS * sr)]
+    rest = signals[:, late : late + int(LISTENED_S * sr)]
     least = float(chdtri(2 * len(signals), false_alarms / (1.5 * rest.shape[1])) / 2)
     found = parallel_map(lambda band: _lines_of(band, sr, least), _bands(rest, sr, band_hz))
     pole, amplitude, spread, amplitude_sd, energy = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
@@ -83,7 +88,7 @@ def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]
     from scipy.fft import fft, ifft, next_fast_len
 
     step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
-    taps = low_pass(PASSED * BAND_HZ / sr, STOPPED * BAND_HZ / sr, stop_db)
+    taps = low_pass(PASS_WIDTHS * BAND_HZ / sr, STOP_WIDTHS * BAND_HZ / sr, stop_db)
     count = max(0, -(-(signals.shape[1] - len(taps) + 1) // step))
     points = next_fast_len(-(-(signals.shape[1] + len(taps)) // step))
     whole = points * step
@@ -146,11 +151,11 @@ def _candidates(y: Array) -> Array:
     from scipy.linalg.blas import zherk
 
     m = y.shape[1]
-    rows = min(ROWS, m // 3)
+    rows = min(MATRIX_ROWS, m // 3)
     if rows < 8:
         return np.zeros(0, complex)
-    data = np.concatenate([sliding_window_view(row, rows)[:: 1 + (m - rows) // COLUMNS] for row in y])
-    most = min(MOST, rows // 2)
+    data = np.concatenate([sliding_window_view(row, rows)[:: 1 + (m - rows) // MATRIX_COLUMNS] for row in y])
+    most = min(MOST_POLES, rows // 2)
     gram = zherk(1.0, data.T, lower=1)
     vector = eigh(gram, subset_by_index=(rows - most, rows - 1), check_finite=False)[1]
     last = vector[-1]  # of orthonormal columns: V₁ᴴV₁ = I − v̄ vᵀ, by which the shift needs no least squares
@@ -173,7 +178,7 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
         """Its number or -1, what it takes (s,); Gram matrix and moments without it. All are apart from those chosen."""
         new = np.diag(gram).real
         taken = np.abs(seen) ** 2 / np.maximum(new, 1e-300)
-        worth = np.where(among & (new > OWN * own), taken.sum(axis=0), -1.0)
+        worth = np.where(among & (new > OWN_SHARE * own), taken.sum(axis=0), -1.0)
         k = int(worth.argmax())
         if worth[k] < least:
             return -1, taken[:, k], gram, seen
@@ -197,7 +202,7 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
         free[k] = False
         chosen = [k]
         if not stands(k, taken, without([*found, k])):  # two close ones may, each beside the other
-            near = free & (np.abs(pole.imag - pole[k].imag) < AROUND * _width(pole[k], len(ring)))
+            near = free & (np.abs(pole.imag - pole[k].imag) < WIDTHS_AROUND * _width(pole[k], len(ring)))
             second, more, *rest = strongest(rest[0], rest[1], near)
             if second < 0:
                 continue
@@ -225,7 +230,7 @@ def _level_around(left: Array, ring: Array, pole: complex) -> Array:
     """Power (s,) of what is left beside a line's frequency while it rings, as its energy's square root's variance."""
     turn = np.exp(1j * _width(pole, len(ring)) * np.arange(len(ring)))
     once = left * ring.conj()
-    powers = np.empty((AROUND - 1, len(ring)), complex)
+    powers = np.empty((WIDTHS_AROUND - 1, len(ring)), complex)
     powers[0] = turn * turn
     for k in range(1, len(powers)):
         np.multiply(powers[k - 1], turn, out=powers[k])

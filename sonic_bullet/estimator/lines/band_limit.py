@@ -10,8 +10,8 @@ import numpy as np
 from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
-LOWEST_HZ = 20.0  # of what is heard
-PERIODS, ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
+LOWEST_HEARD_HZ = 20.0  # of what is heard
+PERIODS, BAND_ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
 def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
@@ -38,7 +38,7 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     reach = min(len(signal), round(PERIODS / max(low, 1.0) * sr))
     # a hum or a tone goes on, and fades: one that is cut off would begin and end with a click, which is in every band
     fade = _raised(np.arange(reach), reach, 0)
-    ends = [predicted_on(part, ORDER, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
+    ends = [predicted_on(part, BAND_ORDER, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
     whole = np.concatenate([ends[0][::-1], signal, ends[1]])
     size = next_fast_len(2 * len(whole))
     freq = np.arange(size // 2 + 1) * sr / size
@@ -71,10 +71,10 @@ def without_drift(signal: Array, sr: int) -> tuple[Array, str]:
         What to say of it, or nothing.
     """
     drifts = 3.16  # times the rms of all that is heard, most of the time: wind, a warming amplifier
-    edge = np.arange(0, len(signal), max(round(sr / LOWEST_HZ / 2), 1))
+    edge = np.arange(0, len(signal), max(round(sr / LOWEST_HEARD_HZ / 2), 1))
     mean = np.add.reduceat(signal, edge) / np.diff(edge, append=len(signal))  # a drift's samples over half a period
     power = np.add.reduceat(signal**2, edge) / np.diff(edge, append=len(signal))
     if not np.median(mean**2 - drifts**2 * (power - mean**2)) > 0:
         return signal, ""
-    above = limit_band(signal, sr, (LOWEST_HZ, np.inf))
-    return above, f"a drift below {LOWEST_HZ:.0f} Hz, louder than all above it, is taken off"
+    above = limit_band(signal, sr, (LOWEST_HEARD_HZ, np.inf))
+    return above, f"a drift below {LOWEST_HEARD_HZ:.0f} Hz, louder than all above it, is taken off"

@@ -22,7 +22,7 @@ from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.records import Array
 
 EDGE, FALL = 1e-7, 5.0
-POLISHED, POLISHED_ROUNDED, STEPS = 3000, 10_000, 5
+POLISHED, POLISHED_ROUNDED, POLISH_STEPS = 3000, 10_000, 5
 
 
 def modes(signal: Array, sr: int) -> Sinusoids | None:
@@ -96,7 +96,7 @@ def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
     left = likelihood.residual(signal, start, sr)
-    for _ in range(STEPS):
+    for _ in range(POLISH_STEPS):
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break

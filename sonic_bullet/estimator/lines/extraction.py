@@ -38,11 +38,15 @@ from sonic_bullet.records.errors import AudioError
 FASTEST_PER_S = 3000.0
 FALSE_ALARMS = 0.05
 BAND_HZ = 500.0
-ROUGH, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)  # steps and tolerance of a fit on the way, and of the last
-FEW, MANY = 3, 40
-MOST_MODES = 140
+ROUGH_FIT, QUICK, THOROUGH = (
+    (3, 1e-2),
+    (8, 1e-4),
+    (40, 1e-6),
+)  # steps and tolerance of a fit on the way, and of the last
+FEW_MODES, MANY_MODES = 3, 40
+MOST_BAND_MODES = 140
 LEAST_SAMPLES_A_MODE = 24
-FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
+ROUNDING_FLOOR = 1e-12  # of the recording's rms: rounding, where there is no noise
 # shares of the energy: below the one it is said, below the other no feature of a sound that is not over soon
 EXPLAINED, TRUSTED = 0.8, 0.5
 FRONT, FRONT_SHARE = 0.3, 0.75
@@ -50,7 +54,7 @@ PINNED = 0.999  # of the fastest decay looked for
 DECAY_IDENTIFIED = 2.0  # spreads that a decay must be away from none
 # after which a real take is judged; noise over the signal there, at least; over that noise, what is no sum of lines
 ATTACK_S, QUIETEST, OVER_NOISE = 0.02, 10**-2.6, 10.0
-NEAR = 4.0  # decays within which one mode can do another's work
+NEAR_DECAYS = 4.0  # decays within which one mode can do another's work
 
 
 @one_thread()
@@ -111,7 +115,7 @@ def extract(
         signal = limited + limit_band(model, sr, (low, np.inf)) - limit_band(model, sr, (low, high))
         x = signal[start : start + len(x)]
         modes = _pruned(x, (low, high), _fit(x, modes, sr, (low, high), THOROUGH), noise, _least(x))
-        noise = measured(likelihood.residual(x, modes, sr), sr, FLOOR * _rms(x), len(modes.pole), (low, high))
+        noise = measured(likelihood.residual(x, modes, sr), sr, ROUNDING_FLOOR * _rms(x), len(modes.pole), (low, high))
     if onset_s is None and len(modes.pole):
         start = onset.by_modes(signal, part.start, modes, sr, _rms(likelihood.residual(x, modes, sr)))
         x = signal[start : start + len(x)]
@@ -136,7 +140,7 @@ def _fit(
 def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, Noise] | Lines:
     """Find the significant modes of a signal and the noise they leave; of a real take what rings after its attack."""
     rounds = 6
-    floor = FLOOR * _rms(x)
+    floor = ROUNDING_FLOOR * _rms(x)
     without_noise = exact_modes.modes(x, sr)
     if without_noise is not None:
         return without_noise, white(max(_rms(likelihood.residual(x, without_noise, sr)), floor), sr)
@@ -147,10 +151,10 @@ def _modes(x: Array, sr: int, band_hz: tuple[float, float]) -> tuple[Sinusoids, 
     if _rms(left[late:]) > OVER_NOISE * max(noise_rms(x[None], sr)[0], QUIETEST * _rms(x[late:])):
         return ringing_lines(x[None], sr, band_hz, signed=True)
     modes, noise = _first(x, sr, start, band_hz, least, floor)
-    most = min(MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
+    most = min(MOST_BAND_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     for _ in range(rounds):
         more = matched(likelihood.residual(x, modes, sr), noise, band_hz, _needed(modes.pole, least), FASTEST_PER_S)
-        more = more[: max(0, min(MANY, most - len(modes.pole)))]
+        more = more[: max(0, min(MANY_MODES, most - len(modes.pole)))]
         if not len(more):
             break
         trial = _pruned(
@@ -174,12 +178,12 @@ def _least(x: Array) -> float:
 
 def _least_of_a_second(modes: int, least: float) -> float:
     """Least energy of a second mode in a line: of all cells it has but the few beside the lines to chance upon."""
-    return float(min(least, 2 * np.log(1.5 * 2 * NEAR * max(modes, 1) / FALSE_ALARMS)))
+    return float(min(least, 2 * np.log(1.5 * 2 * NEAR_DECAYS * max(modes, 1) / FALSE_ALARMS)))
 
 
 def _needed(pole: Array, least: float) -> Callable[[Array], Array]:
     """Least energy (n,) of a mode at frequencies (n,) in Hz, given those that are there."""
-    centre, reach = np.abs(pole.imag) / (2 * np.pi), NEAR * -pole.real / (2 * np.pi)
+    centre, reach = np.abs(pole.imag) / (2 * np.pi), NEAR_DECAYS * -pole.real / (2 * np.pi)
 
     def at(freq_hz: Array) -> Array:
         need = np.full(len(freq_hz), least)
@@ -200,7 +204,7 @@ def _start(x: Array, sr: int, band_hz: tuple[float, float], floor: float) -> Sin
     fast = subspace.early_poles(x, sr, density, band_hz, FASTEST_PER_S)
     seen = (np.abs(fast[:, None] - slow) < 0.5 * np.abs(fast.real[:, None])).any(axis=1)
     pole = np.concatenate([slow, fast[~seen & (fast.real < -early_per_s)]])
-    most = min(2 * MOST_MODES, len(x) // LEAST_SAMPLES_A_MODE)
+    most = min(2 * MOST_BAND_MODES, len(x) // LEAST_SAMPLES_A_MODE)
     if len(pole) > most:
         pole = pole[np.argsort(-likelihood.alone(x, pole, sr), kind="stable")[:most]]
     return likelihood.amplitudes(x, pole, sr)
@@ -215,7 +219,7 @@ def _first(
     if not len(pole):
         return start, noise
     energy = likelihood.spreads(start, sr, len(x))[1] / noise.rms(pole.imag / (2 * np.pi), -pole.real) ** 2
-    kept = np.argsort(-energy, kind="stable")[:MOST_MODES]
+    kept = np.argsort(-energy, kind="stable")[:MOST_BAND_MODES]
     kept = kept[energy[kept] > least]
     modes = _fit(x, likelihood.amplitudes(x, pole[kept], sr), sr, band_hz)
     noise = measured(likelihood.residual(x, modes, sr), sr, floor, len(modes.pole), band_hz)
@@ -239,7 +243,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
         )
         energy[outside | (np.abs(modes.amplitude) > cancelling * np.abs(x).max())] *= 1e-9
         far, fade = np.abs(modes.pole.imag[:, None] - modes.pole.imag), -modes.pole.real
-        near = far < NEAR * np.maximum(fade[:, None], fade)
+        near = far < NEAR_DECAYS * np.maximum(fade[:, None], fade)
         vague = (fade < DECAY_IDENTIFIED * spread[1] * met) & (near.sum(axis=1) > 1)
         weak = np.flatnonzero(
             (energy <= np.where(near.sum(axis=1) > 1, _least_of_a_second(len(fade), least), least)) | vague
@@ -251,7 +255,7 @@ def _pruned(x: Array, band_hz: tuple[float, float], modes: Sinusoids, noise: Noi
             weak[~rival.any(axis=1)], weak[np.argsort(energy[weak], kind="stable")[: (len(weak) + 1) // 2]]
         )
         modes = likelihood.amplitudes(x, np.delete(modes.pole, gone), noise.sr)
-        modes = _fit(x, modes, noise.sr, band_hz, ROUGH if len(gone) > FEW else QUICK)
+        modes = _fit(x, modes, noise.sr, band_hz, ROUGH_FIT if len(gone) > FEW_MODES else QUICK)
     return modes
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from sonic_bullet.records import Array
 
 STEPS_MOST = 60
-BLOCK = 256  # about the square root of a second's samples
+PHASOR_BLOCK = 256  # about the square root of a second's samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,26 +51,26 @@ def _powers(pole: Array, step: int, count: int) -> Array:
 
 
 def _subtracted(signal: Array, pole: Array, amplitude: Array) -> Array:
-    """Signal less Re Σ A e^{pn}; pole per sample. n = BLOCK·b + j, so the sum over modes is a product of matrices."""
-    blocks = -(-len(signal) // BLOCK)
-    coarse, fine = _powers(pole, BLOCK, blocks) * amplitude, _powers(pole, 1, BLOCK)
+    """Signal less Re Σ A e^{pn}; pole per sample. n = PHASOR_BLOCK·b + j: the sum is a product of matrices."""
+    blocks = -(-len(signal) // PHASOR_BLOCK)
+    coarse, fine = _powers(pole, PHASOR_BLOCK, blocks) * amplitude, _powers(pole, 1, PHASOR_BLOCK)
     sound = np.concatenate([coarse.real, -coarse.imag], axis=1) @ np.concatenate([fine.real, fine.imag], axis=1).T
     return np.asarray(signal - sound.ravel()[: len(signal)])
 
 
 def moments(signal: Array, pole: Array) -> tuple[Array, Array]:
     """Σ x e^{pn} and Σ n x e^{pn}, both (k,), by the same division of n."""
-    blocks, k = -(-len(signal) // BLOCK), len(pole)
-    padded = np.zeros((blocks, BLOCK))
+    blocks, k = -(-len(signal) // PHASOR_BLOCK), len(pole)
+    padded = np.zeros((blocks, PHASOR_BLOCK))
     padded.ravel()[: len(signal)] = signal
-    coarse, fine = _powers(pole, BLOCK, blocks), _powers(pole, 1, BLOCK)
-    slope = np.arange(BLOCK)[:, None] * fine
+    coarse, fine = _powers(pole, PHASOR_BLOCK, blocks), _powers(pole, 1, PHASOR_BLOCK)
+    slope = np.arange(PHASOR_BLOCK)[:, None] * fine
     sums = padded @ np.concatenate([fine.real, fine.imag, slope.real, slope.imag], axis=1)
     plain, sloped = (
         coarse * (sums[:, :k] + 1j * sums[:, k : 2 * k]),
         coarse * (sums[:, 2 * k : 3 * k] + 1j * sums[:, 3 * k :]),
     )
-    return plain.sum(axis=0), (BLOCK * np.arange(blocks)) @ plain + sloped.sum(axis=0)
+    return plain.sum(axis=0), (PHASOR_BLOCK * np.arange(blocks)) @ plain + sloped.sum(axis=0)
 
 
 def geometric(first: Array, second: Array, count: int) -> tuple[Array, Array, Array]:

@@ -17,8 +17,8 @@ from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
 
-WINDOWS = (512, 2048, 8192)
-ABOVE = 10.0  # m: cells 10 dB above the noise count
+DISTANCE_WINDOWS = (512, 2048, 8192)
+ABOVE_NOISE = 10.0  # m: cells 10 dB above the noise count
 FEWEST_CELLS = 20  # cells of a window that may speak for itself
 FLOOR_WINDOW = 1024
 HIDING = 1e30  # variance over which nothing stands
@@ -123,7 +123,7 @@ def white(rms: float) -> Floor:
 
 
 def log_spectral_db(
-    a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = WINDOWS, above: float = ABOVE
+    a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = DISTANCE_WINDOWS, above: float = ABOVE_NOISE
 ) -> float:
     """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
 
@@ -134,7 +134,7 @@ def log_spectral_db(
     return spectra_distance_db(power_spectra(a, windows), power_spectra(b, windows), floor, above=above)
 
 
-def power_spectra(sound: Array, windows: tuple[int, ...] = WINDOWS) -> tuple[Array, ...]:
+def power_spectra(sound: Array, windows: tuple[int, ...] = DISTANCE_WINDOWS) -> tuple[Array, ...]:
     """Powers (frames, bins) of a sound (n,) under each window that fits into it."""
     return tuple(_power(sound, window) for window in windows if window <= len(sound))
 
@@ -144,7 +144,9 @@ def noise_spectra(floor: Floor, like: tuple[Array, ...]) -> tuple[Array, ...]:
     return tuple(floor.at(power.shape[1])[None] * (np.hanning(2 * (power.shape[1] - 1)) ** 2).sum() for power in like)
 
 
-def spectra_distance_db(a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = ABOVE) -> float:
+def spectra_distance_db(
+    a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = ABOVE_NOISE
+) -> float:
     """Distance D of two sounds by their powers, as `log_spectral_db`."""
     found: list[float] = []
     few: list[float] = []
@@ -168,8 +170,8 @@ def noise_floor_db(
     floor: Floor,
     *,
     seeds: tuple[int, int] = (1, 2),
-    windows: tuple[int, ...] = WINDOWS,
-    above: float = ABOVE,
+    windows: tuple[int, ...] = DISTANCE_WINDOWS,
+    above: float = ABOVE_NOISE,
 ) -> float:
     """D of two noisy takes of one clean sound (n,)."""
     return log_spectral_db(

@@ -17,8 +17,8 @@ from sonic_bullet.estimator.lines.strike_times import GAP_S, find_strikes
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-BLOCK_S = 1e-3
-SHOWN = 6  # hits whose times are said
+ONSET_BLOCK_S = 1e-3
+SHOWN_HITS = 6  # hits whose times are said
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +36,14 @@ class Span:
 
     def describe_hits(self, sr: int) -> str:
         """Say how many hits there are, and when; nothing of a single one."""
-        times = [f"{at / sr:.2f}" for at in (self.start, *self.later)][:SHOWN]
-        more = ", …" if self.hits > SHOWN else f" and {times.pop()}"
+        times = [f"{at / sr:.2f}" for at in (self.start, *self.later)][:SHOWN_HITS]
+        more = ", …" if self.hits > SHOWN_HITS else f" and {times.pop()}"
         return f"{self.hits} hits, at {', '.join(times)}{more} s" if self.later else ""
 
 
 def levels(signal: Array, sr: int) -> tuple[Array, int]:
     """Mean square (b,) in blocks of 1 ms, and the block's length in samples."""
-    block = max(1, int(BLOCK_S * sr))
+    block = max(1, int(ONSET_BLOCK_S * sr))
     count = len(signal) // block
     return (signal[: count * block].reshape(count, block) ** 2).mean(axis=1), block
 
@@ -59,7 +59,7 @@ def span(signal: Array, sr: int) -> Span:
     strikes = find_strikes(signal, sr)
     early = int(np.argmax(power >= power.max() * 10 ** (-near_db / 10)))  # the first hit, be a later one louder
     struck = round(strikes[0] * sr) // block if len(strikes) else 0
-    begun = early + round(GAP_S / BLOCK_S)
+    begun = early + round(GAP_S / ONSET_BLOCK_S)
     if struck > begun and power[early:begun].max() < falls * power[begun:struck].max():
         early = struck  # what was there before does not fall: no strike
     loud = early + int(np.argmax(power[early : early + 10]))

@@ -13,8 +13,8 @@ import numpy as np
 from sonic_bullet.estimator.lines.linear_prediction import prediction_error_filter
 from sonic_bullet.records import Array
 
-ORDER = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
-BLOCK_S, GAP_S = 1e-3, 0.05
+SHARPENED_ORDER = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
+STRIKE_BLOCK_S, GAP_S = 1e-3, 0.05
 
 
 def find_strikes(signal: Array, sr: int) -> Array:
@@ -37,13 +37,13 @@ def find_strikes(signal: Array, sr: int) -> Array:
     below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
     from scipy.ndimage import median_filter
 
-    block = max(1, round(BLOCK_S * sr))
+    block = max(1, round(STRIKE_BLOCK_S * sr))
     count = len(signal) // block
     if count < 20 or not np.any(signal):
         return np.zeros(0)
-    left = np.convolve(signal, prediction_error_filter(signal, ORDER))
+    left = np.convolve(signal, prediction_error_filter(signal, SHARPENED_ORDER))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
-    near = median_filter(power, min(round(2 * near_s / BLOCK_S), count) | 1, mode="nearest")
+    near = median_filter(power, min(round(2 * near_s / STRIKE_BLOCK_S), count) | 1, mode="nearest")
     stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))
     at = np.flatnonzero(stands) * block / sr
     return at[np.diff(at, prepend=-1.0) > GAP_S]

@@ -30,7 +30,7 @@ from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import StruckModes
 
 POWER = 0.3
-ALIKE = 0.02
+UNREPRESENTED = 0.02
 """A feature whose power is represented but for less than this, a tenth of a decibel, leaves nothing."""
 
 
@@ -107,7 +107,7 @@ def strikes_of(
     order = order[np.append(True, np.diff(modes[0][order]) > 0)] if len(order) else order
     hz, mode_decay, played = modes[0][order], modes[1][order], modes[2][:, order]
     share = represented_share(freq, decay, amplitude, hz, mode_decay, played)
-    loud = np.sqrt(np.where(1 - share**2 > ALIKE, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
+    loud = np.sqrt(np.where(1 - share**2 > UNREPRESENTED, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
     rest = np.stack([x - damped(hz, mode_decay, a, signals.shape[1], sr) for x, a in zip(signals, played, strict=True)])
     residual = residual_record(signals, left, rest, sr, StruckModes(hz, mode_decay, mean), (freq, decay, loud), source)

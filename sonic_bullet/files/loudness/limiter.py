@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-AHEAD_S = 0.005
+LOOKAHEAD_S = 0.005
 """One period of 200 Hz: the descent is too slow to be audible as a click, and the strike after it masks it."""
 RELEASES_DB_S = (100.0, 400.0, 1600.0, 6400.0)
 """6 dB in 60 ms, longer than a period of 20 Hz: low tones are not distorted. Struck bodies decay faster;
@@ -34,7 +34,7 @@ def limiter_factor(peak_db: Array, sr: int, ceiling_db: float, release_db_s: flo
     wanted = np.minimum(0.0, ceiling_db - peak_db)
     slope = release_db_s / sr * np.arange(len(wanted))
     held = np.minimum.accumulate(wanted - slope) + slope
-    width = 2 * round(AHEAD_S * sr / 2) + 1
+    width = 2 * round(LOOKAHEAD_S * sr / 2) + 1
     padded = np.concatenate([held, np.repeat(held[-1:], width - 1)])
     # of frames i … i + width - 1, at i; the mean at i is then of those that began i - width + 1 … i, all of which saw i
     ahead = minimum_filter1d(np.minimum(padded, 0.0), width, origin=-(width // 2))[: len(wanted)]

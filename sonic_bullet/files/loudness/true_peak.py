@@ -16,7 +16,7 @@ from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 
 OVERSAMPLING = 16
-REACH, KAISER_BETA = 20, 7.0
+SINC_REACH, SINC_BETA = 20, 7.0
 """Samples on either side of an interpolated one, and their window: even to 0.45 of the rate."""
 BLOCK_FRAMES = 1 << 14
 
@@ -26,7 +26,7 @@ def find_true_peak(sound: KeptSound) -> float:
     bound = 3.5  # Upper bound of an interpolated sample over the largest around it: the sum of the sinc's magnitudes
     found = 0.0
     for start in range(0, sound.shape[1], BLOCK_FRAMES):
-        block = sound.read(max(start - 2 * REACH, 0), start + BLOCK_FRAMES + 2 * REACH)
+        block = sound.read(max(start - 2 * SINC_REACH, 0), start + BLOCK_FRAMES + 2 * SINC_REACH)
         if bound * np.abs(block).max(initial=0.0) > found:
             found = max(found, float(np.abs(_between(block)).max()))
     return found
@@ -37,8 +37,8 @@ def sample_true_peaks(samples: Array) -> Array:
     frames = samples.shape[1]
     made = np.empty(frames)
     for start in range(0, frames, BLOCK_FRAMES):
-        first, stop = max(start - 2 * REACH, 0), min(start + BLOCK_FRAMES, frames)
-        fine = np.abs(_between(samples[:, first : stop + 2 * REACH])).max(axis=0)
+        first, stop = max(start - 2 * SINC_REACH, 0), min(start + BLOCK_FRAMES, frames)
+        fine = np.abs(_between(samples[:, first : stop + 2 * SINC_REACH])).max(axis=0)
         fine = np.concatenate([np.zeros(OVERSAMPLING // 2), fine, np.zeros(OVERSAMPLING // 2)])
         after = OVERSAMPLING * (np.arange(start, stop) - first)  # half a sample before each, then as much after it
         made[start:stop] = np.maximum.reduce([fine[after + k] for k in range(OVERSAMPLING + 1)])
@@ -55,4 +55,4 @@ def _between(samples: Array) -> Array:
 def _window() -> Array:
     from scipy.signal import firwin
 
-    return np.asarray(firwin(2 * REACH * OVERSAMPLING + 1, 1 / OVERSAMPLING, window=("kaiser", KAISER_BETA)))
+    return np.asarray(firwin(2 * SINC_REACH * OVERSAMPLING + 1, 1 / OVERSAMPLING, window=("kaiser", SINC_BETA)))

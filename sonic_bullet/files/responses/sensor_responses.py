@@ -16,7 +16,7 @@ from sonic_bullet.records import Array, SensorResponse
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
 
-REMEDY = "give rows of a frequency in Hz and a factor, or a FIR filter as a sound file"
+RESPONSE_REMEDY = "give rows of a frequency in Hz and a factor, or a FIR filter as a sound file"
 LEAST_TAPS = 1024
 """A short filter's spectrum is taken at as many points as of one so long."""
 
@@ -32,12 +32,12 @@ def read_response(path: str | os.PathLike[str]) -> SensorResponse:
     tables = (".csv", ".txt", ".tsv")
     name = as_path(path, "path", "name a table (.csv) or a sound file (.wav)")
     if Path(name).suffix.lower() in tables:
-        with reading(name, "sensor response", FileError, REMEDY):
+        with reading(name, "sensor response", FileError, RESPONSE_REMEDY):
             table = _table(Path(name).read_text(encoding="utf-8"), name)
         return _response(table[:, 0], table[:, 1], name)
     taps, sr = read_audio(name)
     if len(taps) != 1:
-        raise FileError(f"{name} has {len(taps)} channels, and a filter has one", REMEDY)
+        raise FileError(f"{name} has {len(taps)} channels, and a filter has one", RESPONSE_REMEDY)
     size = max(LEAST_TAPS, taps.shape[1])
     return _response(np.fft.rfftfreq(size, 1 / sr)[1:], np.abs(np.fft.rfft(taps[0], size))[1:], name)
 
@@ -50,17 +50,17 @@ def _table(text: str, name: str) -> Array:
             row = [float(word) for word in words[:2]]
         except ValueError:
             if rows:
-                raise FileError(f"{name}:{number}: no row of numbers", REMEDY) from None
+                raise FileError(f"{name}:{number}: no row of numbers", RESPONSE_REMEDY) from None
             continue  # a heading
         if words and len(row) < 2:
-            raise FileError(f"{name}:{number}: one number", REMEDY)
+            raise FileError(f"{name}:{number}: one number", RESPONSE_REMEDY)
         if words:
             rows.append(row)
     if not rows:
-        raise FileError(f"{name} holds no row of numbers", REMEDY)
+        raise FileError(f"{name} holds no row of numbers", RESPONSE_REMEDY)
     return np.array(rows)
 
 
 def _response(freq_hz: Array, magnitude: Array, name: str) -> SensorResponse:
-    with reading(name, "sensor response", FileError, REMEDY):
+    with reading(name, "sensor response", FileError, RESPONSE_REMEDY):
         return SensorResponse(freq_hz, magnitude)

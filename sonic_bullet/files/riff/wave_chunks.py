@@ -20,7 +20,7 @@ from sonic_bullet.records.errors import RecordError
 
 LAST_SAMPLE = 2**32 - 1
 """Last sample of a cue, which has 32 bits: a day at 48 kHz."""
-TEXT_BYTES = 200
+CHUNK_TEXT_BYTES = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ def _chunk(name: bytes, body: bytes) -> bytes:
     return name + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
 
 
-def _text(text: str, most: int = TEXT_BYTES) -> bytes:
+def _text(text: str, most: int = CHUNK_TEXT_BYTES) -> bytes:
     """Encode a text for a chunk: UTF-8, without NUL."""
     return text.replace("\0", " ").encode("utf-8", "replace")[:most].decode("utf-8", "ignore").encode()
 

@@ -1,11 +1,11 @@
 """Steps of a contact log as columns, in memory and on disk, for logs of hours.
 
-Step -> StepLog -> STEP row + POSE rows + CONTACT rows + LINK_MOTION rows (spools) -> LogSteps -> Step, on request
+Step -> StepLog -> LOGGED_STEP row + rows of LOGGED_POSE, CONTACT, LINK_MOTION (spools) -> LogSteps -> Step, on request
 npz  -> the same four tables, read from the file (step_entries) -> LogSteps -> Step
 
-STEP       length, gravity, and the end of its rows among all poses, contacts and motions
-POSE       index of the body into the log's `bodies`, moved by hand or not, position, quaternion
-CONTACT    records.contacts
+LOGGED_STEP     length, gravity, and the end of its rows among all poses, contacts and motions
+LOGGED_POSE     index of the body into the log's `bodies`, moved by hand or not, position, quaternion
+CONTACT         records.contacts
 LINK_MOTION     records.touching.link_motions
 """
 
@@ -24,10 +24,10 @@ from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step, first_bodies
 from sonic_bullet.records.touching.link_motions import LINK_MOTION
 
-KINDS = ("pose", "contact", "motion")
+ROW_KINDS = ("pose", "contact", "motion")
 """Tables whose rows belong to steps."""
-STEP = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), *((f"{kind}_end", "i8") for kind in KINDS)])
-POSE = np.dtype(
+LOGGED_STEP = np.dtype([("dt_s", "f8"), ("gravity_m_s2", "f8", (3,)), *((f"{kind}_end", "i8") for kind in ROW_KINDS)])
+LOGGED_POSE = np.dtype(
     [("body", "i4"), ("teleported", "?"), ("position_m", "f8", (3,)), ("quaternion_xyzw", "f8", (4,))], align=True
 )
 PACKED = 64
@@ -51,7 +51,7 @@ class StepBlock(NamedTuple):
 
     Parameters
     ----------
-    step, pose, contact, motion : Array of STEP, POSE, CONTACT, LINK_MOTION
+    step, pose, contact, motion : Array of LOGGED_STEP, LOGGED_POSE, CONTACT, LINK_MOTION
         The ends in step count from this block's first rows.
     """
 
@@ -61,7 +61,7 @@ class StepBlock(NamedTuple):
     motion: Array
 
     def counts(self, name: str) -> Array:
-        """Return the rows (n,) of each step; name: of `KINDS`."""
+        """Return the rows (n,) of each step; name: of `ROW_KINDS`."""
         return np.diff(self.step[f"{name}_end"], prepend=0)
 
     def steps(self) -> list[Step]:
@@ -73,7 +73,7 @@ class StepBlock(NamedTuple):
         gravity, none = _column(self.step, "gravity_m_s2"), Contacts.none()
         body = body.astype(np.int64)
         body.flags.writeable = False
-        columns = (self.step[name].tolist() for name in ("dt_s", *(f"{kind}_end" for kind in KINDS)))
+        columns = (self.step[name].tolist() for name in ("dt_s", *(f"{kind}_end" for kind in ROW_KINDS)))
         for i, (dt_s, p1, k1, m1) in enumerate(zip(*columns, strict=True)):
             rows = Contacts.trusted(self.contact[k0:k1]) if k1 > k0 else none
             # ascending from 0, so that the last tells whether it is the first p1 - p0
@@ -99,7 +99,7 @@ class LogSteps(Sequence[Step]):
     Parameters
     ----------
     step, pose, contact, motion
-        Tables of STEP, POSE, CONTACT, LINK_MOTION; they may grow beyond ``stop``.
+        Tables of LOGGED_STEP, LOGGED_POSE, CONTACT, LINK_MOTION; they may grow beyond ``stop``.
     known
         More than the largest index of a body in the tables.
     """
@@ -155,32 +155,32 @@ class LogSteps(Sequence[Step]):
         while first < stop:
             before = self._before(first)
             step = self.step[first : min(first + BLOCK_STEPS, stop)].copy()
-            for kind, rows in zip(KINDS, before, strict=True):
+            for kind, rows in zip(ROW_KINDS, before, strict=True):
                 step[f"{kind}_end"] -= rows
-            most = np.max([step[f"{kind}_end"] for kind in KINDS], axis=0)
+            most = np.max([step[f"{kind}_end"] for kind in ROW_KINDS], axis=0)
             step = step[: max(1, int(np.searchsorted(most, BLOCK_ROWS, side="right")))]
             yield StepBlock(
                 step,
                 *(
                     getattr(self, kind)[rows : rows + int(step[f"{kind}_end"][-1])]
-                    for kind, rows in zip(KINDS, before, strict=True)
+                    for kind, rows in zip(ROW_KINDS, before, strict=True)
                 ),
             )
             first += len(step)
 
     def _before(self, number: int) -> tuple[int, ...]:
-        """Count the rows of each of `KINDS` before a step."""
+        """Count the rows of each of `ROW_KINDS` before a step."""
         if number == 0:
-            return (0,) * len(KINDS)
+            return (0,) * len(ROW_KINDS)
         (row,) = self.step[number - 1 : number]
-        return tuple(int(row[f"{kind}_end"]) for kind in KINDS)
+        return tuple(int(row[f"{kind}_end"]) for kind in ROW_KINDS)
 
     def lengths_s(self) -> Array:
         """Return the length (n,) of each step."""
         return np.concatenate([np.zeros(0), *(rows["dt_s"] for rows in self.step_rows())])
 
     def step_rows(self) -> Iterator[Array]:
-        """Iterate over STEP rows alone, many at once; their ends count from the tables' first rows."""
+        """Iterate over LOGGED_STEP rows alone, many at once; their ends count from the tables' first rows."""
         for first in range(self.start, self.stop, BLOCK_ROWS):
             yield self.step[first : min(first + BLOCK_ROWS, self.stop)]
 
@@ -190,12 +190,12 @@ class LogSteps(Sequence[Step]):
 
     @property
     def rows_before(self) -> tuple[int, ...]:
-        """Number of rows of each of `KINDS` in the tables before the first step."""
+        """Number of rows of each of `ROW_KINDS` in the tables before the first step."""
         return self._before(self.start)
 
     @property
     def row_counts(self) -> tuple[int, ...]:
-        """Number of rows of each of `KINDS` of the steps."""
+        """Number of rows of each of `ROW_KINDS` of the steps."""
         return tuple(np.subtract(self._before(self.stop), self.rows_before).tolist())
 
     def bodies(self) -> int:
@@ -208,7 +208,8 @@ class StepLog:
 
     def __init__(self, instead: str = "") -> None:
         self._tables = tuple(
-            Spool(dtype, what="contact log", instead=instead) for dtype in (STEP, POSE, CONTACT, LINK_MOTION)
+            Spool(dtype, what="contact log", instead=instead)
+            for dtype in (LOGGED_STEP, LOGGED_POSE, CONTACT, LINK_MOTION)
         )
         self._fresh: list[Step] = []
         self._known = 0
@@ -237,13 +238,13 @@ class StepLog:
             return
         steps, *tables = self._tables
         counts = np.array([(len(one.body), len(one.contacts.row), len(one.motions)) for one in fresh], np.int64).T
-        step, pose = np.zeros(len(fresh), STEP), np.zeros(int(counts[0].sum()), POSE)
+        step, pose = np.zeros(len(fresh), LOGGED_STEP), np.zeros(int(counts[0].sum()), LOGGED_POSE)
         step["dt_s"] = [one.dt_s for one in fresh]
         step["gravity_m_s2"] = joined([one.gravity_m_s2 for one in fresh], float, (3,))
-        for kind, table, count in zip(KINDS, tables, counts, strict=True):
+        for kind, table, count in zip(ROW_KINDS, tables, counts, strict=True):
             step[f"{kind}_end"] = len(table) + np.cumsum(count)
         for name in ("body", "teleported", "position_m", "quaternion_xyzw"):
-            dtype, tail = POSE[name].base, POSE[name].shape
+            dtype, tail = LOGGED_POSE[name].base, LOGGED_POSE[name].shape
             pose[name] = joined([getattr(one, name) for one in fresh], np.int64 if name == "body" else dtype, tail)
         self._known = max(self._known, int(pose["body"].max(initial=-1)) + 1)
         steps.append(step)

@@ -13,7 +13,15 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.container import REMEDY, Column, RowsOfEntry, take
-from sonic_bullet.files.rows.log_steps import BLOCK_ROWS, KINDS, POSE, STEP, LogSteps, StepBlock, Table
+from sonic_bullet.files.rows.log_steps import (
+    BLOCK_ROWS,
+    LOGGED_POSE,
+    LOGGED_STEP,
+    ROW_KINDS,
+    LogSteps,
+    StepBlock,
+    Table,
+)
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
 from sonic_bullet.records.coerce import as_number
@@ -101,8 +109,8 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
         A number is NaN or infinite.
     """
     dt = take(arrays, "step_dt_s", float, (None,), path)
-    step = np.zeros(len(dt), STEP)
-    for kind, what in zip(KINDS, ("body", "contact", "motion"), strict=True):
+    step = np.zeros(len(dt), LOGGED_STEP)
+    for kind, what in zip(ROW_KINDS, ("body", "contact", "motion"), strict=True):
         name, field = f"step_{what}_count", f"{kind}_end"
         if kind == "motion" and name not in arrays:  # nothing jointed is listened to
             continue
@@ -110,7 +118,7 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
         if (count < 0).any() or (count > ROWS_MOST).any() or count.sum(dtype=float) > 2**62:
             raise LogError(f"{path}: {name} is negative or absurd", REMEDY)
         step[field] = np.cumsum(count)
-    p, k, m = (int(step[f"{kind}_end"][-1]) if len(dt) else 0 for kind in KINDS)
+    p, k, m = (int(step[f"{kind}_end"][-1]) if len(dt) else 0 for kind in ROW_KINDS)
     gravity = take(arrays, "step_gravity_m_s2", float, (len(dt), 3), path)
     step["gravity_m_s2"] = frozen_array(gravity, float, (len(dt), 3), "step: gravity_m_s2")
     remedy = "set a time step between 0 and 1 s with setTimeStep"
@@ -124,7 +132,7 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
         )
     )  # fmt: skip
     step.flags.writeable = False
-    tables = Fields(POSE, p, poses), Fields(CONTACT, k, contacts), Fields(LINK_MOTION, m, motions)
+    tables = Fields(LOGGED_POSE, p, poses), Fields(CONTACT, k, contacts), Fields(LINK_MOTION, m, motions)
     steps = LogSteps(step, *tables, 0, len(dt), bodies, [0, ()])
     for block in steps.blocks():
         _check(block, bodies, path)

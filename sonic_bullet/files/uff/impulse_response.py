@@ -23,12 +23,12 @@ from sonic_bullet.files.uff.reader import Response
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-LOWEST_HZ = 20.0
+LOWEST_MEASURED_HZ = 20.0
 BAND = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
 BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
 OFF_RATE = 5e-5  # relative: six figures of a step, and their last
-ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
-MOTION = {"acceleration": -1, "velocity": 0, "displacement": 1}
+PREDICTION_ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
+MOTION_ORDER = {"acceleration": -1, "velocity": 0, "displacement": 1}
 """Powers of iω from a quantity to velocity."""
 
 
@@ -55,7 +55,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
         Its rate is not a whole number of Hz, or it unpacks to too many samples.
     """
     off_grid = 0.01  # of a step
-    power = MOTION.get(response.quantity, 0)
+    power = MOTION_ORDER.get(response.quantity, 0)
     if not response.spectral:
         return _from_time(response, power)
     step, first = response.step, round(response.start / response.step)
@@ -66,7 +66,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
     last = first + len(response.value) - 1
     count, sr = _length(max(2 * last, math.ceil(READ_MIN_HZ / step)), step)
     freq = sr / count * np.arange(first, last + 1)
-    low = max(LOWEST_HZ, 2 * step, response.start * 1.1)
+    low = max(LOWEST_MEASURED_HZ, 2 * step, response.start * 1.1)
     spectrum = np.zeros(count // 2 + 1, complex)
     spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, BAND * freq[-1])
     sound = np.fft.irfft(spectrum, count) * sr
@@ -77,7 +77,7 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
 def _predicted_back(sound: Array, jump: int) -> Array:
     """Predict the first samples of a recording (n,) from later ones; unchanged where it is too short."""
     exact = 1e-13  # of the largest eigenvalue: below it are rounding errors
-    order = min(ORDER, (len(sound) - jump) // 8)
+    order = min(PREDICTION_ORDER, (len(sound) - jump) // 8)
     if order < 2:
         return sound
     window = np.lib.stride_tricks.sliding_window_view(sound[jump : jump + 7 * order], order + 1)
@@ -97,10 +97,10 @@ def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float,
         raise FileError(f"a time record has {1 / response.step:g} samples a second", "export it at a whole number")
     value = np.asarray(response.value, float)
     if power == 0:
-        return value, sr, (LOWEST_HZ, 0.45 * sr)
+        return value, sr, (LOWEST_MEASURED_HZ, 0.45 * sr)
     freq = np.fft.rfftfreq(len(value), 1 / sr)
-    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, LOWEST_HZ, 0.45 * sr)
-    return np.fft.irfft(spectrum, len(value)), sr, (LOWEST_HZ, 0.45 * sr)
+    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, LOWEST_MEASURED_HZ, 0.45 * sr)
+    return np.fft.irfft(spectrum, len(value)), sr, (LOWEST_MEASURED_HZ, 0.45 * sr)
 
 
 def _derived(value: Array, freq_hz: Array, power: int) -> Array:

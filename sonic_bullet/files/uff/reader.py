@@ -18,14 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.case_fields import LARGEST
+from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-READ = (15, 58, 164, 2411)
+READ_DATASETS = (15, 58, 164, 2411)
 QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration", 15: "pressure"}
-FORCES = (9, 13)
+FORCE_TYPES = (9, 13)
 Point = tuple[float, float, float]
 
 
@@ -117,7 +117,7 @@ def read_uff(path: str | os.PathLike[str]) -> UffFile:
         _refuse_cut(Path(path))
         file = pyuff.UFF(os.fspath(path))
         kinds = [int(kind) for kind in file.get_set_types()]
-        sets = [(kind, _dataset(file, i, kind)) for i, kind in enumerate(kinds) if kind in READ]
+        sets = [(kind, _dataset(file, i, kind)) for i, kind in enumerate(kinds) if kind in READ_DATASETS]
         return _understood(sets, kinds, path)
 
 
@@ -134,7 +134,7 @@ def _understood(sets: list[tuple[int, dict[str, Any]]], kinds: list[int], path: 
             unread[response] += 1
         else:
             found.append(response)
-            assumed += response.spectral and int(one.get("orddenom_spec_data_type", 0)) not in FORCES
+            assumed += response.spectral and int(one.get("orddenom_spec_data_type", 0)) not in FORCE_TYPES
     if not found:
         held = ", ".join(_counted(unread)) or ", ".join(f"dataset {k}" for k in dict.fromkeys(kinds)) or "no dataset"
         raise FileError(f"{path} holds no response that is understood ({held})", "export frequency responses to force")
@@ -183,7 +183,7 @@ def _nodes(sets: list[dict[str, Any]], metre: float) -> dict[int, Point]:
         for node, x, y, z in zip(one["node_nums"], one["x"], one["y"], one["z"], strict=True)
     }
     for node, point in found.items():
-        if not all(abs(x) <= LARGEST for x in point):
+        if not all(abs(x) <= LARGEST_NUMBER for x in point):
             raise FileError(f"node {node} lies at {point[0]:g}, {point[1]:g}, {point[2]:g} m", "give coordinates in SI")
     return found
 
@@ -212,7 +212,7 @@ def _response(
     if kind not in (1, 4):
         return functions.get(kind, f"functions of type {kind}")
     below = int(one.get("orddenom_spec_data_type", 0))
-    if quantity is None or (below not in FORCES and below != 0):
+    if quantity is None or (below not in FORCE_TYPES and below != 0):
         word = "frequency responses" if kind == 4 else "time records"
         return f"{word} of ordinate type {one['ordinate_spec_data_type']} per type {below}"
     if any(abs(int(one[axis])) > 3 for axis in ("rsp_dir", "ref_dir")):
@@ -224,7 +224,7 @@ def _response(
     if not (np.isfinite(x).all() and (np.abs(value) <= largest_value).all()):
         raise FileError(f"{path} holds values that are NaN or beyond {largest_value:g}", "export it again")
     step = float(x[-1] - x[0]) / (count - 1)
-    if not least_step <= step <= LARGEST or np.abs(x[0] + step * np.arange(count) - x).max() > uneven * abs(
+    if not least_step <= step <= LARGEST_NUMBER or np.abs(x[0] + step * np.arange(count) - x).max() > uneven * abs(
         float(x[-1])
     ):
         return "functions with uneven steps"
@@ -232,7 +232,7 @@ def _response(
     scale = newton / metre**2 if quantity == "pressure" else metre
     if str(one.get("ordinate_axis_units_lab", "")).strip().lower() in ("g", "gn", "g's"):
         scale = gravity_m_s2
-    per_force = kind == 4 or below in FORCES
+    per_force = kind == 4 or below in FORCE_TYPES
     sensor, strike = (
         Freedom(int(one[f"{end}_node"]), int(one[f"{end}_dir"]), nodes.get(int(one[f"{end}_node"])))
         for end in ("rsp", "ref")
@@ -252,7 +252,7 @@ def _notes(found: list[Response], unread: Counter[str], kinds: list[int], assume
     quiet = (151, 2412, 82)  # header, elements, trace lines: nothing for a case
     systems = (18, 2420)
     lines = [f"not used: {', '.join(_counted(unread))}"] if unread else []
-    others = Counter(kind for kind in kinds if kind not in (*READ, *quiet, *systems))
+    others = Counter(kind for kind in kinds if kind not in (*READ_DATASETS, *quiet, *systems))
     if others:
         lines.append("not used: " + ", ".join(f"dataset {kind} ({count})" for kind, count in others.items()))
     if any(kind in systems for kind in kinds):

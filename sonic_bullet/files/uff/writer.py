@@ -18,7 +18,7 @@ from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-VELOCITY, FORCE, FREQUENCY = 11, 13, 18
+VELOCITY, FORCE_TYPE, FREQUENCY = 11, 13, 18
 TITLE = 80
 
 
@@ -164,7 +164,7 @@ def _function(one: Mobility, title: str) -> dict[str, Any]:
         "abscissa_spacing": 1,
         "abscissa_spec_data_type": FREQUENCY,
         "ordinate_spec_data_type": VELOCITY,
-        "orddenom_spec_data_type": FORCE,
+        "orddenom_spec_data_type": FORCE_TYPE,
         "x": one.step_hz * np.arange(len(one.value)),
         "data": np.asarray(one.value, complex),
     }

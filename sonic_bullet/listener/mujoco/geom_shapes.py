@@ -25,7 +25,7 @@ SIZED: dict[Any, tuple[ShapeKind, Callable[[float, float, float], tuple[float, f
     GEOM.mjGEOM_BOX: ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
 }
 """Kind of shape, and its size_m of a geom's size: MuJoCo's are half lengths."""
-RINGS = 24
+ELLIPSOID_RINGS = 24
 """Rings of triangles of an ellipsoid, of twice as many each."""
 
 
@@ -77,7 +77,7 @@ def _ellipsoid(radius_m: Array) -> tuple[Array, Array]:
     """Return vertices and triangles of an ellipsoid about the origin."""
     from trimesh.creation import uv_sphere
 
-    made = uv_sphere(radius=1, count=[RINGS, 2 * RINGS])
+    made = uv_sphere(radius=1, count=[ELLIPSOID_RINGS, 2 * ELLIPSOID_RINGS])
     vertex, face = np.array(made.vertices), made.faces.astype(np.int32)
     fuller = np.cbrt(4 / 3 * np.pi / volume_m3(vertex, face))  # of the same volume
     return fuller * vertex * radius_m, face

@@ -29,7 +29,16 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import Values, finite
 
-OPTIONS = ("timestep", "impratio", "tolerance", "iterations", "noslip_iterations", "integrator", "cone", "solver")
+MUJOCO_OPTIONS = (
+    "timestep",
+    "impratio",
+    "tolerance",
+    "iterations",
+    "noslip_iterations",
+    "integrator",
+    "cone",
+    "solver",
+)
 
 
 class MujocoWorld(MotionWorld):
@@ -104,7 +113,7 @@ class MujocoWorld(MotionWorld):
         """Return MuJoCo's options."""
         option = self.model.opt
         gravity = {f"gravity_{axis}": float(x) for axis, x in zip("xyz", option.gravity, strict=True)}
-        return finite({**{name: float(getattr(option, name)) for name in OPTIONS}, **gravity})
+        return finite({**{name: float(getattr(option, name)) for name in MUJOCO_OPTIONS}, **gravity})
 
     def versions(self) -> dict[str, str]:
         """Return MuJoCo's version."""

@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sonic_bullet.listener.frames import MOTION, Motion
+from sonic_bullet.listener.frames import LINK_STATE, Motion
 from sonic_bullet.listener.mujoco.model_links import ModelLinks
 from sonic_bullet.listener.polling import TOUCH
 from sonic_bullet.machine.compiled import njit
@@ -24,7 +24,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 
 RK4 = mujoco.mjtIntegrator.mjINT_RK4
-NODES = (0.5, 0.5, 1.0)
+PULSE_NODES = (0.5, 0.5, 1.0)
 """Times of the second to fourth stage, in steps; each goes on from the slope of the stage before."""
 WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
@@ -38,7 +38,7 @@ class StageForces:
         self._before: tuple[Motion, list[tuple[Array, Array]]] | None = None
         self._force = np.zeros(6)
         of_world = links.body == 0
-        self._row: Array = np.zeros(len(links.body), MOTION)
+        self._row: Array = np.zeros(len(links.body), LINK_STATE)
         self._row["position_m"][of_world] = np.asarray(model.geom_pos)[links.geom[of_world]]
         self._row["quaternion_xyzw"][of_world] = np.asarray(model.geom_quat)[links.geom[of_world]][:, [1, 2, 3, 0]]
 
@@ -117,11 +117,11 @@ class StageForces:
         for stage in (0, 1):
             speed, change, rate = copy.qvel.copy(), copy.qacc.copy(), copy.act_dot.copy()
             copy.qpos[:] = qpos
-            mujoco.mj_integratePos(model, copy.qpos, speed, h * NODES[stage])
-            copy.qvel[:], copy.act[:] = qvel + h * NODES[stage] * change, act + h * NODES[stage] * rate
-            copy.time = time_s + h * NODES[stage]
+            mujoco.mj_integratePos(model, copy.qpos, speed, h * PULSE_NODES[stage])
+            copy.qvel[:], copy.act[:] = qvel + h * PULSE_NODES[stage] * change, act + h * PULSE_NODES[stage] * rate
+            copy.time = time_s + h * PULSE_NODES[stage]
             mujoco.mj_forwardSkip(model, copy, mujoco.mjtStage.mjSTAGE_NONE, 1)
-            stages.append(self._touches(copy, h * WEIGHTS[stage + 1], h * NODES[stage]))
+            stages.append(self._touches(copy, h * WEIGHTS[stage + 1], h * PULSE_NODES[stage]))
         return motion, stages
 
 

@@ -65,9 +65,9 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
 """Positional arguments, by PyBullet's names for them."""
 BESIDES = ("stepSimulation", "setAdditionalSearchPath")
 """Functions that are intercepted though they set nothing."""
-BODY = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
+BODY_ARGUMENT = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
 CONSTRAINT = "userConstraintUniqueId"
-SHAPES = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
+SHAPE_ARGUMENTS = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
 PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "specularColor"}
 
 
@@ -213,10 +213,10 @@ class Interception:
             if key in PICTURES:
                 continue
             value = _plain(raw)
-            if BODY.match(key) or key == CONSTRAINT:
+            if BODY_ARGUMENT.match(key) or key == CONSTRAINT:
                 value = self.who(int(raw), "constraint" if key == CONSTRAINT else "body")
                 whom = whom or value
-            elif key in SHAPES:
+            elif key in SHAPE_ARGUMENTS:
                 value = mapped(value, lambda index: self._shapes.get(index, index))
             elif key.lower().endswith("filename"):
                 value = self._file(str(raw))
@@ -228,7 +228,7 @@ class Interception:
         return {key: self._handle(key, value) for key, value in arguments.items()}
 
     def _handle(self, key: str, value: Any) -> Any:
-        if key in SHAPES:
+        if key in SHAPE_ARGUMENTS:
             if isinstance(value, Mapping):
                 index = self._ask("createCollisionShape", self._to_ask(value), self.client)
                 self._shapes[int(index)] = value

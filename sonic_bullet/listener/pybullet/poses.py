@@ -15,9 +15,9 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.listener.frames import (
-    BEYOND,
+    INVALID_BEYOND,
     LINK_SPAN,
-    MOTION,
+    LINK_STATE,
     MOTION_NUMBERS,
     Motion,
     Roster,
@@ -31,8 +31,8 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import SceneError
 
-POSE, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
-MOTION_BYTES = MOTION.itemsize
+POSE_BYTES, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
+MOTION_BYTES = LINK_STATE.itemsize
 SOFT = 3
 """Last entry but one of getDynamicsInfo for a soft body (Bullet's BT_SOFT_BODY)."""
 
@@ -96,8 +96,8 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
         A body of the roster is gone or has other links.
     """
     if not len(roster.code):
-        return Motion(roster, np.zeros(0, MOTION))
-    buffer, at = bytearray(len(roster.code) * MOTION.itemsize), 0
+        return Motion(roster, np.zeros(0, LINK_STATE))
+    buffer, at = bytearray(len(roster.code) * LINK_STATE.itemsize), 0
     pose, twist, links = pybullet.getBasePositionAndOrientation, pybullet.getBaseVelocity, pybullet.getLinkStates
     count = pybullet.getNumJoints
     with collector_waiting():
@@ -107,7 +107,7 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
                 raise pybullet.error(f"body {body} has other links than before")
             (x, y, z), (i, j, k, r) = pose(body, client_id)
             if fixed:
-                POSE.pack_into(buffer, at, x, y, z, i, j, k, r)
+                POSE_BYTES.pack_into(buffer, at, x, y, z, i, j, k, r)
             else:
                 (u, v, w), (a, b, c) = twist(body, client_id)
                 POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
@@ -119,11 +119,11 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
                     POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
                     at += MOTION_BYTES
     number = np.frombuffer(buffer)
-    if number.dot(number) < BEYOND**2:  # so no number is beyond, and none is NaN
-        return Motion(roster, np.frombuffer(buffer, MOTION))
-    wild = ~(np.abs(number.reshape(-1, MOTION_NUMBERS)) < BEYOND).all(axis=1)
+    if number.dot(number) < INVALID_BEYOND**2:  # so no number is beyond, and none is NaN
+        return Motion(roster, np.frombuffer(buffer, LINK_STATE))
+    wild = ~(np.abs(number.reshape(-1, MOTION_NUMBERS)) < INVALID_BEYOND).all(axis=1)
     broken = tuple(int(body) for body in np.unique(roster.code[wild] // LINK_SPAN))
-    return Motion(roster, np.frombuffer(buffer, MOTION), broken=broken)
+    return Motion(roster, np.frombuffer(buffer, LINK_STATE), broken=broken)
 
 
 def undone(now: Motion, which: Array, touches: Touches, dt_s: float, client_id: int) -> Motion:

@@ -17,7 +17,7 @@ from sonic_bullet.listener.pybullet.clients import client_id_of
 from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
 
 THRESHOLD = "restitutionVelocityThreshold"
-KEPT = "sonic_bullet.contactProcessingThreshold"
+THRESHOLD_DATA = "sonic_bullet.contactProcessingThreshold"
 
 
 def keep_restitution(client: Any) -> int:
@@ -40,7 +40,7 @@ def keep_restitution(client: Any) -> int:
     links = all_links(client_id)
     for body, link in links:
         pybullet.changeDynamics(body, link, contactProcessingThreshold=0, physicsClientId=client_id)
-        pybullet.addUserData(body, KEPT, "0", link, physicsClientId=client_id)
+        pybullet.addUserData(body, THRESHOLD_DATA, "0", link, physicsClientId=client_id)
     return len(links)
 
 
@@ -57,7 +57,7 @@ def lost_restitution(client_id: int, known: SetValues) -> list[Finding]:
         for e in movable
         if bouncy[e] > 0
         and springy - {e[0]}
-        and pybullet.getUserDataId(e[0], KEPT, e[1], physicsClientId=client_id) < 0
+        and pybullet.getUserDataId(e[0], THRESHOLD_DATA, e[1], physicsClientId=client_id) < 0
         and known.of(*e).get("contactProcessingThreshold") != 0
     ]
     if not lost:

@@ -37,7 +37,7 @@ from sonic_bullet.machine.worker import note_leftover
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
 
-REMEDY = "set numSubSteps to 0 and a smaller time step instead"
+SUBSTEP_REMEDY = "set numSubSteps to 0 and a smaller time step instead"
 RECORD = np.dtype(
     {
         "names": ["mark", "step", "time", "flag", "body", "link", "point_a", "point_b", "normal", "gap", "force"],
@@ -89,7 +89,7 @@ class SubstepLog:
         self.offset = self.count = 0
         if self.handle < 0 or not os.path.exists(self.path):
             self.abandon()
-            raise SceneError("numSubSteps is above 1 and Bullet's contact log cannot be written", REMEDY)
+            raise SceneError("numSubSteps is above 1 and Bullet's contact log cannot be written", SUBSTEP_REMEDY)
 
     def close(self) -> None:
         """Stop logging and remove the file; harmless when nothing is open."""
@@ -113,15 +113,17 @@ class SubstepLog:
                 if not header:
                     return np.zeros(0, RECORD)
                 if header.split(b"\n")[1] != LETTERS:
-                    raise SceneError("numSubSteps is above 1 and this PyBullet writes an unknown contact log", REMEDY)
+                    raise SceneError(
+                        "numSubSteps is above 1 and this PyBullet writes an unknown contact log", SUBSTEP_REMEDY
+                    )
                 self.offset = len(header)
             file.seek(self.offset)
             data = file.read()
         if len(data) % RECORD.itemsize:
-            raise SceneError("numSubSteps is above 1 and Bullet's contact log ends within a record", REMEDY)
+            raise SceneError("numSubSteps is above 1 and Bullet's contact log ends within a record", SUBSTEP_REMEDY)
         rows = np.frombuffer(data, RECORD)
         if (rows["mark"] != MARK).any():
-            raise SceneError("numSubSteps is above 1 and Bullet's contact log is damaged", REMEDY)
+            raise SceneError("numSubSteps is above 1 and Bullet's contact log is damaged", SUBSTEP_REMEDY)
         self.offset += len(data)
         if self.offset > REWIND_BYTES:
             self.open()
@@ -169,7 +171,7 @@ def gather_substeps(
         if np.count_nonzero(number == newest) != len(last):
             raise SceneError(
                 f"numSubSteps is {substeps} and Bullet's contact log has stopped",
-                "attach again after resetSimulation, or " + REMEDY,
+                "attach again after resetSimulation, or " + SUBSTEP_REMEDY,
             )
         first = int(newest) + 1 - substeps
     h = dt_s / substeps

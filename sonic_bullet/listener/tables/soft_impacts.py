@@ -9,9 +9,9 @@ A soft constraint spreads an impact over its time constant, 10 ms and more, wher
 step by step it would be a support (synth.strikes). No impulse is lost or made: what is held is given out later, so that
 the sums balance momentum over each impact. The strike comes as the impact ends.
 
-The load has settled: what exceeds the support is below `TAIL` of its peak. The speed has: it is below `REST` of the
-first and, at its present rate, would not have changed by more than twice that since the impact began; at the turning
-point of an elastic impact, where the speed is 0 as well, that is π/2 of it.
+The load has settled: what exceeds the support is below `TAIL` of its peak. The speed has: it is below `REST_SPEED` of
+the first and, at its present rate, would not have changed by more than twice that since the impact began; at the
+turning point of an elastic impact, where the speed is 0 as well, that is π/2 of it.
 """
 # mypy: disable-error-code="no-untyped-def"
 
@@ -25,8 +25,8 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import CONTACT
 
-REST, TAIL = 0.05, 0.03
-LONGEST_S = 0.1
+REST_SPEED, TAIL = 0.05, 0.03
+LONGEST_IMPACT_S = 0.1
 """Longest impact: what brakes a body for longer is a cushion, which is silent."""
 
 SOFT_IMPACT = np.dtype(
@@ -60,7 +60,7 @@ LOAD = np.dtype(
 """A pair in one step. impact: its place among the impacts, or -1."""
 
 
-IMPACTS, HELD_COUNT, PAIRS, ROWS = 0, 1, 2, 3
+IMPACTS, HELD_COUNT, IMPACT_PAIRS, IMPACT_ROWS = 0, 1, 2, 3
 """Places in the counts of an `ImpactTables`."""
 
 
@@ -106,8 +106,8 @@ class SoftImpacts:
         g = float(np.linalg.norm(gravity_m_s2))
         collect_rows(row, g * mass_kg, dt_s, 1.1 * g * dt_s, ImpactTables(impact, held, self._before, now, out, counts))
         self._impact, self._held = impact[: counts[IMPACTS]].copy(), held[: counts[HELD_COUNT]].copy()
-        self._before = now[: counts[PAIRS]]
-        return out[: counts[ROWS]]
+        self._before = now[: counts[IMPACT_PAIRS]]
+        return out[: counts[IMPACT_ROWS]]
 
 
 @njit(nogil=True, error_model="numpy")
@@ -199,12 +199,12 @@ def collect_rows(row, weight, dt, fall, tables):
     for i in range(counts[IMPACTS]):
         impact[i].over = 1  # unless the pair is loaded
     sum_loads(row, weight, dt, now, counts)
-    for i in range(counts[PAIRS]):
+    for i in range(counts[IMPACT_PAIRS]):
         if now[i].force_n > 0:
             now[i].impact = follow(now[i], dt, fall, tables)
     for i in range(len(row)):
-        pass_row(row[i], now[place_of(now, counts[PAIRS], pair_key(row[i]))], tables)
-    for i in range(counts[PAIRS]):  # what passed is the support of the next step
+        pass_row(row[i], now[place_of(now, counts[IMPACT_PAIRS], pair_key(row[i]))], tables)
+    for i in range(counts[IMPACT_PAIRS]):  # what passed is the support of the next step
         if now[i].impact >= 0 and impact[now[i].impact].over == 0:
             now[i].force_n = min(now[i].force_n, impact[now[i].impact].support_n)
     finish(impact, held, tables.out, counts)
@@ -215,10 +215,10 @@ def sum_loads(row, weight, dt, now, counts):
     """Fill now: load and fastest loaded approach of each pair."""
     for i in range(len(row)):
         key, load = pair_key(row[i]), load_of(row[i])
-        at = place_of(now, counts[PAIRS], key)
+        at = place_of(now, counts[IMPACT_PAIRS], key)
         if at < 0:
-            at = counts[PAIRS]
-            counts[PAIRS] += 1
+            at = counts[IMPACT_PAIRS]
+            counts[IMPACT_PAIRS] += 1
             now[at].key, now[at].force_n, now[at].approach_m_s, now[at].impact = key, 0.0, -np.inf, -1
             now[at].weight_n, now[at].gap_m = weight[i], 0.0
         now[at].force_n += load / dt
@@ -235,8 +235,8 @@ def pass_row(one, pair, tables):
         if fraction < 1.0:
             hold(one, pair.key, 1.0 - fraction, tables.held, tables.counts)
     if fraction > 0:
-        copy_row(one, tables.out[tables.counts[ROWS]], fraction)
-        tables.counts[ROWS] += 1
+        copy_row(one, tables.out[tables.counts[IMPACT_ROWS]], fraction)
+        tables.counts[IMPACT_ROWS] += 1
 
 
 @njit(nogil=True, error_model="numpy")
@@ -259,11 +259,11 @@ def follow(one, dt, fall, tables):
     it = impact[at]
     change = abs(it.latest_m_s - one.approach_m_s)
     it.approach_m_s, it.latest_m_s = max(it.approach_m_s, one.approach_m_s), one.approach_m_s
-    rest = REST * it.approach_m_s
+    rest = REST_SPEED * it.approach_m_s
     settled = it.steps > 0 and abs(one.approach_m_s) <= rest and change * it.steps <= 2 * rest
     it.peak_n = max(it.peak_n, one.force_n)
     settled = settled or one.force_n - it.support_n <= TAIL * (it.peak_n - it.support_n)
-    it.over = 1 if settled or it.elapsed_s >= LONGEST_S else 0
+    it.over = 1 if settled or it.elapsed_s >= LONGEST_IMPACT_S else 0
     it.steps, it.elapsed_s = it.steps + 1, it.elapsed_s + dt
     return at
 
@@ -275,8 +275,8 @@ def finish(impact, held, out, counts):
     for i in range(counts[HELD_COUNT]):
         one = impact[place_of(impact, counts[IMPACTS], held[i].key)]
         if one.over != 0:
-            give_out(held[i], one, out[counts[ROWS]])
-            counts[ROWS] += 1
+            give_out(held[i], one, out[counts[IMPACT_ROWS]])
+            counts[IMPACT_ROWS] += 1
         else:
             held[kept] = held[i]
             kept += 1

@@ -27,7 +27,7 @@ from sonic_bullet.records.errors import MeshError
 Filler = Literal["any", "netgen", "simple", "lattice"]
 """How a surface that no rule fits is filled: by Netgen or a substitute, by Netgen or not at all, with its detail left
 out, by a lattice of this edge or not at all."""
-LATTICE = "lattice"  # first word of the note of a solid filled by a lattice
+LATTICE_NOTE = "lattice"  # first word of the note of a solid filled by a lattice
 MOST_TETS = 60_000
 """A third of a million unknowns, 1.5 GB."""
 FILLED = (0.6, 1.7)
@@ -35,7 +35,7 @@ FILLED = (0.6, 1.7)
 
 Wide, for a surface that passes through itself encloses some of it twice.
 """
-FINER = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
+FINER_FILLING = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
 SIMPLER, SLIVER = 0.05, 0.01
 """Of an edge: the detail left out where Netgen refuses the surface as it is, and the height of triangles that it would
 refuse: slivers of unions, on which it takes ten times as long.
@@ -88,7 +88,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
     detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
     attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
-    for tried, size in [*attempts, (simple, edge), (simple, FINER * edge)]:
+    for tried, size in [*attempts, (simple, edge), (simple, FINER_FILLING * edge)]:
         try:
             return _by_netgen(skin, tried, size, say)
         except EndlessError:
@@ -162,9 +162,9 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str],
                     f" ({skin.thickness_m:.2g} m on the mean)",
                     "repair the mesh, or give thicker walls",
                 ) from error
-            edge = max(FINER * edge, least)
+            edge = max(FINER_FILLING * edge, least)
     tet, said = _largest(corner, tet)
-    note = f"{LATTICE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
+    note = f"{LATTICE_NOTE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 

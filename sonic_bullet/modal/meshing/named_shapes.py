@@ -7,7 +7,7 @@ import numpy as np
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.modal.meshing.sizes import dof_budget
 from sonic_bullet.modal.meshing.solid import Solid, surface
-from sonic_bullet.modal.meshing.surfaces import SIZE_M
+from sonic_bullet.modal.meshing.surfaces import BODY_SIZE_M
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
@@ -90,7 +90,7 @@ def alone(shapes: tuple[Shape, ...], thickness_m: float | None) -> Shape | None:
     if len(shapes) > 1 or shapes[0].kind == "mesh" or thickness_m is not None:
         return None
     one = shapes[0]
-    if not SIZE_M[0] < one.size_m.max() < SIZE_M[1]:
+    if not BODY_SIZE_M[0] < one.size_m.max() < BODY_SIZE_M[1]:
         raise MeshError(
             f"{one.kind} is {one.size_m.max():.3g} m across", "check its unit and scale: metres are expected"
         )

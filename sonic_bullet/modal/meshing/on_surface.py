@@ -14,7 +14,7 @@ from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.solid import TET_EDGE, TET_FACE, Solid, corner_volume_m3
 from sonic_bullet.records import Array
 
-LATTICE = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
+BODY_CENTRED = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
 """Where an element's Jacobian is checked: corners and middles of its edges."""
 
 
@@ -83,7 +83,7 @@ def unfolded(solid: Solid) -> Solid:
     from skfem import ElementTetP2
 
     element = ElementTetP2()
-    gradient = np.array([element.lbasis(LATTICE.T, i)[1] for i in range(10)])
+    gradient = np.array([element.lbasis(BODY_CENTRED.T, i)[1] for i in range(10)])
     node = solid.node_m.copy()
     straight = 6 * corner_volume_m3(node, solid.tet)
     while True:  # each round straightens one element at least

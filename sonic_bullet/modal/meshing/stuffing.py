@@ -21,9 +21,9 @@ from sonic_bullet.records.errors import MeshError
 
 GROUP = 8  # faces that are one dipole from afar
 GROUPS = 8  # groups that are one larger group
-PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+EDGE_PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # A wedge 012 345 turned so that its vertex k comes first [Dompierre et al. 1999, table 1]
-TURNED = np.array(
+TURNED_WEDGES = np.array(
     [[0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4], [3, 5, 4, 0, 2, 1], [4, 3, 5, 1, 0, 2],
      [5, 4, 3, 2, 1, 0]])  # fmt: skip
 
@@ -41,7 +41,7 @@ def stuffed(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
     foot = np.einsum("kc,kcx->kx", weight, vertex_m[face[found]])
     phi = np.where(winding_number(vertex_m[face[index.order]], node_m) > 0.5, distance, -distance)
     tet = tet[(phi[tet] > 0).any(axis=1)]
-    a, b = np.unique(np.sort(tet[:, PAIRS].reshape(-1, 2), axis=1), axis=0).T
+    a, b = np.unique(np.sort(tet[:, EDGE_PAIRS].reshape(-1, 2), axis=1), axis=0).T
     reach = np.where((a < corners) == (b < corners), warp_long, warp_short)
     for kind in (slice(0, corners), slice(corners, None)):
         across = phi[a] * phi[b] < 0
@@ -173,16 +173,16 @@ def _cut(node_m: Array, tet: Array, phi: Array) -> tuple[Array, Array]:
     order = np.argsort(-sign, axis=1, kind="stable")
     tet, sign = np.take_along_axis(tet, order, axis=1), np.take_along_axis(sign, order, axis=1)
     n = len(node_m)
-    pair = tet[:, PAIRS]
+    pair = tet[:, EDGE_PAIRS]
     code = pair.min(axis=2) * n + pair.max(axis=2)
-    crossed = sign[:, PAIRS[:, 0]] * sign[:, PAIRS[:, 1]] < 0
+    crossed = sign[:, EDGE_PAIRS[:, 0]] * sign[:, EDGE_PAIRS[:, 1]] < 0
     known, at = np.unique(code[crossed], return_inverse=True)
     low, high = known // n, known % n
     part = (phi[low] / (phi[low] - phi[high]))[:, None]
     node_m = np.concatenate([node_m, (1 - part) * node_m[low] + part * node_m[high]])
     cut = np.full(code.shape, -1)
     cut[crossed] = n + at
-    edge = {(int(i), int(j)): cut[:, k] for k, (i, j) in enumerate(PAIRS)}
+    edge = {(int(i), int(j)): cut[:, k] for k, (i, j) in enumerate(EDGE_PAIRS)}
     plus, minus = (sign > 0).sum(axis=1), (sign < 0).sum(axis=1)
 
     def end(k: int) -> Array:
@@ -214,7 +214,7 @@ def _of_wedges(w: Array) -> list[Array]:
 
     [Dompierre et al. 1999, table 2]
     """
-    w = np.take_along_axis(w, TURNED[np.argmin(w, axis=1)], axis=1)
+    w = np.take_along_axis(w, TURNED_WEDGES[np.argmin(w, axis=1)], axis=1)
     first = (np.minimum(w[:, 1], w[:, 5]) < np.minimum(w[:, 2], w[:, 4]))[:, None]
     return [
         np.where(first, w[:, [0, 1, 2, 5]], w[:, [0, 1, 2, 4]]),

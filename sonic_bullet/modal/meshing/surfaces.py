@@ -25,8 +25,8 @@ from sonic_bullet.records.errors import MeshError
 OPEN_PART = 0.025
 """Mean winding number just outside: a ball with a hole of 5 % of its area has it."""
 SHEET_PART = 0.02
-FLAT_PART = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
-SIZE_M = (1e-5, 1e4)
+FLAT_THICKNESS = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
+BODY_SIZE_M = (1e-5, 1e4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +171,7 @@ def _openness(vertex_m: Array, face: Array) -> float:
     samples = 2000  # faces outside which it is evaluated
     shown = face[:: -(-len(face) // samples)]
     area, normal = geometry.face_areas_m2(vertex_m, shown), geometry.outward_normals(vertex_m, shown)
-    outside = vertex_m[shown].mean(axis=1) + FLAT_PART * np.linalg.norm(np.ptp(vertex_m, axis=0)) * normal
+    outside = vertex_m[shown].mean(axis=1) + FLAT_THICKNESS * np.linalg.norm(np.ptp(vertex_m, axis=0)) * normal
     near = geometry.surface_index(vertex_m, face).order
     return float(np.average(np.abs(winding_number(vertex_m[face[near]], outside)), weights=area))
 
@@ -190,7 +190,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     if len(face) == 0:
         raise MeshError("mesh has no triangle with three different corners", "repair the mesh file")
     diagonal_m = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
-    if not SIZE_M[0] < diagonal_m < SIZE_M[1]:
+    if not BODY_SIZE_M[0] < diagonal_m < BODY_SIZE_M[1]:
         raise MeshError(f"mesh is {diagonal_m:.3g} m across", "check its unit and scale: metres are expected")
     area = geometry.face_areas_m2(vertex_m, face)
     face = face[area > 1e-14 * diagonal_m**2]
@@ -205,7 +205,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     total = float(area.sum())
     volume = geometry.volume_m3(vertex_m, face)
     closed = geometry.is_closed(face)
-    if 2 * volume / total > FLAT_PART * diagonal_m and (closed or _openness(vertex_m, face) < OPEN_PART):
+    if 2 * volume / total > FLAT_THICKNESS * diagonal_m and (closed or _openness(vertex_m, face) < OPEN_PART):
         if not closed:
             note += "; holes filled"
         if thickness_m is None:

@@ -17,7 +17,7 @@ from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
-FINER = 1.5  # sides shorter by this leave FINER^-q of the error, q from 1.1 at notches to 6
+FINER_SIDES = 1.5  # sides shorter by this leave FINER_SIDES^-q of the error, q from 1.1 at notches to 6
 FEWEST_NODES = 120  # fewer save no time
 
 
@@ -114,7 +114,7 @@ class Fourier:
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         around = max((sector.place[0] for sector in sectors), default=0)
-        cells = int(np.clip(skin.AROUND * around, *skin.CELLS))
+        cells = int(np.clip(skin.AROUND_WAVE * around, *skin.AROUND_CELLS))
         wave = float(self.wave(np.array([self.thickness]))[0])
         circles = skin.rows(self.section, 2 * np.pi / wave)
         point, face, curvature, grid = skin.surface(circles, cells)
@@ -128,7 +128,7 @@ class Fourier:
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Estimate the relative error of the frequency of mode top[1] of sector top[0] by a finer section."""
-        left = 1.75  # 1/(1 - FINER^-q), which is 1.1 to 2.8
+        left = 1.75  # 1/(1 - FINER_SIDES^-q), which is 1.1 to 2.8
         finer = self.finer()
         if finer is None:
             return float("nan")
@@ -138,8 +138,8 @@ class Fourier:
         return left * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
 
     def finer(self) -> Fourier | None:
-        """Return the body on a section with sides `FINER` times shorter, None where that takes too many nodes."""
-        by = self.finer_by * FINER
+        """Return the body on a section with sides `FINER_SIDES` times shorter, None where that takes too many nodes."""
+        by = self.finer_by * FINER_SIDES
         section = sectioned(self.body, self.wave, by)
         return None if section is None else replace(self, section=section, finer_by=by)
 

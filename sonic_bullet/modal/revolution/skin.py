@@ -1,8 +1,8 @@
 """Surface of a body of revolution and its displacements there: rows along the outline, times angles.
 
-Rows are the ends and the middles of parabolas, `PER_WAVE` to the shortest wave along the outline, `AROUND` to a wave
-around; each turns `BENT` at most. So a model holds about (2 · PER_WAVE · outline/λ) x (2 · AROUND · m) points of 12
-bytes a mode.
+Rows are the ends and the middles of parabolas, `PER_WAVE` to the shortest wave along the outline, `AROUND_WAVE` to a
+wave around; each turns `BENT` at most. So a model holds about (2 · PER_WAVE · outline/λ) x (2 · AROUND_WAVE · m)
+points of 12 bytes a mode.
 A row on the axis is one point, with triangles about it.
 """
 
@@ -19,8 +19,8 @@ from sonic_bullet.modal.revolution.section import BENT, Section, spread
 from sonic_bullet.records import Array
 
 PER_WAVE = 5.0  # parabolas to the shortest wave along the outline
-AROUND = 5  # parabolas around to a wave
-CELLS = (24, 96)  # parabolas around, least and most
+AROUND_WAVE = 5  # parabolas around to a wave
+AROUND_CELLS = (24, 96)  # parabolas around, least and most
 
 
 @dataclass(frozen=True, slots=True, eq=False)

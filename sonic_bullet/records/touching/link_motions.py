@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.records.arrays import LARGEST, Array
+from sonic_bullet.records.arrays import LARGEST_SI, Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import LogError
 
@@ -46,6 +46,6 @@ def as_motions(rows: object, body: Array) -> Array:
 def check_motions(rows: Array, where: object) -> None:
     """Raise LogError where a number of LINK_MOTION rows is not finite or below what it may be."""
     numbers = np.column_stack([rows["rate_rad_s"], rows["shape"]])
-    finite = numbers.max(initial=0) <= LARGEST and numbers.min(initial=0) >= -LARGEST  # False for NaN too
+    finite = numbers.max(initial=0) <= LARGEST_SI and numbers.min(initial=0) >= -LARGEST_SI  # False for NaN too
     if not finite or (rows["rate_rad_s"] < 0).any() or (rows["mode"] < 0).any():
         raise LogError(f"{where}: motions that are not finite, or of a negative rate", "use an unbroken contact log")

@@ -19,9 +19,9 @@ import numpy as np
 from sonic_bullet.files.gltf.checked_accessors import one_of
 from sonic_bullet.records.rigid_scene import JointKind, RigidJoint, SpeedDrive
 from sonic_bullet.session.gltf_in.node_frames import Nodes
-from sonic_bullet.session.gltf_in.physics import PHYSICS
+from sonic_bullet.session.gltf_in.physics import PHYSICS_EXTENSION
 
-ALL = frozenset((0, 1, 2))
+ALL_AXES = frozenset((0, 1, 2))
 
 
 def joint_of(
@@ -32,11 +32,11 @@ def joint_of(
     number_of: bodies by the numbers of their nodes. Raises the tree's error.
     """
     apart_m = 1e-3
-    said = nodes.extension(index, PHYSICS).get("joint")
+    said = nodes.extension(index, PHYSICS_EXTENSION).get("joint")
     if said is None:
         return None
     name = nodes.name(index)
-    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS, {}).get("physicsJoints", ())
+    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS_EXTENSION, {}).get("physicsJoints", ())
     joint = one_of(nodes.tree, known, said.get("joint"), f"{name}: joint")
     limits, drives = joint.get("limits", ()), joint.get("drives", ())
     owner = _body_above(nodes, index, number_of)
@@ -80,11 +80,11 @@ def _locked(limits: Sequence[Mapping[str, Any]], axes: str) -> frozenset[int]:
 def _kind_of(limits: Sequence[Mapping[str, Any]]) -> tuple[JointKind | None, int]:
     """Find the kind of joint that limits make, and the axis that they leave."""
     ways, turns = _locked(limits, "linearAxes"), _locked(limits, "angularAxes")
-    if ways == ALL:
+    if ways == ALL_AXES:
         kinds: dict[int, JointKind] = {0: "point", 2: "hinge", 3: "fixed"}
-        return kinds.get(len(turns)), min(ALL - turns, default=0)
-    if turns == ALL and len(ways) == 2:
-        return "slider", min(ALL - ways)
+        return kinds.get(len(turns)), min(ALL_AXES - turns, default=0)
+    if turns == ALL_AXES and len(ways) == 2:
+        return "slider", min(ALL_AXES - ways)
     return None, 0
 
 
@@ -107,7 +107,7 @@ def _drive(
 ) -> SpeedDrive | None:
     """Read a joint as a motor, None where it is none."""
     locked = all(
-        set(x.get("angularAxes", ())) == ALL and x.get("min") == x.get("max") == 0 and "linearAxes" not in x
+        set(x.get("angularAxes", ())) == ALL_AXES and x.get("min") == x.get("max") == 0 and "linearAxes" not in x
         for x in limits
     )
     speed = len(drives) == 1 and drives[0].get("type") == "linear" and not drives[0].get("stiffness")

@@ -22,7 +22,7 @@ from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.rigid_scene import PhysicsMaterial
 from sonic_bullet.session.gltf_in.node_frames import UPRIGHT, Nodes
 
-PHYSICS, SHAPES, AUDIO = "KHR_physics_rigid_bodies", "KHR_implicit_shapes", "KHR_audio_rigid_bodies"
+PHYSICS_EXTENSION, SHAPES_EXTENSION, AUDIO = "KHR_physics_rigid_bodies", "KHR_implicit_shapes", "KHR_audio_rigid_bodies"
 UP_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Turns a shape whose axis is z so that it is y."""
 COLLIDER = {"geometry", "physicsMaterial", "extensions", "extras"}
@@ -53,12 +53,12 @@ def body_nodes(nodes: Nodes) -> dict[int, list[int]]:
     """Find each body's node and its colliders': what moves, or sounds, with what hangs on it, else each by itself."""
     found: dict[int, list[int]] = {}
     for i in nodes.in_scene():
-        own = nodes.extension(i, PHYSICS)
+        own = nodes.extension(i, PHYSICS_EXTENSION)
         if "motion" in own:
             found.setdefault(i, [])
         if "collider" in own:
             chain = (i, *nodes.ancestors(i))
-            mover = next((one for one in chain if "motion" in nodes.extension(one, PHYSICS)), None)
+            mover = next((one for one in chain if "motion" in nodes.extension(one, PHYSICS_EXTENSION)), None)
             if mover is None:
                 mover = next((one for one in chain if AUDIO in nodes.entry[one].get("extensions", {})), i)
             found.setdefault(mover, []).append(i)
@@ -69,7 +69,7 @@ def body_frame(nodes: Nodes, index: int) -> BodyFrame:
     """Of a node's body: at its centre of mass, along its principal axes."""
     from scipy.spatial.transform import Rotation
 
-    placed, said = nodes.placed(index), nodes.extension(index, PHYSICS).get("motion", {})
+    placed, said = nodes.placed(index), nodes.extension(index, PHYSICS_EXTENSION).get("motion", {})
     centre = _vector(said, "centerOfMass", f"{nodes.name(index)}: centerOfMass")
     turn = Rotation.from_quat(said.get("inertiaOrientation", (0.0, 0.0, 0.0, 1.0))).as_matrix()
     return BodyFrame(placed.position_m + placed.turn @ (placed.scale * centre), placed.turn @ turn, centre, turn)
@@ -84,7 +84,7 @@ def motion_of(nodes: Nodes, index: int, notes: list[str]) -> BodyMotion:
         "extensions",
         "extras",
     }
-    name, own = nodes.name(index), nodes.extension(index, PHYSICS)
+    name, own = nodes.name(index), nodes.extension(index, PHYSICS_EXTENSION)
     said = own.get("motion")
     zero = np.zeros(3)
     if said is None:
@@ -113,7 +113,7 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
     from scipy.spatial.transform import Rotation
 
     tree, name = nodes.tree, nodes.name(collider)
-    said = nodes.extension(collider, PHYSICS)["collider"]
+    said = nodes.extension(collider, PHYSICS_EXTENSION)["collider"]
     notes += [f"{name}: collider.{key} is not simulated" for key in sorted(set(said) - COLLIDER)]
     placed, geometry = nodes.placed(collider), said.get("geometry", {})
     position = frame.turn.T @ (placed.position_m - frame.centre_m)
@@ -129,7 +129,7 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
         return [
             Shape("mesh", position_m=position, quaternion_xyzw=quaternion(), vertex_m=vertex * placed.scale, face=face)
         ]
-    known = tree.tree.get("extensions", {}).get(SHAPES, {}).get("shapes", ())
+    known = tree.tree.get("extensions", {}).get(SHAPES_EXTENSION, {}).get("shapes", ())
     shape = one_of(tree, known, geometry["shape"], f"{name}: shape")
     kind = str(shape.get("type"))
     own = shape.get(kind, {})
@@ -172,8 +172,8 @@ def _mesh_of(nodes: Nodes, geometry: Mapping[str, Any], name: str) -> Mapping[st
 
 def physics_of(nodes: Nodes, colliders: list[int], name: str, notes: list[str]) -> PhysicsMaterial:
     """Friction and restitution of a body's colliders: those of the first."""
-    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS, {}).get("physicsMaterials", ())
-    indices = [nodes.extension(i, PHYSICS)["collider"].get("physicsMaterial") for i in colliders]
+    known = nodes.tree.tree.get("extensions", {}).get(PHYSICS_EXTENSION, {}).get("physicsMaterials", ())
+    indices = [nodes.extension(i, PHYSICS_EXTENSION)["collider"].get("physicsMaterial") for i in colliders]
     if len(set(indices)) > 1:
         notes.append(f"{name} has several physics materials: that of its first collider counts")
     if not indices or indices[0] is None:

@@ -17,7 +17,7 @@ from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
 
-MICROPHONE = (0.0, -1.0, 0.5)
+GLTF_MICROPHONE = (0.0, -1.0, 0.5)
 
 
 def run_gltf(
@@ -30,7 +30,7 @@ def run_gltf(
     stage.client = client = direct_client()
     watch_settings(client)
     ids, act, notes = build_rigid_scene(client, scene)
-    places = stage.microphones if stage.microphones is not None else MICROPHONE
+    places = stage.microphones if stage.microphones is not None else GLTF_MICROPHONE
     stage.microphones = None
     stage.listener = listener = stage.attached(client, places)
     for body_id, body in zip(ids, scene.bodies, strict=True):

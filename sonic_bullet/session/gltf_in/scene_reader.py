@@ -30,8 +30,8 @@ from sonic_bullet.session.gltf_in.own_words import FREE, own_mounting
 from sonic_bullet.session.gltf_in.physics import (
     AUDIO,
     GRAVITY_M_S2,
-    PHYSICS,
-    SHAPES,
+    PHYSICS_EXTENSION,
+    SHAPES_EXTENSION,
     body_frame,
     body_nodes,
     collider_shapes,
@@ -39,9 +39,9 @@ from sonic_bullet.session.gltf_in.physics import (
     physics_of,
 )
 
-REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
-READ = {PHYSICS, SHAPES, AUDIO, "KHR_texture_transform", "KHR_mesh_quantization"}
-LOOKS = ("KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "EXT_meshopt", "KHR_xmp")
+GLTF_REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
+READ_EXTENSIONS = {PHYSICS_EXTENSION, SHAPES_EXTENSION, AUDIO, "KHR_texture_transform", "KHR_mesh_quantization"}
+LOOKS_EXTENSIONS = ("KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "EXT_meshopt", "KHR_xmp")
 """Beginnings of extensions that only change what is seen."""
 
 
@@ -53,19 +53,23 @@ def is_gltf(path: str | os.PathLike[str]) -> bool:
 def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
     """Bodies, materials and models of a scene. Raises FileError, SceneError, RecordError, each one line."""
     bytes_max = 1 << 30
-    with reading(path, "glTF scene", SceneError, REMEDY):
+    with reading(path, "glTF scene", SceneError, GLTF_REMEDY):
         if Path(path).stat().st_size > bytes_max:
             raise SceneError(f"{path} is larger than a gigabyte", "split it")
-        return _scene_of(read_tree(Path(path), SceneError, REMEDY), Path(path).name)
+        return _scene_of(read_tree(Path(path), SceneError, GLTF_REMEDY), Path(path).name)
 
 
 def _scene_of(tree: GltfTree, name: str) -> RigidScene:
     nodes, notes = Nodes(tree), list[str]()
     used = [str(x) for x in tree.tree.get("extensionsUsed", ())]
-    notes += [f"{name} uses {x}, which is not read" for x in used if x not in READ and not x.startswith(LOOKS)]
+    notes += [
+        f"{name} uses {x}, which is not read"
+        for x in used
+        if x not in READ_EXTENSIONS and not x.startswith(LOOKS_EXTENSIONS)
+    ]
     found = body_nodes(nodes)
     if not found:
-        raise SceneError(f"{name} has no rigid body: its extensions are {', '.join(used) or 'none'}", REMEDY)
+        raise SceneError(f"{name} has no rigid body: its extensions are {', '.join(used) or 'none'}", GLTF_REMEDY)
     modelled = bool(audio_of(nodes).get("modalModels"))
     bodies: list[RigidBody] = []
     number_of: dict[int, int] = {}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.listener.animated import AnimatedBody, rotation
-from sonic_bullet.listener.frames import MOTION
+from sonic_bullet.listener.frames import LINK_STATE
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_kinds, as_number, shown
@@ -118,7 +118,7 @@ class Animation:
         In the first frame, those since a frame before it that gravity alone would have led from. A semi-implicit
         integrator starts its step with just these: x(n) = x(n-1) + v(n)·dt.
         """
-        motion = np.zeros(self.position_m.shape[:2], MOTION)
+        motion = np.zeros(self.position_m.shape[:2], LINK_STATE)
         motion["position_m"], motion["quaternion_xyzw"] = self.position_m, self.quaternion_xyzw
         motion["velocity_m_s"][1:] = np.diff(self.position_m, axis=0) * self.fps
         motion["spin_rad_s"][1:] = rotation(self.quaternion_xyzw[:-1], self.quaternion_xyzw[1:]) * self.fps

@@ -13,7 +13,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import QUARTER_RAD, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import near_pairs, speeds
 
-STEADY = 0.1
+STEADY_FALL = 0.1
 """Relative change of an acceleration from frame to frame that is still a fall: air, and float32 poses."""
 LEAST_FRAMES = 4
 FALL_RANGE = (0.02, 5.0)
@@ -44,7 +44,7 @@ def _steady(a: Array, animation: Animation) -> Array:
     """Return (a - 1, b) whether an acceleration is the next frame's too, downwards, and not small."""
     down = animation.gravity_m_s2
     size = np.linalg.norm(a, axis=2)
-    same = np.linalg.norm(a[1:] - a[:-1], axis=2) < STEADY * size[:-1]
+    same = np.linalg.norm(a[1:] - a[:-1], axis=2) < STEADY_FALL * size[:-1]
     along = (a @ down)[:-1] > 0.9 * size[:-1] * max(float(np.linalg.norm(down)), 1e-12)
     return np.asarray(same & along & (size[:-1] > 0.05) & animation.free)
 
@@ -54,7 +54,7 @@ def fall_m_s2(animation: Animation, noise_m: float | None = None) -> float | Non
 
     A body that leans on something falls slower, none faster: the fastest tenth is free.
     """
-    within_m_s2 = STEADY * float(np.linalg.norm(animation.gravity_m_s2))
+    within_m_s2 = STEADY_FALL * float(np.linalg.norm(animation.gravity_m_s2))
     a = accelerations(animation, frames_apart(animation, noise_m, within_m_s2))
     steady = _steady(a, animation)
     if steady.sum() < LEAST_FRAMES:
@@ -144,11 +144,11 @@ def hidden_turns(animation: Animation) -> Array:
 def unforced(animation: Animation, noise_m: float | None) -> Array:
     """Return (t - 1, b) which bodies rotate by a hidden amount while their centre falls as without contact.
 
-    At either end of the interval the second difference of its places is gravity's to `STEADY` of it and to what noise
-    hides.
+    At either end of the interval the second difference of its places is gravity's to `STEADY_FALL` of it and to what
+    noise hides.
     """
     fall_m_s = float(np.linalg.norm(animation.gravity_m_s2)) / animation.fps
-    least_m_s = STEADY * fall_m_s + (0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps))
+    least_m_s = STEADY_FALL * fall_m_s + (0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps))
     off = (accelerations(animation) - animation.gravity_m_s2) / animation.fps
     given = np.zeros(animation.position_m.shape[:2], bool)
     given[1:-1] = np.linalg.norm(off, axis=2) > least_m_s

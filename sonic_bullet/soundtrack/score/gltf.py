@@ -32,7 +32,7 @@ from sonic_bullet.soundtrack.score.keyframes import tipped, upright
 BYTES_MAX = 1 << 30
 POSES_MAX = 2_000_000
 """Of all nodes: half a gigabyte while they are read."""
-_REMEDY = "export it again as glTF 2.0 (.glb)"
+ANIMATION_REMEDY = "export it again as glTF 2.0 (.glb)"
 
 
 def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
@@ -42,10 +42,10 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
     """
     late_s = 1e-3
     place = Path(path)
-    with reading(path, "glTF file", AnimationError, _REMEDY):
+    with reading(path, "glTF file", AnimationError, ANIMATION_REMEDY):
         if place.stat().st_size > BYTES_MAX:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
-        file = read_tree(place, AnimationError, _REMEDY)
+        file = read_tree(place, AnimationError, ANIMATION_REMEDY)
         channels = read_channels(file)
         if not channels:
             raise AnimationError(
@@ -91,7 +91,7 @@ def _objects(
     def world(i: int, depth: int = 0) -> Array:
         """Compute the global transform (t, 4, 4) of a node."""
         if depth > len(nodes):
-            raise AnimationError("its nodes hang on themselves", _REMEDY)
+            raise AnimationError("its nodes hang on themselves", ANIMATION_REMEDY)
         if i not in known:
             own = local_transforms(nodes[i], channels.get(i, {}), at_s)
             known[i] = world(parent[i], depth + 1) @ own if i in parent else own

@@ -24,7 +24,7 @@ from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.frame_rates import fraction_of
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 
-FORMAT = "sonic-bullet-animation/1"
+ANIMATION_FORMAT = "sonic-bullet-animation/1"
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -78,7 +78,7 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
         if place.stat().st_size > bytes_max:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         if place.suffix.lower() == ".npz":
-            made, arrays = read_container(place, _File, FORMAT, "animation")
+            made, arrays = read_container(place, _File, ANIMATION_FORMAT, "animation")
             many = len(made.bodies)
             position, turn = (_numbers(arrays, name, many, n) for name, n in (("position", 3), ("quaternion_xyzw", 4)))
             poses = [(position[:, i], turn[:, i]) for i in range(many)]

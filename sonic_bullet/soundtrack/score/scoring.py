@@ -39,7 +39,7 @@ from sonic_bullet.soundtrack.score.flight import (
 )
 from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
-MICROPHONE = (0.0, -1.0, 0.5)
+SCORE_MICROPHONE = (0.0, -1.0, 0.5)
 DEEP_M = 0.01
 """How deep poses may overlap at a frame and still be one touch of two bodies."""
 
@@ -78,7 +78,7 @@ def score_animation(
     scale: float = 1.0,
     sr: int = 48_000,
     seed: int = 0,
-    microphones: MicrophoneLike = MICROPHONE,
+    microphones: MicrophoneLike = SCORE_MICROPHONE,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
     tail_db: float | None = None,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import OUTSIDE, WINDOW
+from sonic_bullet.estimator.perceptual.image import IMAGE_WINDOW, OUTSIDE
 from sonic_bullet.machine.compiled import njit
 
 NODES = 8  # of the loudness table, an octave of power
@@ -94,10 +94,10 @@ def frame(freq_hz, decay_per_s, amplitude, reach, sr, late_s, length, hop):  # t
             turned *= step
         for k in range(count):
             value = (
-                WINDOW[0] * geometric[k + 3]
-                - 0.5 * WINDOW[1] * (geometric[k + 2] + geometric[k + 4])
-                + 0.5 * WINDOW[2] * (geometric[k + 1] + geometric[k + 5])
-                - 0.5 * WINDOW[3] * (geometric[k] + geometric[k + 6])
+                IMAGE_WINDOW[0] * geometric[k + 3]
+                - 0.5 * IMAGE_WINDOW[1] * (geometric[k + 2] + geometric[k + 4])
+                + 0.5 * IMAGE_WINDOW[2] * (geometric[k + 1] + geometric[k + 5])
+                - 0.5 * IMAGE_WINDOW[3] * (geometric[k] + geometric[k + 6])
             )
             fade = min(1.0, radius - abs(reach[j, 0] + k - centre))
             shapes[0, at + k], shapes[1, at + k] = fade * value.real, fade * value.imag

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import AudioWriter, read_audio, write_audio
-from sonic_bullet.files.riff.wave_chunks import LAST_SAMPLE, TEXT_BYTES, Cue, wave_chunks
+from sonic_bullet.files.riff.wave_chunks import CHUNK_TEXT_BYTES, LAST_SAMPLE, Cue, wave_chunks
 from sonic_bullet.records.errors import FileError, RecordError
 from tests.made.disks import full_disk
 
@@ -78,7 +78,7 @@ def test_what_does_not_fit_is_cut_or_left_out() -> None:
     long = wave_chunks([Cue(5, 0, "ü\0" * 500), Cue(2**40, 0, "beyond")])
     assert struct.unpack_from("<I", long, 8 + 602 + 8)[0] == 1
     label = long[long.index(b"labl") + 12 :]
-    assert len(label.rstrip(b"\0")) <= TEXT_BYTES
+    assert len(label.rstrip(b"\0")) <= CHUNK_TEXT_BYTES
     label.rstrip(b"\0").decode()
     with pytest.raises(RecordError, match="cue"):
         Cue(-1, 0, "x")

@@ -18,7 +18,7 @@ from sonic_bullet.soundtrack.frame_rates import nearest_rate, rate_of_keys
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
 from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
-from sonic_bullet.soundtrack.score.keyframes import FORMAT, read_rules
+from sonic_bullet.soundtrack.score.keyframes import ANIMATION_FORMAT, read_rules
 from sonic_bullet.soundtrack.score.scoring import read_animation
 from tests.made.animations import (
     EDGES_M,
@@ -41,7 +41,9 @@ def test_three_files_of_one_scene_are_one_animation(tmp_path: Path) -> None:
     place = np.stack([keys.position_m[one] for one in keys.mesh], axis=1)
     turn = np.stack([keys.quaternion_xyzw[one] for one in keys.mesh], axis=1)
     bare = [{key: one[key] for key in ("name", "mesh")} for one in text["bodies"]]
-    header = json.dumps({"format": FORMAT, "fps": 240, "bodies": bare}).encode()  # as export_from_blender.py writes it
+    header = json.dumps(
+        {"format": ANIMATION_FORMAT, "fps": 240, "bodies": bare}
+    ).encode()  # as export_from_blender.py writes it
     np.savez(tmp_path / "a.npz", header=np.frombuffer(header, np.uint8), position=place, quaternion_xyzw=turn)
     made = [assembled(read_animation(tmp_path / f"a.{end}"), (), "plastic")[0] for end in ("json", "npz", "glb")]
     for one, within in zip(made[1:], (1e-12, 1e-6), strict=True):

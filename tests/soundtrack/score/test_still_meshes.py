@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.animated import AnimatedBody
-from sonic_bullet.listener.frames import MOTION
+from sonic_bullet.listener.frames import LINK_STATE
 from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage
 from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
 from sonic_bullet.records import Array, Shape
@@ -110,7 +110,7 @@ def test_a_fine_bowl_is_hollow() -> None:
         "mesh", vertex_m=bowl, face=np.concatenate([of_quads(bowl, quads)[1], [(0, i, i + 1) for i in range(31)]])
     )
     assert pieces(shape, "bowl", False) == []
-    motion = np.zeros(2, MOTION)
+    motion = np.zeros(2, LINK_STATE)
     motion["quaternion_xyzw"][:, 3] = 1
     with AnimatedStage((AnimatedBody("bowl", (shape,), 0.0, np.zeros(3)), ball_body()), np.zeros(3)) as stage:
         for tilt in (0.0, 0.8):

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from sonic_bullet.estimator.lines.log_spectral import (
-    ABOVE,
+    ABOVE_NOISE,
     FEWEST_CELLS,
     HIDING,
     Floor,
@@ -24,12 +24,12 @@ from sonic_bullet.estimator.lines.log_spectral import (
 )
 from sonic_bullet.records import Array
 
-STEP_DB, WITHIN_DB = 1.0, 2.0
+GAIN_STEP_DB, WITHIN_DB = 1.0, 2.0
 BELOW_DB, OVER_DB = 10.0, 40.0
 """The grid begins where the loudest cell is that far below its noise, and ends that far over equal energy."""
-CELLS = 6000
+GRID_CELLS = 6000
 """Of a window and of a kind that the grid is searched by, at most: D to some 0.1 dB."""
-LOWEST = 2
+REFINED_MINIMA = 2
 """Minima of the grid that are refined."""
 
 
@@ -78,10 +78,10 @@ def find_best_gain(
 def find_nearest_take(power: tuple[Array, ...], takes: list[tuple[Array, ...]], floor: Floor) -> float:
     """Distance in dB of the nearest of other takes at its best gain, by power spectra; NaN where there is none.
 
-    All are searched by some cells, the `LOWEST` nearest by all.
+    All are searched by some cells, the `REFINED_MINIMA` nearest by all.
     """
     searched = [_searched(power, take, floor, True) for take in takes]
-    order = np.argsort([costs.min(initial=np.inf) for _, costs in searched], kind="stable")[:LOWEST]
+    order = np.argsort([costs.min(initial=np.inf) for _, costs in searched], kind="stable")[:REFINED_MINIMA]
     found = [_refined(power, takes[k], floor, searched[k], True).distance_db for k in order]
     return float(np.nanmin(found)) if np.isfinite(found).any() else float("nan")
 
@@ -109,7 +109,7 @@ def _refined(
     def cost(db: float) -> float:
         return distance_at(power, made, floor, 10 ** (db / 20), recorded=recorded)
 
-    for at in minima[np.argsort(costs[minima], kind="stable")][:LOWEST]:
+    for at in minima[np.argsort(costs[minima], kind="stable")][:REFINED_MINIMA]:
         level = 20 * np.log10(grid[at])
         near = (level - WITHIN_DB, level + WITHIN_DB)
         best = minimize_scalar(cost, bounds=near, method="bounded", options={"xatol": 0.1})
@@ -132,7 +132,7 @@ def _grid(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor) -> Ar
         return np.zeros(0)
     top = 10 * np.log10(max(level[0], 1e-300) / level[1]) + OVER_DB
     bottom = min(-10 * np.log10(over) - BELOW_DB, top)
-    return np.asarray(10 ** (np.arange(bottom, top + STEP_DB, STEP_DB) / 20))
+    return np.asarray(10 ** (np.arange(bottom, top + GAIN_STEP_DB, GAIN_STEP_DB) / 20))
 
 
 def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, *, added: bool) -> list[Array]:
@@ -147,12 +147,12 @@ def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, 
         inside = np.flatnonzero(cell[0] < HIDING)
         noise = np.broadcast_to(cell, p.shape)[:count, inside].ravel()
         ours, theirs = p[:count, inside].ravel(), m[:count, inside].ravel()
-        always = ours > 2 * ABOVE * noise
+        always = ours > 2 * ABOVE_NOISE * noise
         loud = np.argsort(-theirs / noise, kind="stable")  # those that come to count first, whole; evenly from there
         loud = loud[: int((theirs > 0).sum())]
         rows = []
-        for which in (np.flatnonzero(always), *np.split(loud[~always[loud]], [CELLS])):
-            some = which[np.linspace(0, len(which) - 1, min(CELLS, len(which))).round().astype(int)]
+        for which in (np.flatnonzero(always), *np.split(loud[~always[loud]], [GRID_CELLS])):
+            some = which[np.linspace(0, len(which) - 1, min(GRID_CELLS, len(which))).round().astype(int)]
             weight = np.full(len(some), len(which) / max(len(some), 1))
             rows.append(np.stack([ours[some], theirs[some], noise[some], np.full(len(some), float(added)), weight]))
         found.append(np.concatenate(rows, axis=1))
@@ -165,7 +165,7 @@ def _distances_of_few(few: list[Array], gain: Array) -> Array:
     for ours, theirs, noise, added, weight in few:
         share = np.maximum(added, np.maximum(0.0, 1 - gain[:, None] ** 2))
         played = gain[:, None] ** 2 * theirs + share * noise
-        counted = weight * ((ours + played) / 2 > ABOVE * noise)
+        counted = weight * ((ours + played) / 2 > ABOVE_NOISE * noise)
         off = (10 * np.log10((ours + 1e-3 * noise) / (played + 1e-3 * noise))) ** 2
         count = counted.sum(axis=1)
         rows.append(np.sqrt((counted * off).sum(axis=1) / np.maximum(count, 1e-300)))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from sonic_bullet.listener.pybullet.colliding.pieces import Piece
 
 MARGIN_M = 0.04
-FINE = 0.2
+FINE_TURN = 0.2
 LARGEST_FILE = 1 << 24
 LOADED = re.compile(r'^objects = p\.loadMJCF\("(.*)"\)$', re.MULTILINE)
 Ends = tuple[float, ...] | None
@@ -61,7 +61,7 @@ def must_not_be_asked(client_id: int, body: int, drawn: tuple[Piece, ...]) -> bo
 
 def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]) -> tuple[Piece, ...] | None:
     """Return the collision pieces, body frame, of a link that must not be queried; None where they cannot be known."""
-    if fills(client_id, body, link, drawn, fine=FINE):
+    if fills(client_id, body, link, drawn, fine=FINE_TURN):
         return drawn
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     back = pybullet.invertTransform(info[3], info[4])
@@ -72,10 +72,10 @@ def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]
             placed = _placed(drawn, geoms, back)
             if placed is not None:
                 grown = [MARGIN_M if ends is not None else 0.0 for ends in geoms]
-                if fills(client_id, body, link, placed, grown, fine=FINE) and placed not in found:
+                if fills(client_id, body, link, placed, grown, fine=FINE_TURN) and placed not in found:
                     found.append(placed)
     all_by_ends = [MARGIN_M if piece.kind == pybullet.GEOM_CAPSULE else 0.0 for piece in drawn]
-    if not found and fills(client_id, body, link, drawn, all_by_ends, fine=FINE):
+    if not found and fills(client_id, body, link, drawn, all_by_ends, fine=FINE_TURN):
         return drawn
     return found[0] if len(found) == 1 else None
 

@@ -18,7 +18,7 @@ from sonic_bullet.listener.pybullet.colliding.mjcf_capsules import must_not_be_a
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array
 
-KINDS = {
+PIECE_KINDS = {
     pybullet.GEOM_SPHERE,
     pybullet.GEOM_BOX,
     pybullet.GEOM_CYLINDER,
@@ -88,7 +88,7 @@ def _maximal_pieces(client_id: int, body: int) -> tuple[tuple[Piece, ...], bool]
     with reduced_body(client_id, body) as other:
         if other is not None:
             return collision_pieces(*other, -1), False
-    drawn = tuple(piece for piece in visual_pieces(client_id, body, -1) if piece.kind in KINDS)
+    drawn = tuple(piece for piece in visual_pieces(client_id, body, -1) if piece.kind in PIECE_KINDS)
     if fills(client_id, body, -1, drawn):
         return drawn, True
     if len(drawn) == 1 and drawn[0].kind == pybullet.GEOM_MESH and len(hull_vertices(client_id, body, -1, 0)):

@@ -19,13 +19,13 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import BodyPath, RigidBody
 
 IMMOVABLE_KG = 1e6
-SIZE_M = 1.0
+KINEMATIC_SIZE_M = 1.0
 """Of the sphere whose moments it has."""
 
 
 def as_kinematic(body: RigidBody) -> RigidBody:
     """Make a body so heavy that nothing moves it."""
-    moments = np.full(3, 0.4 * IMMOVABLE_KG * SIZE_M**2)
+    moments = np.full(3, 0.4 * IMMOVABLE_KG * KINEMATIC_SIZE_M**2)
     return replace(body, mass_kg=IMMOVABLE_KG, inertia_kg_m2=moments)
 
 

@@ -24,7 +24,7 @@ from sonic_bullet.listener.pybullet.staged.body_shapes import collision_options,
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import CombineRule, PhysicsMaterial, RigidBody, RigidScene, SpeedDrive
 
-RULES: tuple[CombineRule, ...] = ("average", "minimum", "multiply", "maximum")
+COMBINE_RULES: tuple[CombineRule, ...] = ("average", "minimum", "multiply", "maximum")
 """Of two rules the later counts [KHR_physics_rigid_bodies, Physics Materials]."""
 PAIR_OFF = 0.01
 LOCKED = 1e6
@@ -94,7 +94,7 @@ def combined_restitution(a: PhysicsMaterial, b: PhysicsMaterial) -> float:
 
 
 def _combined(a: float, b: float, of_a: CombineRule, of_b: CombineRule) -> float:
-    match max(of_a, of_b, key=RULES.index):
+    match max(of_a, of_b, key=COMBINE_RULES.index):
         case "average":
             return (a + b) / 2
         case "minimum":

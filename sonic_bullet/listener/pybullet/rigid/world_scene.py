@@ -27,7 +27,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.rigid_scene import JointKind, PhysicsMaterial, RigidBody, RigidJoint, RigidScene
 
-KINDS: dict[int, JointKind] = {
+JOINT_KINDS: dict[int, JointKind] = {
     pybullet.JOINT_REVOLUTE: "hinge",
     pybullet.JOINT_PRISMATIC: "slider",
     pybullet.JOINT_SPHERICAL: "point",
@@ -95,7 +95,7 @@ def _link_joints(
     for body, count, _ in bodies:
         for link in range(count):
             info = pybullet.getJointInfo(body, link, physicsClientId=client_id)
-            name, kind = info[1].decode(errors="replace"), KINDS.get(info[2])
+            name, kind = info[1].decode(errors="replace"), JOINT_KINDS.get(info[2])
             state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=client_id)
             ends = number.get((body, link)), number.get((body, info[16]))
             if kind is None or ends[0] is None or ends[1] is None:
@@ -119,7 +119,7 @@ def _constraints(client_id: int, number: dict[Link, int], notes: list[str]) -> l
     for i in range(pybullet.getNumConstraints(physicsClientId=client_id)):
         one = pybullet.getConstraintUniqueId(i, physicsClientId=client_id)
         info = pybullet.getConstraintInfo(one, physicsClientId=client_id)
-        parent, child, kind = (info[0], info[1]), (info[2], info[3]), KINDS.get(info[4])
+        parent, child, kind = (info[0], info[1]), (info[2], info[3]), JOINT_KINDS.get(info[4])
         ends = number.get(parent), -1 if info[2] < 0 else number.get(child)
         if kind is None or ends[0] is None or ends[1] is None:
             why = "it is no point, fixed or prismatic one" if kind is None else "one of its links has no shape"

@@ -13,7 +13,7 @@ import numpy as np
 import pybullet
 
 from sonic_bullet.listener.animated import AnimatedBody, Shot, matrices, rotation
-from sonic_bullet.listener.frames import MOTION, Motion, turned
+from sonic_bullet.listener.frames import LINK_STATE, Motion, turned
 from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
@@ -181,7 +181,7 @@ class AnimatedStage:
         self.hold(True)
         pybullet.setTimeStep(dt_s, physicsClientId=cid)
         course = between(start, end, steps, dt_s)
-        motion, raws = np.zeros((steps + 1, many), MOTION), []
+        motion, raws = np.zeros((steps + 1, many), LINK_STATE), []
         touching, loaded = np.zeros((many, many), bool), np.zeros((many, many), bool)
         for row in range(many):
             self._set(row, start[row] if not self.held[row] else course[0, row])
@@ -291,7 +291,7 @@ def _raw(a: int, b: int, point_a: Any, point_b: Any, normal: Any, gap: float) ->
 
 def between(start: Array, end: Array, steps: int, dt_s: float) -> Array:
     """Interpolate MOTION (steps + 1, b) straight from a pose to another, with the speed of that path."""
-    course = np.zeros((steps + 1, len(start)), MOTION)
+    course = np.zeros((steps + 1, len(start)), LINK_STATE)
     move = end["position_m"] - start["position_m"]
     turn = rotation(start["quaternion_xyzw"], end["quaternion_xyzw"])
     for step in range(steps + 1):

@@ -18,11 +18,11 @@ from sonic_bullet.listener.pybullet.urdf_meshes import hull
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError, MeshError
 
-MOST = 64
+MOST_PIECES = 64
 """Most pieces of one body: with more, PyBullet takes longer than for triangles."""
 CONVEX = 0.02
 """Fraction of volume or area by which the hull of a convex part may be larger: rounded corners."""
-FLAT = 1e-3
+FLAT_FACE = 1e-3
 """Deviation of a flat face's corners, relative to its size."""
 
 
@@ -39,11 +39,11 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
     if moves:
         solid = [own for own, _ in parts if len(own) >= 4]
         try:
-            return [hull(own)[0] for own in (solid if 0 < len(solid) <= MOST else [vertex])]
+            return [hull(own)[0] for own in (solid if 0 < len(solid) <= MOST_PIECES else [vertex])]
         except MeshError as error:
             raise AnimationError(f"body '{name}': its mesh is flat", "give it thickness") from error
     found = [piece for part in parts for piece in _still(*part)]
-    return found if len(found) <= MOST else []
+    return found if len(found) <= MOST_PIECES else []
 
 
 def _connected(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
@@ -98,7 +98,7 @@ def _flat_faces(vertex: Array, face: Array) -> Iterator[Array]:
         plane, reached, ahead = normal[first], [first], [first]
         while ahead:
             for other in near[ahead.pop()] & left:
-                if abs(normal[other] @ plane) > 1 - FLAT**2:
+                if abs(normal[other] @ plane) > 1 - FLAT_FACE**2:
                     left.discard(other)
                     reached.append(other)
                     ahead.append(other)

@@ -22,7 +22,7 @@ from sonic_bullet.records.errors import MeshError, SceneError
 
 FACES_MOST = 40_000
 """Most faces of a shape: PyBullet takes 131 072 vertices, and here each face has its own three."""
-TILE = 32
+PICTURE_TILE = 32
 """Pixels by which the drawn part grows: the renderer allocates its memory anew for every other size."""
 LIGHT = (0.4, -0.6, 1.2)
 FAR_AWAY = (0.0, 0.0, -1e5)
@@ -88,8 +88,14 @@ class PyBulletPictures:
         # a sphere's outline reaches beyond r·f/z: by less than z/√(z²-r²) < 1.16 in angle, and off the middle once more
         wide = 1.5 * focal * radius_m / z * (1 + (x**2 + y**2) / z**2)
         across, down = width / 2 + focal * x / z, height / 2 - focal * y / z
-        low = [(edge // TILE) * TILE for edge in ((across - wide).min(initial=1e9), (down - wide).min(initial=1e9))]
-        high = [-(-edge // TILE) * TILE for edge in ((across + wide).max(initial=-1), (down + wide).max(initial=-1))]
+        low = [
+            (edge // PICTURE_TILE) * PICTURE_TILE
+            for edge in ((across - wide).min(initial=1e9), (down - wide).min(initial=1e9))
+        ]
+        high = [
+            -(-edge // PICTURE_TILE) * PICTURE_TILE
+            for edge in ((across + wide).max(initial=-1), (down + wide).max(initial=-1))
+        ]
         return (
             int(max(low[0], 0)), int(max(low[1], 0)), int(min(high[0], width)), int(min(high[1], height))
         )  # fmt: skip
