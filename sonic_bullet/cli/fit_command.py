@@ -22,35 +22,6 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
-FIT_COLUMNS = (
-    "object",
-    "freq_hz",
-    "freq_sd_hz",
-    "decay_per_s",
-    "decay_sd_per_s",
-    "t60_s",
-    "t60_sd_s",
-    "loss_factor",
-    "loss_factor_sd",
-    "q",
-    "q_sd",
-    "mode_hz",
-)
-OF_ONE_TAKE = (
-    "mesh",
-    "strike",
-    "direction",
-    "impulse",
-    "material",
-    "scale",
-    "sensor",
-    "sensor_at",
-    "sensor_direction",
-    "onset_s",
-    "fixed",
-    "channel",
-    "medium",
-)
 
 
 def run_fit(
@@ -65,6 +36,20 @@ def run_fit(
     **one: Any,
 ) -> None:
     """Run `fit`; raises SonicBulletError."""
+    fit_columns = (
+        "object",
+        "freq_hz",
+        "freq_sd_hz",
+        "decay_per_s",
+        "decay_sd_per_s",
+        "t60_s",
+        "t60_sd_s",
+        "loss_factor",
+        "loss_factor_sd",
+        "q",
+        "q_sd",
+        "mode_hz",
+    )
     if not output.endswith(".json"):
         raise FileError(f"cannot write {output}: presets are JSON files", "end the name with .json")
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
@@ -92,7 +77,7 @@ def run_fit(
             write_fit_picture(picture, found)
         say(_summary(found, preset))
     warn(found.warnings)
-    write_csv(csv_to, line_rows(found), FIT_COLUMNS)
+    write_csv(csv_to, line_rows(found), fit_columns)
     write_json(json_to, described(found))
     if found.worse_than_silence:
         raise click.exceptions.Exit(1)
@@ -115,9 +100,24 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     FileError
         The source cannot be read, or options are missing or wrong.
     """
+    of_one_take = (
+        "mesh",
+        "strike",
+        "direction",
+        "impulse",
+        "material",
+        "scale",
+        "sensor",
+        "sensor_at",
+        "sensor_direction",
+        "onset_s",
+        "fixed",
+        "channel",
+        "medium",
+    )
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
-        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in OF_ONE_TAKE if one[name] not in (None, ())]
+        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one_take if one[name] not in (None, ())]
         if given:
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)

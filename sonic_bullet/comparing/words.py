@@ -17,30 +17,6 @@ from sonic_bullet.listener.calls import Call, InputFile, Who, same
 if TYPE_CHECKING:
     from sonic_bullet.comparing.comparison_record import Comparison
 
-QUANTITY_UNITS = {
-    "mass": "kg",
-    "start position": "m",
-    "start velocity": "m/s",
-    "start spin": "rad/s",
-    "gravity": "m/s²",
-    "force": "N",
-    "torque": "N m",
-    "largest force": "N",
-    "joint position": "m",
-    "time step": "s",
-    "inertia": "kg m²",
-    "density_kg_m3": "kg/m³",
-    "stiffness_pa": "Pa",
-    "roughness_m": "m",
-    "sr": "Hz",
-    "seconds": "s",
-    "shape radius": "m",
-    "shape halfExtents": "m",
-    "shape height": "m",
-    "to_hz": "Hz",
-    "thickness_m": "m",
-    "sound_speed_m_s": "m/s",
-}
 PLAIN_WORDS = {
     "density_kg_m3": "density",
     "stiffness_pa": "stiffness",
@@ -85,9 +61,33 @@ def logged_words(one: Logged) -> str:
 
 def change_words(what: str, a: Any, b: Any) -> str:
     """Describe a change: "density 7850 → 7929 kg/m³ (+1.0 %)"."""
+    quantity_units = {
+        "mass": "kg",
+        "start position": "m",
+        "start velocity": "m/s",
+        "start spin": "rad/s",
+        "gravity": "m/s²",
+        "force": "N",
+        "torque": "N m",
+        "largest force": "N",
+        "joint position": "m",
+        "time step": "s",
+        "inertia": "kg m²",
+        "density_kg_m3": "kg/m³",
+        "stiffness_pa": "Pa",
+        "roughness_m": "m",
+        "sr": "Hz",
+        "seconds": "s",
+        "shape radius": "m",
+        "shape halfExtents": "m",
+        "shape height": "m",
+        "to_hz": "Hz",
+        "thickness_m": "m",
+        "sound_speed_m_s": "m/s",
+    }
     last = what.rsplit(maxsplit=1)[-1]
     key = last if last in PLAIN_WORDS else what
-    name, unit = PLAIN_WORDS.get(key, what), QUANTITY_UNITS.get(key, "")
+    name, unit = PLAIN_WORDS.get(key, what), quantity_units.get(key, "")
     unit = f" {unit}" if unit else ""
     if a is None or b is None:
         return f"{name} {shown(a)} → {shown(b)}{unit}"

@@ -17,7 +17,6 @@ from sonic_bullet.records import Shape
 from sonic_bullet.session.known_shapes import KnownShape, known_shape
 
 IMPACT_MATERIALS = ("steel", "aluminium", "brass", "copper", "glass", "porcelain", "plastic", "wood")
-FLOOR_MATERIAL = "concrete"
 SIZES = (0.6, 1.4)
 
 
@@ -98,6 +97,7 @@ def build(
     spin_rad_s: list[float],
 ) -> dict[int, Any]:
     """Set up a floor and the body above it."""
+    floor_material = "concrete"
     made = load_material(material)
     model = known(object, material).model(size, made)
     client.setGravity(0, 0, -9.81)
@@ -110,11 +110,11 @@ def build(
         baseOrientation=np.array(quaternion_xyzw) / np.linalg.norm(quaternion_xyzw),
     )
     client.resetBaseVelocity(body, angularVelocity=spin_rad_s)
-    for one, of in ((floor, load_material(FLOOR_MATERIAL)), (body, made)):
+    for one, of in ((floor, load_material(floor_material)), (body, made)):
         client.changeDynamics(one, -1, restitution=of.restitution, lateralFriction=0.5, linearDamping=0)
     keep_restitution(client)
     return {
-        floor: {"material": FLOOR_MATERIAL, "name": "floor"},
+        floor: {"material": floor_material, "name": "floor"},
         body: {"material": made, "model": model, "name": object},
     }
 

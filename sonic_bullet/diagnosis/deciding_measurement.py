@@ -14,11 +14,6 @@ from sonic_bullet.effects.protocol import Dereverberates
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement as of_fit
 
-DIFFERS = 0.5
-"""Standard deviation of ln of what is left, over strikes: more goes with the place or the strike."""
-NO_MODE = 0.5
-"""Of what is left, that no modes play."""
-
 
 def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[str, Any]) -> str:
     """Name the one measurement that would decide; after a verdict that leaves nothing open, the fit's."""
@@ -27,6 +22,8 @@ def next_measurement(found: CaseFit, end: Closed | NothingCompared, left: dict[s
 
 def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
     """Yield a measurement for each thing that is open, the most important first."""
+    differs = 0.5  # Standard deviation of ln of what is left, over strikes: more goes with the place or the strike
+    no_mode = 0.5  # of what is left, that no modes play
     most = max(left["when"], key=left["when"].__getitem__)
     slope, slope_sd = left["slope_against_impulse"], left["slope_standard_error"]
     if len(end.judged) == 1:
@@ -35,12 +32,12 @@ def _open(end: Closed, left: dict[str, Any]) -> Iterator[str]:
         yield "record at half the distance and at twice it: what the room adds stays, what the body radiates does not"
     if slope is not None and abs(slope) > RULES.standard_errors * slope_sd:
         yield "strike one place at five strengths from soft to hard, force recorded: what is left goes with strength"
-    if left["share_of_no_modes"] > NO_MODE and most == "first":
+    if left["share_of_no_modes"] > no_mode and most == "first":
         yield (
             "record the hammer's force with the sound (case new --force-channel): what is left is at the beginning, "
             "and no mode plays it"
         )
-    if left["scatter_over_strikes"] > DIFFERS:
+    if left["scatter_over_strikes"] > differs:
         yield "strike one place five times alike: what is left differs from strike to strike, by the place or by itself"
     band = max(left["bands"], key=lambda b: b["share_of_energy_left"])
     yield (

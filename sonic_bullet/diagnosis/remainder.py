@@ -21,7 +21,6 @@ from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
-WINDOW = 1024
 SHOWN = 4
 NOTHING = "nothing could be compared"
 
@@ -125,25 +124,26 @@ def _again(takes: Sequence[Take]) -> float | None:
 
 def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Array]:
     """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
+    window = 1024
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
     lowest = min((float(made[t.body].model.freq_hz.min(initial=np.inf)) for t in takes), default=np.inf)
     lowest = min([lowest, *(float(g.lines.freq_hz.min(initial=np.inf)) for t in takes if (g := t.body.recorded))])
     edges = edges[(edges < 0.5 * sr) & (edges * 2 ** (1 / 3) > min(lowest, 0.25 * sr))]  # below rings no mode, no line
     rows, level = [], []
-    shape = np.hanning(WINDOW)
+    shape = np.hanning(window)
     for take in takes:
-        if take.sr != sr or len(take.sample) < 6 * WINDOW:
+        if take.sr != sr or len(take.sample) < 6 * window:
             continue
-        bins = np.searchsorted(edges, np.fft.rfftfreq(WINDOW, 1 / sr)) - 1
+        bins = np.searchsorted(edges, np.fft.rfftfreq(window, 1 / sr)) - 1
         table = []
         for x in (take.sample - take.played(made[take.body]), take.sample):
-            frames = np.lib.stride_tricks.sliding_window_view(x, WINDOW)[:: WINDOW // 2]
+            frames = np.lib.stride_tricks.sliding_window_view(x, window)[:: window // 2]
             power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2
             thirds = [part.sum(axis=0) for part in np.array_split(power, 3)]
             table.append([[row[bins == i].sum() for i in range(len(edges) - 1)] for row in thirds])
         left, own = np.array(table)
-        noise = take.floor.at(WINDOW // 2 + 1) * (shape**2).sum() * (len(frames) / 3)
+        noise = take.floor.at(window // 2 + 1) * (shape**2).sum() * (len(frames) / 3)
         floor = np.array([noise[bins == i].sum() for i in range(len(edges) - 1)])
         clear = own > 4 * floor
         rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))

@@ -20,12 +20,8 @@ from sonic_bullet.effects.common.hum import hum_of
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
-ROUGH = 0.03
-BETTER = 16.0
 CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
-FEWEST_LINES, AGAIN = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
 STUCK, OFTEN = 4, 12  # samples in a row at the limit, or in all
-SAME = 2e-3  # of a limit: how far peaks that it has made are apart
 
 
 @dataclass(frozen=True)
@@ -104,6 +100,8 @@ class MeasurementChain:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Look for a limit, hum and, where there is no limit, a filter; None where none is found."""
+        better = 16.0
+        fewest_lines, again = 5, 3  # lines: to look for a filter, and to fit it again to a part of them
         observed = [h for h in evidence.observed if h.signal is not None and h.predicted is not None]
         if not observed:
             return None
@@ -116,7 +114,7 @@ class MeasurementChain:
         parts |= _hum(observed, evidence.known.hum_hz if isinstance(evidence.known, cls) else 0.0)
         if "limit" not in parts:
             parts |= (
-                _filter(observed, BETTER, FEWEST_LINES) if evidence.known is None else _filter(observed, 0.0, AGAIN)
+                _filter(observed, better, fewest_lines) if evidence.known is None else _filter(observed, 0.0, again)
             )
         return cls(**parts) if parts else None
 
@@ -133,7 +131,7 @@ def butterworth(freq_hz: Array, corner_hz: float, order: int, high: bool, sr: in
 def limit_of(signals: list[Array], known: float = 0.0) -> float:
     """Find the level at which one recording or more is clipped, and which is another's peak.
 
-    Two strikes never have the same peak to SAME otherwise.
+    Two strikes never have the same peak to same otherwise.
 
     Parameters
     ----------
@@ -147,15 +145,16 @@ def limit_of(signals: list[Array], known: float = 0.0) -> float:
     float
         The limit in units of the file, 0 where there is none.
     """
+    same = 2e-3  # of a limit: how far peaks that it has made are apart
     peak = np.concatenate([np.abs(signal).max(axis=1) for signal in signals])
     if known:
-        return known if abs(float(peak.max()) / known - 1) < SAME else 0.0
+        return known if abs(float(peak.max()) / known - 1) < same else 0.0
     stands = np.array([_stands(row) for signal in signals for row in signal])
     if not stands.any():
         return 0.0
     level = float(np.median(peak[stands]))
-    at = np.abs(peak / level - 1) < SAME
-    return level if at.sum() >= 2 and at[stands].all() and peak.max() < (1 + SAME) * level else 0.0
+    at = np.abs(peak / level - 1) < same
+    return level if at.sum() >= 2 and at[stands].all() and peak.max() < (1 + same) * level else 0.0
 
 
 def _stands(row: Array) -> bool:
@@ -209,13 +208,14 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
 
 def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     """Compute per line frequency, ln of observed over expected amplitude, and its spread with the strikes' scatter."""
+    rough = 0.03
     expected, seen = np.abs(h.expected), np.abs(h.amplitude)
-    width = np.hypot(h.amplitude_sd, ROUGH * expected.max(axis=0, keepdims=True)) + 1e-300
+    width = np.hypot(h.amplitude_sd, rough * expected.max(axis=0, keepdims=True)) + 1e-300
     gain = (expected * seen / width**2).sum(axis=0) / np.maximum((expected**2 / width**2).sum(axis=0), 1e-300)
     left = np.sqrt((((seen - gain * expected) / width) ** 2).mean(axis=0))
     size = np.sqrt((expected**2 / width**2).sum(axis=0))
     good = (gain > 0) & (size > 3)
-    sd = np.hypot(np.maximum(left, 1.0)[good] / (size[good] * np.maximum(gain[good], 1e-300)), ROUGH)
+    sd = np.hypot(np.maximum(left, 1.0)[good] / (size[good] * np.maximum(gain[good], 1e-300)), rough)
     return h.freq_hz[good], np.log(gain[good]), sd
 
 

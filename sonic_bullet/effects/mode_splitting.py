@@ -21,18 +21,11 @@ from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Split
 from sonic_bullet.records import Array, ModalModel
 
 SPLIT = (1e-4, 3e-2)
-OBSERVED = 0.12  # of a line's own width: pairs nearer than that sound as one
-REACH = 2e-2  # of a line from its pair's middle
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
 ALIKE = 0.9
 # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or
 # too far
 SAME, TURNED = 1e-4, 0.3
-PLAINLY, ALSO, STRIKES = (
-    3,
-    0.8,
-    5,
-)  # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so many
 
 
 @dataclass(frozen=True)
@@ -135,6 +128,15 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     A line represents one mode; the most certain pairs choose first. An imperfection splits many pairs: where some are
     plain, others may be less so.
     """
+    observed = 0.12  # of a line's own width: pairs nearer than that sound as one
+    reach = 2e-2  # of a line from its pair's middle
+    # pairs that make it plain that the body is split: how alike others then need to be, every strike as loud, of so
+    # many
+    plainly, also, strikes = (
+        3,
+        0.8,
+        5,
+    )
     mostly = 0.5  # of the pairs must be more than that
     most = 7
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
@@ -149,28 +151,28 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     trials: list[tuple[bool, float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
         middle = scale * (model_hz[a] + model_hz[a + 1]) / 2
-        near = np.flatnonzero((np.abs(every / middle - 1) < REACH) & clear)
+        near = np.flatnonzero((np.abs(every / middle - 1) < reach) & clear)
         near = np.sort(near[np.argsort(-size[near])][:most])
         for i, j in combinations(near.tolist(), 2):
             low, high = (int(i), int(j)) if every[i] < every[j] else (int(j), int(i))
             split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
-            if not SPLIT[0] < split < SPLIT[1] or split * middle < OBSERVED * min(decay[low], decay[high]) / np.pi:
+            if not SPLIT[0] < split < SPLIT[1] or split * middle < observed * min(decay[low], decay[high]) / np.pi:
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
             plain = alike > ALIKE
-            if not plain and alike > ALSO and len(strike) >= STRIKES:
+            if not plain and alike > also and len(strike) >= strikes:
                 alike = min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1])
-            if plain or (alike > ALSO and len(strike) >= STRIKES):
+            if plain or (alike > also and len(strike) >= strikes):
                 trials.append(
-                    (plain, float(alike - off / REACH * (1 - ALIKE)), int(a), int(low), int(high), split, turn)
+                    (plain, float(alike - off / reach * (1 - ALIKE)), int(a), int(low), int(high), split, turn)
                 )
     found: list[tuple[float, ...]] = []
     split_off: list[bool] = []
     taken: set[int] = set()
     done: set[int] = set()
     for plain, _, mode, low, high, split, turn in sorted(trials, reverse=True):
-        if not plain and len(found) < PLAINLY:
+        if not plain and len(found) < plainly:
             break
         if low in taken or high in taken or mode in done or mode + 1 in done:
             continue

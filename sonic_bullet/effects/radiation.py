@@ -24,8 +24,6 @@ from sonic_bullet.records import Array, ModalModel
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
 SOUND = 343.0
 SCATTER = 0.03
-FEWEST_LINES, FEWEST_LINES_AGAIN = 6, 4  # lines: to look for it, and to fit it again to a part of them
-AGAIN = 2.0  # times smaller or larger, where it is fitted again
 ORDERS: tuple[int, ...] = (2, 4)
 
 
@@ -87,13 +85,15 @@ class Radiation(Alternatives):
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Fit radius, order and strength to the decays and the tilt to the levels; None where none is identified."""
+        fewest_lines, fewest_lines_again = 6, 4  # lines: to look for it, and to fit it again to a part of them
+        again = 2.0  # times smaller or larger, where it is fitted again
         clearer = 0.45  # twice the ln likelihood, a line, that a tilt must be worth
         better = 14.0
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
         with_decay = int((~np.isposinf(observed.decay_sd_per_s)).sum())  # in a room some lines tell no decay
         if (
             observed.model is None
-            or with_decay < (FEWEST_LINES if evidence.known is None else FEWEST_LINES_AGAIN)
+            or with_decay < (fewest_lines if evidence.known is None else fewest_lines_again)
             or not np.isfinite(observed.decay_per_s).all()
         ):
             return None
@@ -109,7 +109,7 @@ class Radiation(Alternatives):
         # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
         if isinstance(evidence.known, cls):
             # by either law: which one, a pulse or a filter may have hidden
-            radii = evidence.known.radius_m * np.geomspace(1 / AGAIN, AGAIN, 21)
+            radii = evidence.known.radius_m * np.geomspace(1 / again, again, 21)
         found = []
         for one in (cls(float(radius), 1.0, order=order) for order in ORDERS for radius in radii):
             x, left = _left(

@@ -15,10 +15,6 @@ from sonic_bullet.records import Array
 
 PART = 0.1  # of the peak: what exceeds it is contact; two such stretches further apart than GAP_S are two hits
 GAP_S = 2e-4
-FLAT_SAMPLES, FLAT_FRACTION = (
-    3,
-    0.05,
-)  # samples at the ceiling; of the contact: 0.02 of a half-sine in 16 bits is its flat top
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +38,11 @@ class HammerPulse:
 
 def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
     """Measure the pulse in a take's force (n,); None where none stands above its noise."""
+    # samples at the ceiling; of the contact: 0.02 of a half-sine in 16 bits is its flat top
+    flat_samples, flat_fraction = (
+        3,
+        0.05,
+    )
     above_noise = 8.0  # times its rms, which noise alone does not reach in 10¹⁴ samples
     rest = force - np.median(force)
     turned = -rest.min() > rest.max()
@@ -59,5 +60,5 @@ def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
     start = int(before[-1]) + 1 if len(before) else 0
     stop = hit[-1] + int(after[0]) if len(after) else len(rest)
     top = int(np.count_nonzero(rest[start:stop] >= peak * (1 - 1e-6)))
-    flat = top if top >= max(FLAT_SAMPLES, FLAT_FRACTION * len(hit)) else 0
+    flat = top if top >= max(flat_samples, flat_fraction * len(hit)) else 0
     return HammerPulse(float(rest[start:stop].sum()) / sr, peak, len(parts), bool(turned), flat)

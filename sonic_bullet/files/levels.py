@@ -21,8 +21,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_whole, shown
 from sonic_bullet.records.errors import AudioError
 
-GAIN_RISE_DB, MOST_RISE_DB = 6.0, 36.0
-"""Rise of g above the gain without a limiter: a step, and the limit beyond which a sound gets no flatter."""
 LUFS_WITHIN = 0.01
 LIMITER_LOOKS, MOST_STEPS = 6, 20
 
@@ -107,6 +105,8 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
 
     peak_db (n,): true peaks of the sound at that loudness; goal_db: ceiling of the limiter.
     """
+    # Rise of g above the gain without a limiter: a step, and the limit beyond which a sound gets no flatter
+    gain_rise_db, most_rise_db = 6.0, 36.0
     from scipy.optimize import brentq
 
     from sonic_bullet.files.loudness.limiter import RELEASES_DB_S, limiter_factor
@@ -123,8 +123,8 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
     for release_db_s in RELEASES_DB_S:
         low_db = high_db = 0.0
         factor, missed = limited(0.0, release_db_s)
-        while missed < -LUFS_WITHIN and high_db < MOST_RISE_DB:
-            low_db, high_db = high_db, high_db + GAIN_RISE_DB
+        while missed < -LUFS_WITHIN and high_db < most_rise_db:
+            low_db, high_db = high_db, high_db + gain_rise_db
             factor, missed = limited(high_db, release_db_s)
         if missed >= -LUFS_WITHIN:
             break

@@ -23,15 +23,6 @@ T = TypeVar("T")
 Key = str | int
 ANY = "..."
 """Step into an object of free names, which msgspec does not name."""
-TYPE_WORDS = {
-    "object": "an object {…}",
-    "array": "a list [...]",
-    "str": "a text",
-    "int": "a whole number",
-    "float": "a number",
-    "bool": "true or false",
-    "null": "null",
-}
 
 
 def decode_json(content: bytes, form: type[T], where: str, error: type[SonicBulletError], remedy: str) -> T:
@@ -155,6 +146,15 @@ def _there(tree: Any, keys: list[Key]) -> str:
 
 def _wanted(said: str) -> str:
     """Convert msgspec's words for a type and its bounds to plain ones."""
+    type_words = {
+        "object": "an object {…}",
+        "array": "a list [...]",
+        "str": "a text",
+        "int": "a whole number",
+        "float": "a number",
+        "bool": "true or false",
+        "null": "null",
+    }
     bounds = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
     found = re.fullmatch(r"`([^`]*)`(.*)", said)
     if found is None:
@@ -162,7 +162,7 @@ def _wanted(said: str) -> str:
     kinds, rest = found[1], found[2].strip()
     if length := re.fullmatch("of length (.*)", rest):
         return f"a list of {length[1]}"
-    words = " or ".join(TYPE_WORDS.get(kind, kind) for kind in kinds.split(" | "))
+    words = " or ".join(type_words.get(kind, kind) for kind in kinds.split(" | "))
     sign, _, bound = rest.partition(" ")
     return f"{words} {bounds[sign]} {bound.removesuffix('.0')}" if sign in bounds else f"{words} {rest}".strip()
 

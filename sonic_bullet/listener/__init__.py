@@ -61,32 +61,31 @@ __all__ = [
     "watch_settings",
 ]
 
-_HOME = {
-    "Finding": "pybullet.findings",
-    "PyBulletWorld": "pybullet.pybullet_world",
-    "World": "world",
-    "bodies_called": "pybullet.clients",
-    "body_ids": "pybullet.poses",
-    "client_id_of": "pybullet.clients",
-    "diagnose_world": "pybullet.doctor",
-    "direct_client": "pybullet.clients",
-    "disconnect": "pybullet.clients",
-    "is_bullet_client": "pybullet.clients",
-    "is_connected": "pybullet.clients",
-    "is_static": "pybullet.clients",
-    "keep_restitution": "pybullet.restitution",
-    "links_called": "pybullet.clients",
-    "links_with_shapes": "pybullet.clients",
-    "module_steps": "pybullet.hooks",
-    "open_world": "pybullet.clients",
-    "own_clients": "pybullet.script",
-    "run_script": "pybullet.script",
-    "seen_settings": "pybullet.hooks",
-    "watch_settings": "pybullet.clients",
-}
-
 
 def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(importlib.import_module(f"sonic_bullet.listener.{_HOME[name]}"), name)
+    home = {
+        "Finding": "pybullet.findings",
+        "PyBulletWorld": "pybullet.pybullet_world",
+        "World": "world",
+        "bodies_called": "pybullet.clients",
+        "body_ids": "pybullet.poses",
+        "client_id_of": "pybullet.clients",
+        "diagnose_world": "pybullet.doctor",
+        "direct_client": "pybullet.clients",
+        "disconnect": "pybullet.clients",
+        "is_bullet_client": "pybullet.clients",
+        "is_connected": "pybullet.clients",
+        "is_static": "pybullet.clients",
+        "keep_restitution": "pybullet.restitution",
+        "links_called": "pybullet.clients",
+        "links_with_shapes": "pybullet.clients",
+        "module_steps": "pybullet.hooks",
+        "open_world": "pybullet.clients",
+        "own_clients": "pybullet.script",
+        "run_script": "pybullet.script",
+        "seen_settings": "pybullet.hooks",
+        "watch_settings": "pybullet.clients",
+    }
+    if name in home:
+        return getattr(importlib.import_module(f"sonic_bullet.listener.{home[name]}"), name)
     raise AttributeError(f"module 'sonic_bullet.listener' has no attribute '{name}'")

@@ -20,8 +20,6 @@ from sonic_bullet.records.arrays import frozen_array, require, store
 from sonic_bullet.records.coerce import as_flag, as_number, as_text, shown
 from sonic_bullet.records.errors import RecordError
 
-HEAVIEST_KG = 1e6
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnimatedBody:
@@ -51,11 +49,12 @@ class AnimatedBody:
 
     def __post_init__(self) -> None:
         """Check and normalise the fields."""
+        heaviest_kg = 1e6
         who = f"body {shown(self.name)}"
         as_text(self.name, "the name of a body", "give a text")
         store(
             self,
-            mass_kg=as_number(self.mass_kg, f"{who}: mass_kg", "give kilograms, 0 or more", least=0, most=HEAVIEST_KG),
+            mass_kg=as_number(self.mass_kg, f"{who}: mass_kg", "give kilograms, 0 or more", least=0, most=heaviest_kg),
             inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3,), f"{who}: inertia_kg_m2"),
             restitution=as_number(
                 self.restitution, f"{who}: restitution", "give a number from 0 to 1", least=0, most=1

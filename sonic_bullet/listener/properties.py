@@ -18,8 +18,6 @@ from sonic_bullet.records.simulated import Change, Simulator, Values, finite
 
 ENGINE = None
 """The engine, in place of a body's index."""
-OF_WHOLE_BODY = ("linearDamping", "angularDamping")
-"""Values that PyBullet has once for a body, whatever link they are set on."""
 
 
 class SetValues:
@@ -35,8 +33,10 @@ class SetValues:
 
     def set_link(self, body: int, link: int, values: dict[str, object]) -> None:
         """Store values set on a link."""
+        # Values that PyBullet has once for a body, whatever link they are set on
+        of_whole_body = ("linearDamping", "angularDamping")
         for name, value in finite(values).items():
-            whom = None if name in OF_WHOLE_BODY else link
+            whom = None if name in of_whole_body else link
             self._links.setdefault(body, {}).setdefault(whom, {})[name] = value
 
     def of(self, body: int, link: int) -> Values:

@@ -49,8 +49,6 @@ IDLE_S = 10.0
 """Wall time without a physics step after which a scene is taken for a viewer's loop."""
 END_S = 0.5
 """For an interrupted command to end by itself; it must be gone within 1 s."""
-CLOSE_S = 20.0
-"""For what was made before the interrupt to be written."""
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
 STAND_INS = f"{PACKAGE}/listener/pybullet/"
 """Functions that a script calls in place of PyBullet's: their time is the script's own."""
@@ -214,6 +212,7 @@ def _idle_words(name: str, line: int) -> tuple[str, str]:
 
 
 def _wait(child: _Worker, stops: list[int]) -> Ending:
+    close_s = 20.0  # for what was made before the interrupt to be written
     ask_s = 1.0  # how often a scene that does not step is asked for its line
     poll_s = 0.05
     sent, stopped_at, seen_at = 0, 0.0, time.monotonic()
@@ -230,7 +229,7 @@ def _wait(child: _Worker, stops: list[int]) -> Ending:
             stopped_at, sent = stopped_at or now, len(stops)
             os.kill(child.process, stops[0])
         if stopped_at:
-            if now - stopped_at > (CLOSE_S if child.closing else END_S):
+            if now - stopped_at > (close_s if child.closing else END_S):
                 break
             continue
         stepped = struct.unpack_from("d", child.clock)[0]

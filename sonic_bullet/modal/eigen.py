@@ -22,8 +22,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError
 
-EIGEN_BLOCK = 8
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
@@ -78,10 +76,11 @@ def solve(
     ModalError
         The body has another number of rigid modes, or the iteration does not converge.
     """
+    eigen_block = 8
     tolerance = 1e-7  # of the residual bound, relative to θ
     size = stiffness.shape[0]
     factor = factorise(stiffness - shift * mass)
-    block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(EIGEN_BLOCK, size))), mass)
+    block, image, _ = _orthonormal(np.random.default_rng(0).standard_normal((size, min(eigen_block, size))), mass)
     width = block.shape[1]
     longest = min(size // width * width, 4 * (most + rigid) + 64 * width)
     basis, images = np.zeros((size, longest), order="F"), np.zeros((size, longest), order="F")

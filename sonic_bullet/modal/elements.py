@@ -36,7 +36,6 @@ body is tried: creases keep elements small.
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
 CUBIC_UNKNOWNS = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
-COARSER_TRIES = 2
 WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
 OVER = 1.4  # × MOST_UNKNOWNS: a surface with more detail than its volume and area predict takes larger elements
 UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
@@ -202,8 +201,9 @@ class Elements:
 
         Too many are by far more than ``MOST_UNKNOWNS``, or more than ``most``, which is what its work allows.
         """
+        coarser_tries = 2
         made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
-        for _ in range(COARSER_TRIES):
+        for _ in range(coarser_tries):
             if made._unknowns < min(OVER * MOST_UNKNOWNS[self.thin], most):
                 break
             larger = made._refilled(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))

@@ -24,9 +24,6 @@ from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
-APART_POISSON = 0.05  # of ν₁ and ν₂ from the guess
-POISSON_RANGE = (-0.5, 0.485)
-
 
 @one_thread()
 def family(
@@ -99,8 +96,10 @@ def family(
 
 
 def _poissons(poisson: float) -> tuple[float, float]:
-    low, high = (float(np.clip(poisson + apart, *POISSON_RANGE)) for apart in (-APART_POISSON, APART_POISSON))
-    if high - low < APART_POISSON / 2:
+    apart_poisson = 0.05  # of ν₁ and ν₂ from the guess
+    poisson_range = (-0.5, 0.485)
+    low, high = (float(np.clip(poisson + apart, *poisson_range)) for apart in (-apart_poisson, apart_poisson))
+    if high - low < apart_poisson / 2:
         raise ModalError(f"Poisson's ratio {poisson} is no isotropic solid's", "guess one between -0.5 and 0.48")
     return low, high
 

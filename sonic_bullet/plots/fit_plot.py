@@ -23,8 +23,6 @@ from sonic_bullet.records.errors import FileError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SPECTRUM_WINDOW = 1024
-
 
 def write_fit_picture(path: str | os.PathLike[str], found: CaseFit) -> None:
     """Draw a fit to .png, .pdf or .svg. Raises FileError."""
@@ -141,6 +139,7 @@ def circle(freq_hz: Array, alpha_per_s: float, beta_s: float) -> Array:
 
 
 def _levels(sound: Array) -> Array:
-    window = min(SPECTRUM_WINDOW, len(sound))
+    spectrum_window = 1024
+    window = min(spectrum_window, len(sound))
     frames = np.lib.stride_tricks.sliding_window_view(sound, window)[:: max(1, window // 4)]
     return np.asarray(20 * np.log10(np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)).T + 1e-12))

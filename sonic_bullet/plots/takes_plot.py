@@ -10,8 +10,6 @@ import numpy as np
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
-ENVELOPE_COLUMNS = 2000  # of an envelope: more than a picture is wide
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnRecording:
@@ -25,6 +23,7 @@ class DrawnRecording:
 
 def write_takes_picture(path: Path, recordings: list[DrawnRecording]) -> None:
     """Draw recordings and their takes to .png, .pdf or .svg. Raises FileError."""
+    envelope_columns = 2000  # of an envelope: more than a picture is wide
     lowest_db = -80.0
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -32,7 +31,7 @@ def write_takes_picture(path: Path, recordings: list[DrawnRecording]) -> None:
     figure = Figure(figsize=(11, 1 + 2 * len(recordings)), layout="constrained")
     FigureCanvasAgg(figure)
     for axes, one in zip(figure.subplots(len(recordings), squeeze=False)[:, 0], recordings, strict=True):
-        step = max(1, len(one.signal) // ENVELOPE_COLUMNS)
+        step = max(1, len(one.signal) // envelope_columns)
         block = np.abs(one.signal[: len(one.signal) // step * step]).reshape(-1, step).max(axis=1)
         time = np.arange(len(block)) * step / one.sr
         axes.plot(time, 20 * np.log10(np.maximum(block, 10 ** (lowest_db / 20))), linewidth=0.7, color="k")

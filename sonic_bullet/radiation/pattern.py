@@ -21,7 +21,6 @@ PATTERN_RINGS, PATTERN_TURNS = 24, 48
 PATTERN_ROWS = PATTERN_RINGS + 2
 CHECKED = 512
 """Directions, and their negatives, that the mean is taken over."""
-PATTERN_MODES = 64
 
 
 def radiation_pattern(model: ModalModel, air: Air) -> Array | None:
@@ -29,6 +28,7 @@ def radiation_pattern(model: ModalModel, air: Air) -> Array | None:
 
     A mode that does not radiate has 1 everywhere.
     """
+    pattern_modes = 64
     terms = surface_terms(model, air)
     if not isinstance(terms, SurfaceTerms):
         return None
@@ -39,8 +39,8 @@ def radiation_pattern(model: ModalModel, air: Air) -> Array | None:
     half, m = PATTERN_RINGS // 2, model.mode_count
     upper = np.ascontiguousarray(np.stack([across, along, level], axis=-1)[:half].reshape(-1, 3) @ terms.turn.T)
     grid = np.ones((PATTERN_ROWS, PATTERN_TURNS, m), complex)
-    for lo in range(0, m, PATTERN_MODES):
-        now = np.arange(lo, min(lo + PATTERN_MODES, m))
+    for lo in range(0, m, pattern_modes):
+        now = np.arange(lo, min(lo + pattern_modes, m))
         pressure, reach = surface_pressure(terms, air, upper, now)
         left = pressure * np.exp(-1j * terms.k[now, None] * reach)
         ahead, behind = left.T.reshape(2, half, PATTERN_TURNS, len(now))

@@ -20,7 +20,6 @@ from sonic_bullet.records.mounting import Mounting, as_mounting
 
 CombineRule = Literal["average", "minimum", "maximum", "multiply"]
 JointKind = Literal["fixed", "point", "hinge", "slider"]
-HEAVIEST_RIGID_KG, FASTEST_M_S_RIGID = 1e9, 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +72,7 @@ class RigidBody:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        heaviest_rigid_kg, fastest_m_s_rigid = 1e9, 1e6
         where = as_text(self.name, "the name of a body", "give a text")
         for name, width in (
             ("inertia_kg_m2", 3),
@@ -84,7 +84,7 @@ class RigidBody:
             store(self, **{name: frozen_array(getattr(self, name), float, (width,), f"{where}: {name}")})
         store(
             self,
-            mass_kg=as_number(self.mass_kg, f"{where}: mass", "give kilograms", least=0, most=HEAVIEST_RIGID_KG),
+            mass_kg=as_number(self.mass_kg, f"{where}: mass", "give kilograms", least=0, most=heaviest_rigid_kg),
             gravity_factor=as_number(self.gravity_factor, f"{where}: gravityFactor", "give a number"),
             mounting=as_mounting(self.mounting, f"{where}: mounting"),
             gain=as_number(self.gain, f"{where}: gain", "give a factor, 0 or more", least=0, most=1e10),
@@ -93,7 +93,7 @@ class RigidBody:
         require(bool((self.inertia_kg_m2 >= 0).all()), f"{where}: a moment of inertia is below 0", "give moments")
         speeds = np.concatenate([self.velocity_m_s, self.spin_rad_s])
         require(
-            bool((np.abs(speeds) <= FASTEST_M_S_RIGID).all()), f"{where} is faster than anything", "give m/s and rad/s"
+            bool((np.abs(speeds) <= fastest_m_s_rigid).all()), f"{where} is faster than anything", "give m/s and rad/s"
         )
 
 

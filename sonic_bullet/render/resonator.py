@@ -29,9 +29,6 @@ from sonic_bullet.synth.bank import Translation, audible
 
 RIGID = ContactSide(np.inf, 0.3, 0.0, 0.0)
 """Side of a partner of unknown material."""
-FASTEST_RIGID = 0.6
-"""Fraction of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer depends on
-w."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -226,10 +223,13 @@ def _played(model: ModalModel, air: Air, sr: int, mounting: Mounting) -> _Played
 
 def _translation(body: Body, sr: int, air: Air) -> Translation | None:
     """Return the mode of each translation of a moving body: gain is the force along it, weight Pa·m per N·s."""
+    # Fraction of sr/2 at which a small body's w is cut: below, its click is the compact law's, which no longer depends
+    # on w
+    fastest_rigid = 0.6
     radius = (3 * body.volume_m3 / (4 * np.pi)) ** (1 / 3)
     if body.mass_kg <= 0 or radius <= 0 or body.material is None:  # a tiny volume's radius may round to zero
         return None
-    rate = min(air.sound_speed_m_s / radius, FASTEST_RIGID * np.pi * sr)
+    rate = min(air.sound_speed_m_s / radius, fastest_rigid * np.pi * sr)
     return Translation(rate, rate, 2 * jerk_coefficient(body.volume_m3, air) * rate**2 / body.mass_kg)
 
 

@@ -30,8 +30,6 @@ TAIL_DB = -60.0
 MOST_S = 10.0
 CHECKED_S = 0.1
 """Length checked at once: longer than beats of neighbouring modes that a listener hears as one decay."""
-STEP_S = 1 / 240
-"""Steps of a tail are no shorter: nothing happens in them."""
 
 
 def as_tail_db(tail_db: object, name: str = "tail_db") -> float | None:
@@ -47,6 +45,7 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
 
     ``state`` is not changed.
     """
+    step_s = 1 / 240  # steps of a tail are no shorter: nothing happens in them
     from sonic_bullet.render.synthesizer import advance
 
     state = state.copy()
@@ -55,7 +54,7 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
     advance(setup, state, [still] * LOOKAHEAD)  # up to the end of ``last``, which is rendered already
     state.credit_s = np.zeros(0)  # no new poles
     state.changed()
-    step = replace(still, dt_s=max(still.dt_s, STEP_S))
+    step = replace(still, dt_s=max(still.dt_s, step_s))
     while True:
         yield advance(setup, state, [step] * max(1, round(CHECKED_S / step.dt_s)))
 

@@ -24,14 +24,7 @@ from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.render.resonator import Resonator, build_resonator
 from sonic_bullet.synth.strikes import SPAN
 
-BY_HAND = 0.5
-"""Fraction of its steps in which a body was teleported, from which on that is what moves it."""
-SLIDES_M_S = 1e-3
-"""Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
-(synth.strikes).
-"""
 NAMED_SILENT, MANY_SILENT = 3, 20
-UNTOUCHED = "touched by nobody, so silent"
 
 
 def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
@@ -70,6 +63,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
 
     Kinds: not touched, no mode in the band, a sensor on a body that was not added, radiation by a simpler law.
     """
+    untouched = "touched by nobody, so silent"
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
     alone = [b for i in added if i not in touched and can_sound(b := log.bodies[i])]
@@ -77,7 +71,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
     notes = []
     if alone and log.steps:
-        notes.append(f"{UNTOUCHED}: {_names(alone, MANY_SILENT)}")
+        notes.append(f"{untouched}: {_names(alone, MANY_SILENT)}")
     for still, said in ((False, "they click but do not ring"), (True, "they do not move either, so they are silent")):
         mute = [body for body in dull if (body.mass_kg == 0) == still]
         if mute:
@@ -124,13 +118,14 @@ def why_silent(log: ContactLog) -> str | None:
 
 def _untouched(log: ContactLog, rows: Contacts, added: Array) -> str:
     """Explain why none of the added bodies touched another."""
+    by_hand = 0.5  # Fraction of its steps in which a body was teleported, from which on that is what moves it
     named = _names(body for body, one in zip(log.bodies, added, strict=True) if one)
     moved = np.zeros(len(added))
     lived = np.zeros(len(added))
     for step in log.steps:
         moved[step.body] += step.teleported
         lived[step.body] += 1
-    hand = np.flatnonzero((moved > 0) & (moved >= BY_HAND * lived))
+    hand = np.flatnonzero((moved > 0) & (moved >= by_hand * lived))
     if len(hand):
         return (
             f"{_names(log.bodies[i] for i in hand)} was moved by hand in {int(moved[hand].max())} of "
@@ -185,13 +180,16 @@ def _read_place(sensor: Vibrometer, log: ContactLog) -> str:
 
 def _at_rest(log: ContactLog, rows: Contacts, mine: Array) -> str | None:
     """Detect that bodies only rest: nothing approached faster than gravity in settling, nothing slid or rolled."""
+    # Speed of a contact over a surface below which nothing rolls or slides: a settled pile creeps at a tenth of it
+    # (synth.strikes)
+    slides_m_s = 1e-3
     step = log.step[mine]
     fall = np.concatenate([block.step["gravity_m_s2"] * block.step["dt_s"][:, None] for block in log.blocks()])[step]
     # as synth.strikes has it
     settling = SPAN * (
         1.1 * np.abs(np.einsum("ki,ki->k", fall, rows.normal[mine])) + 0.01 * np.linalg.norm(fall, axis=1)
     )
-    slides = np.unique(step[(rows.sweep_m_s[mine] > SLIDES_M_S).any(axis=1)])
+    slides = np.unique(step[(rows.sweep_m_s[mine] > slides_m_s).any(axis=1)])
     # shorter contact is settling, no support yet
     if (rows.approach_m_s[mine] > settling).any() or len(slides) > SPAN:
         return None

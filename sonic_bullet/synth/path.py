@@ -35,8 +35,6 @@ from sonic_bullet.synth.path_places import (
     TOO_FAR,
 )
 
-_SHORTEST = 1024
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
@@ -174,9 +172,10 @@ def _stride(size: Array) -> Array:
 
 def _add_places(path: Path, state: PathState, count: int) -> None:
     """Add places, free and asleep."""
+    shortest = 1024
     channels = len(path.microphone_m)
     new = np.zeros(count, PLACE)
-    new["body"], new["next"], new["size"] = -1, -1, _SHORTEST
+    new["body"], new["next"], new["size"] = -1, -1, shortest
     each = channels * _stride(new["size"])
     new["memory_at"] = len(state.memory) + np.cumsum(each) - each
     state.places = np.concatenate([state.places, new])

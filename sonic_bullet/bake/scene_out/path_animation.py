@@ -17,11 +17,10 @@ from sonic_bullet.files.gltf.gltf_writer import GltfBuffer
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import BodyPath
 
-ANIMATION_NAME = "recorded motion"
-
 
 def animation_of(paths: Sequence[BodyPath], node_of: Sequence[int], buffer: GltfBuffer) -> dict[str, Any] | None:
     """Write all paths as one animation; node_of: a body's node. None without any."""
+    animation_name = "recorded motion"
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     known: dict[bytes, int] = {}
@@ -39,7 +38,7 @@ def animation_of(paths: Sequence[BodyPath], node_of: Sequence[int], buffer: Gltf
             sampler = {"input": known[time.tobytes()], "output": buffer.append(value[keep]), "interpolation": "LINEAR"}
             channels.append({"sampler": len(samplers), "target": {"node": node_of[path.body], "path": target}})
             samplers.append(sampler)
-    return {"name": ANIMATION_NAME, "channels": channels, "samplers": samplers} if channels else None
+    return {"name": animation_name, "channels": channels, "samplers": samplers} if channels else None
 
 
 def _same_side(turn: Array) -> Array:

@@ -35,8 +35,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
 BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
-# chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
-OFTEN, MOSTLY = 0.4, 1.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +79,8 @@ def baseline(
     progress : callable
         Called with what is being done.
     """
+    # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
+    often, mostly = 0.4, 1.05
     nearer = 0.9  # of the distance, where chains are one line each
     plain = _of(case, recorded, cache, progress)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
@@ -98,7 +98,7 @@ def baseline(
         )
     best = min((_of(case, faint, cache, None) for faint in directions), key=_off_db)
     changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
-    most = MOSTLY if all(share(one.lines, LINKS[0]) > OFTEN for one in changed) else nearer
+    most = mostly if all(share(one.lines, LINKS[0]) > often for one in changed) else nearer
     return best if _off_db(best) < most * _off_db(plain) else plain
 
 

@@ -22,7 +22,6 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
 
-LOSSY, TOGETHER = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
 # of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
 OWN, ALIKE = 1e-4, 2.0
 
@@ -176,6 +175,7 @@ def paired(p: Prediction, *, anew: bool = False) -> tuple[Array, tuple[Array, ..
 
 def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     """Pair lines and modes by frequency, pattern and decay."""
+    lossy, together = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
     reach = 0.012  # of a line from its mode where effects have moved it
     from scipy.optimize import linear_sum_assignment
 
@@ -191,7 +191,7 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
-    price = np.minimum((gap / reach) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + LOSSY * worse**2, 1.0) - 1.0
+    price = np.minimum((gap / reach) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + lossy * worse**2, 1.0) - 1.0
     price[known] = 0.0
     row, column = linear_sum_assignment(price)
     good = price[row, column] < 0
@@ -200,7 +200,7 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE_SPLIT)
     taken, mode = set(column.tolist()), []
     for c in column:
-        like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < TOGETHER
+        like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < together
         others = [int(k) for k in np.flatnonzero((group == group[c]) & like) if k == c or int(k) not in taken]
         taken |= set(others)
         mode.append(np.array(others))

@@ -26,8 +26,6 @@ LINKS = (
     # a chain's next line is so much shorter at least, and as near as that many times its decay;
     # whether modes are only bent
 )
-LONG, FRAMES, FAINT = 3.0, 120, 0.03  # of 1/d; of the strongest level
-LEAST_CHAINS, LEAST_SHARE_OF_CHAINS = 4, 0.1  # chains, and of all modes' lines: fewer are neighbours, hits or a room's
 # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
 PLAIN = 4
 
@@ -38,9 +36,11 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     It has the slowest's frequency, the slowest's decay or the chain's own, and the amplitudes' sum. Where there are too
     few chains, only those that are plain are replaced, if the loudest line is in one; None if not.
     """
+    # chains, and of all modes' lines: fewer are neighbours, hits or a room's
+    least_chains, least_share_of_chains = 4, 0.1
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
-    if many < max(LEAST_CHAINS, LEAST_SHARE_OF_CHAINS * len(groups)):
+    if many < max(least_chains, least_share_of_chains * len(groups)):
         loudest = np.abs(lines.amplitude).max(axis=0).argmax() if len(groups) else -1
         plain = [len(g) >= PLAIN and _one_direction(lines.freq_hz[g]) for g in groups]
         if not any(p and loudest in g for p, g in zip(plain, groups, strict=True)):
@@ -78,13 +78,14 @@ def _falls(lines: Lines, group: Array) -> float:
 
     Bent or not, a mode's level goes as e^{−dt}, and no single line of many is as certain.
     """
+    long, frames, faint = 3.0, 120, 0.03  # of 1/d; of the strongest level
     pole = -lines.decay_per_s[group] + 2j * np.pi * (lines.freq_hz[group] - lines.freq_hz[group[0]])
-    time = np.linspace(0, LONG / lines.decay_per_s[group[0]], FRAMES)
+    time = np.linspace(0, long / lines.decay_per_s[group[0]], frames)
     level = np.abs(lines.amplitude[:, group] @ np.exp(pole[:, None] * time))
     level = level[level.max(axis=1) > 0]
     if not len(level):
         return float(lines.decay_per_s[group[0]])
-    weight = 1 / (1 + (FAINT * level.max() / np.maximum(level, 1e-300)) ** 2)
+    weight = 1 / (1 + (faint * level.max() / np.maximum(level, 1e-300)) ** 2)
     ramp = time - (weight * time).sum(axis=1, keepdims=True) / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
     falls = -(weight * ramp * np.log(np.maximum(level, 1e-300))).sum() / (weight * ramp**2).sum()
     # lines that beat are no chain

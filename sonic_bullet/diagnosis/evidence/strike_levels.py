@@ -13,12 +13,10 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.prediction import pattern
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 
-MOST_SPREADS = 100.0
-"""By which a line stands over its spread, and weighs more no longer."""
-
 
 def with_levels(body: Struck, gain: float) -> Struck:
     """Estimate the levels of a body's fitted strikes of unknown impulse; see `Struck.level_n_s`."""
+    most_spreads = 100.0  # By which a line stands over its spread, and weighs more no longer
     recorded = body.recorded
     unknown = ~np.isfinite(body.impulse_n_s)
     if recorded is None or recorded.signals is None or not unknown[body.fitted].any():
@@ -35,7 +33,7 @@ def with_levels(body: Struck, gain: float) -> Struck:
         if good.any():
             ratio, weight = (
                 np.log(size[good] / played[good]),
-                np.minimum(size[good] / (sd[good] + 1e-300), MOST_SPREADS),
+                np.minimum(size[good] / (sd[good] + 1e-300), most_spreads),
             )
             order = np.argsort(ratio)
             total = np.cumsum(weight[order])

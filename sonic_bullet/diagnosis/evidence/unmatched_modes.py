@@ -22,7 +22,6 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
 CORRECTION = 0.01
-PURE = 0.1  # of its energy near its line may be something else
 SKIRT, WIDE = 4.0, 40.0  # half widths to both sides: where a mode is looked for, and taken out
 
 
@@ -73,6 +72,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
         Modes without a line; all where None. Another moves only if nothing but itself, as the mesh has it, is at its
         line: degenerate modes that an imperfection has turned are not the mesh's.
     """
+    pure = 0.1  # of its energy near its line may be something else
     turns = 3
     body, known, model, plain = p.body, p.hypothesis.correction, p.model, p.uncorrected()
     assert body.recorded is not None and body.recorded.signals is not None
@@ -92,7 +92,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
         before = correction.copy()
         for j in loud:
             decay, push = float(model.decay_per_s[rank[j]]), observed.push[:, rank[j]]
-            most = np.inf if alone is None or alone[j] else PURE
+            most = np.inf if alone is None or alone[j] else pure
             ratio = _best(
                 left, push, decay, own[j], correction[j], n=n, sr=observed.sr, most=most, band_hz=body.band_hz
             )

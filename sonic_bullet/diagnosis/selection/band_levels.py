@@ -26,7 +26,6 @@ from sonic_bullet.estimator.lines.log_spectral import ABOVE_NOISE, Floor
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-WINDOWS = (512, 1024, 2048, 4096, 8192)
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF = 2 ** (1 / 6)  # of a third octave, to each side
 SHOWN = 4  # in words
@@ -104,10 +103,11 @@ def over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tupl
 
 def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tuple[float, float]) -> Array:
     """Compute the same of one part of the sounds."""
+    windows = (512, 1024, 2048, 4096, 8192)
     found = np.full(len(CENTRE_HZ), np.nan)
     low, high = CENTRE_HZ / HALF, CENTRE_HZ * HALF
     inside = (low >= band_hz[0]) & (high <= min(band_hz[1], sr / 2))
-    fits = [w for w in WINDOWS if w <= len(recorded)]
+    fits = [w for w in windows if w <= len(recorded)]
     window = np.array([next((w for w in fits if RULES.band_cells * sr / w <= wide), 0) for wide in high - low])
     for w in np.unique(window[inside & (window > 0)]):
         who = np.flatnonzero(inside & (window == w))

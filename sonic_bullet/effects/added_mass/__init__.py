@@ -29,15 +29,10 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array, ModalModel
 
 POINTS = 100
-SHARES = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
-YIELDS = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin with
 # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own
 # imperfection may be what it stands for
 LIGHTEST = 0.005
 TRIES = 6
-MATCHED, MOVED = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
-STAYED, DEGENERATE = 0.6, 1e-3  # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
-BETTER = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
 
 
 @dataclass(frozen=True)
@@ -99,6 +94,9 @@ class AddedMass(ChangesBaseline):
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Search the surface for the mass that explains the lines best; None where the bare body does as well."""
+        shares = (0.002, 0.006, 0.015, 0.03, 0.055, 0.1, 0.16)  # of the body's mass
+        yields = (0.0, 1.0, 4.0)  # of what modes above the band may yield, to begin with
+        better = (1.5, 0.12)  # in price: as much as a strong line and a half, paired well; and of the bare body's own
         far_off = 0.015  # of ln f: more than pairs alone find
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.plain is not None else 0)
         if observed.plain is None or len(observed.freq_hz) + len(observed.foreign_hz) < 8 or not observed.plain.mass_kg:
@@ -129,8 +127,8 @@ class AddedMass(ChangesBaseline):
             up, side = trial.rest(vertex)
             return [
                 one
-                for s in SHARES
-                for y in YIELDS
+                for s in shares
+                for y in yields
                 for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), WIDTHS[0])
             ]
 
@@ -146,7 +144,7 @@ class AddedMass(ChangesBaseline):
         again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
         best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
         bare = none[0] + trial.unlikely(trial.fitted)
-        if best[0] > bare - max(BETTER[0], BETTER[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
+        if best[0] > bare - max(better[0], better[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
             return None
         return cls._at(x, best, observed.poisson is not None)
 
@@ -171,11 +169,14 @@ def _in_place(line_hz: Array, size: Array, mode_hz: Array, none: tuple[float, Ar
     A mass leaves few modes in place, and something else splits or bends the others. Of degenerate modes a mass leaves
     one, which has a node at it, so only modes without a degenerate partner count.
     """
+    matched, moved = 0.8, 2.5e-3  # share of lines, and how far nine in ten of them may lie off: a mesh's error
+    # of the lines' strength; of ln f, between modes of which a mass leaves one where it was
+    stayed, degenerate = 0.6, 1e-3
     _, row, column, shift = none
     off = np.abs(np.log(line_hz[row] / mode_hz[column]) - shift)
-    if len(row) > MATCHED * len(line_hz) and float(np.quantile(off, 0.9)) < MOVED:
+    if len(row) > matched * len(line_hz) and float(np.quantile(off, 0.9)) < moved:
         return True
     off = np.abs(np.log(line_hz)[:, None] - np.log(mode_hz) - shift)
     gap = np.diff(np.log(mode_hz), prepend=-np.inf, append=np.inf)
-    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > DEGENERATE)[off.argmin(axis=1)]
-    return bool(loud[off.min(axis=1) < MOVED].sum() > STAYED * loud.sum() > 0)
+    loud = np.nan_to_num(size).max(axis=0) * (np.minimum(gap[1:], gap[:-1]) > degenerate)[off.argmin(axis=1)]
+    return bool(loud[off.min(axis=1) < moved].sum() > stayed * loud.sum() > 0)

@@ -18,17 +18,12 @@ from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
-STEPS = (0.5, 0.8, 1.25, 2.0)
-RATIOS = (-0.03, 0.03)  # steps of ν
 PLACES, POLISH = 2, 4  # of a turn's best, and steps from each
 # of ln m, ln R along and across, ν, and s: for slopes, and at once
 SMALL, MOST = (0.01, 0.1, 0.1, 0.004), (0.4, 1.0, 1.0, 0.03, 0.02)
 LEAST, FINE = 0.1, 1e-3  # of what the rest of the modes may yield; of ν
-MOST_SD, SOLID = 2.0, 0.48  # of the guess' spread; of ν
 NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
 WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
-# of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
-REACH, BINS = (-0.1, 0.25), 0.008
 
 
 def strict(width: float) -> float:
@@ -166,18 +161,20 @@ class MassFit:
 
         By correlation of the two spectra on a logarithmic axis.
         """
+        # of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
+        reach, bins = (-0.1, 0.25), 0.008
         peaks = 2  # of those shifts, tried further
         alike = 1.0
         if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(pattern).all():
             long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)
             alike = (self.size.T @ pattern / np.maximum(long, 1e-300)) ** 4
         gap = np.log(self.line)[:, None] - np.log(freq_hz)
-        edge = np.arange(REACH[0] - BINS, REACH[1] + 2 * BINS, BINS)
+        edge = np.arange(reach[0] - bins, reach[1] + 2 * bins, bins)
         count = np.histogram(gap, edge, weights=np.broadcast_to(alike, gap.shape))[0]
         count = np.convolve(count, (0.5, 1.0, 0.5), "same")
         peak = np.flatnonzero((count[1:-1] >= count[:-2]) & (count[1:-1] > count[2:])) + 1
         best = peak[np.argsort(-count[peak])][:peaks]
-        return [0.0, *(float(edge[i] + BINS / 2) for i in best)]
+        return [0.0, *(float(edge[i] + bins / 2) for i in best)]
 
     def sifted(self, vertex: int, mass: float, along: tuple[float, float], width: float) -> list[Scored]:
         """Compute the costs of a mass at each of the shifts that its lines suggest."""
@@ -224,30 +221,33 @@ class MassFit:
 
     def _around(self, best: Scored, reach: float, width: float) -> list[Scored]:
         """Compute the costs of neighbouring vertices, masses, compliances and ν."""
+        steps = (0.5, 0.8, 1.25, 2.0)
+        ratios = (-0.03, 0.03)  # steps of ν
         _, vertex, mass, (up, side), shift, ratio = best
         at = self.bare.vertex_m
         body = np.unique(self.bare.face)
         near = body[((at[body] - at[vertex]) ** 2).sum(axis=1) < reach**2]
         least = [LEAST * y for y in self.rest(vertex)]
         trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // NEAR)]]
-        trials += [(vertex, mass * f, (up, side)) for f in STEPS]
-        trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *STEPS)] + [
-            (vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *STEPS)
+        trials += [(vertex, mass * f, (up, side)) for f in steps]
+        trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *steps)] + [
+            (vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *steps)
         ]
         found = [self.scored(*one, shift, ratio, width) for one in trials]
-        other = [] if self.observed.poisson is None else [self._solid(ratio + s) for s in RATIOS]
+        other = [] if self.observed.poisson is None else [self._solid(ratio + s) for s in ratios]
         return found + [self.scored(vertex, mass, (up, side), shift, r, width) for r in other]
 
     def _solid(self, ratio: float) -> float:
         """Limit a ν to the range of its previous estimate, in steps, so that few models are cached."""
+        most_sd, solid = 2.0, 0.48  # of the guess' spread; of ν
         poisson_range = self.observed.poisson
         if poisson_range is None:
             return ratio
         return float(
             np.clip(
                 round(ratio / FINE) * FINE,
-                poisson_range.guess - MOST_SD * poisson_range.sd,
-                min(poisson_range.guess + MOST_SD * poisson_range.sd, SOLID),
+                poisson_range.guess - most_sd * poisson_range.sd,
+                min(poisson_range.guess + most_sd * poisson_range.sd, solid),
             )
         )
 

@@ -42,7 +42,6 @@ from sonic_bullet.effects.protocol import (
 )
 from sonic_bullet.records import Array, ModalModel
 
-SHARE, FEWEST_LINES = 0.5, 1.5  # of the misfit must go, in lines that a damping growth would bend; of such lines
 POWERS = (1.0, 2.0)
 GROWTHS = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
 AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
@@ -236,6 +235,7 @@ def _supported_by_lines(
     Each line counts by the part of its misfit that the damping growth would make, so one loud mode and a softer one are
     enough.
     """
+    share, fewest_lines = 0.5, 1.5  # of the misfit must go, in lines that a damping growth would bend; of such lines
     before = np.exp([one.spread[0] for one in plain])
     after = np.exp([one.least for one in row])
     bent = np.array(
@@ -247,7 +247,7 @@ def _supported_by_lines(
     says = np.minimum(bent / before, 1.0)
     gone = np.maximum(1 - after / before, -1.0)
     many = float(says.sum() ** 2 / max((says**2).sum(), 1e-300))
-    return many >= FEWEST_LINES and float((says * gone).sum() / max(says.sum(), 1e-300)) > SHARE
+    return many >= fewest_lines and float((says * gone).sum() / max(says.sum(), 1e-300)) > share
 
 
 def _louder(h: ObjectEvidence, lines: list[DecayFrames], found: _Fit) -> float:

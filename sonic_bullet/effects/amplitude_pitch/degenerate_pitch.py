@@ -19,9 +19,6 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 FINER = (ANGLES[1] - ANGLES[0]) * np.linspace(-1, 1, 15)  # about the best angle
-LAGS = (2, 6, 18)  # frames
-ROUGH = 0.1  # of ln |z| and of a phase: what neighbours, windows and shapes do to a frame
-MOST = 2.0  # of ln |z|: more off is no worse
 
 
 def bend_with_axes(e: Envelopes, h: ObjectEvidence, measure: str, bend: float, factor: Array) -> float:
@@ -86,22 +83,25 @@ def spread(e: Envelopes, h: ObjectEvidence, q: int, bend: float, amplitude: Arra
     amplitude, level : (p, s, j)
         Of its modes under p angles of their axes.
     """
+    lags = (2, 6, 18)  # frames
+    rough = 0.1  # of ln |z| and of a phase: what neighbours, windows and shapes do to a frame
+    largest = 2.0  # of ln |z|: more off is no worse
     k = int(e.line[q])
     decay, omega, t = max(float(h.decay_per_s[k]), 1e-2), 2 * np.pi * float(h.freq_hz[k]), e.time_s[q]
     turn = bend * omega * level[..., None] ** 2 * -np.expm1(-2 * decay * t) / (2 * decay)  # (p, s, j, t)
     modelled = (amplitude[..., None] * np.exp(1j * turn)).sum(axis=2) * np.exp(-decay * t)
     observed, good = e.z[:, q], e.good[:, q]
-    worth = good / (ROUGH**2 + (e.noise[:, q, None] / np.maximum(np.abs(observed), 1e-300)) ** 2)
+    worth = good / (rough**2 + (e.noise[:, q, None] / np.maximum(np.abs(observed), 1e-300)) ** 2)
     agree, most = np.zeros(len(amplitude)), 0.0
-    for lag in LAGS:
+    for lag in lags:
         both = np.conj(_step(observed, lag)) * _step(modelled, lag)
         weight = np.minimum(worth[:, lag:], worth[:, :-lag])
         agree += np.abs((weight * both).sum(axis=(1, 2)))
         most += float(weight.sum())
     off = np.log(np.maximum(np.abs(modelled), 1e-300)) - np.log(np.maximum(np.abs(observed), 1e-300))
     off -= np.median(off[:, good], axis=1)[:, None, None]
-    size = (worth * np.clip(off, -MOST, MOST) ** 2).sum(axis=(1, 2)) / worth.sum()
-    return np.asarray(np.log(size + ROUGH**2) + np.log(np.maximum(2 - 2 * agree / max(most, 1e-300), 0) + ROUGH**2))
+    size = (worth * np.clip(off, -largest, largest) ** 2).sum(axis=(1, 2)) / worth.sum()
+    return np.asarray(np.log(size + rough**2) + np.log(np.maximum(2 - 2 * agree / max(most, 1e-300), 0) + rough**2))
 
 
 def _step(z: Array, lag: int) -> Array:

@@ -21,15 +21,9 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
-WIDTH_HZ = (30.0, 400.0)
-MOST_LINES = 30
-FRAMES = 96
-MOST_SAID = 1e4  # by one frame
-SELF = 0.006  # relative: lines nearer than this may be one bent mode
 # of a frequency; of a decay: a line that near and that short is what a mode was before its frequency had drifted down,
 # or up
 FAR, FASTER = 0.15, 5.0
-HELD = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
 CLEAR = 12.0  # of |z| over the noise in it
 STEP = 1024  # samples between two exact phasors
 
@@ -65,8 +59,9 @@ class Envelopes:
     window_s: Array
 
     def worth(self, s: int, q: int) -> Array:
-        """Compute the weight of each frame (t,) of a line: its level over the noise, squared, at most MOST_SAID."""
-        return np.asarray(np.minimum((np.abs(self.z[s, q]) / max(self.noise[s, q], 1e-12)) ** 2, MOST_SAID))
+        """Compute the weight of each frame (t,) of a line: its level over the noise, squared, at most most_said."""
+        most_said = 1e4  # by one frame
+        return np.asarray(np.minimum((np.abs(self.z[s, q]) / max(self.noise[s, q], 1e-12)) ** 2, most_said))
 
 
 @lru_cache(maxsize=2)
@@ -92,19 +87,20 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
     window : list of int
         Length of each line's window in samples, odd.
     """
+    frames = 96
     nepers = 8.0  # of a line's decay are looked at
     n, sr = signal.shape[1], h.sr
-    z = np.zeros((len(signal), len(selected), FRAMES), complex)
+    z = np.zeros((len(signal), len(selected), frames), complex)
     good = np.zeros(z.shape, bool)
     phase = np.zeros(z.shape)
     noise = np.zeros(z.shape[:2])
-    time = np.zeros((len(selected), FRAMES))
+    time = np.zeros((len(selected), frames))
     floor = h.noise if len(h.noise) == len(signal) and np.isfinite(h.noise).all() else np.zeros(len(signal))
     for q, (k, length) in enumerate(zip(selected, window, strict=True)):
         shape = np.hanning(length + 2)[1:-1]
         shape /= shape.sum()
         last = min(n - length, int(nepers / max(h.decay_per_s[k], 1e-2) * sr) + length)
-        at = np.unique(np.linspace(length // 2, max(last, length // 2 + FRAMES), FRAMES).astype(int))
+        at = np.unique(np.linspace(length // 2, max(last, length // 2 + frames), frames).astype(int))
         at = np.minimum(at, n - 1)
         time[q, : len(at)] = at / sr
         dense = np.arange(at[0], at[-1] + 1, max(length // 8, 1))
@@ -161,7 +157,10 @@ def _running(y: Array, omega: float, theta: float) -> Array:
 
 
 def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
-    """Select lines without a strong neighbour, and a window for each; at most MOST_LINES, from low to high."""
+    """Select lines without a strong neighbour, and a window for each; at most most_lines, from low to high."""
+    width_hz = (30.0, 400.0)
+    most_lines = 30
+    self = 0.006  # relative: lines nearer than this may be one bent mode
     if h.signal is None:
         return [], []
     n, sr = h.signal.shape[1], h.sr
@@ -174,18 +173,18 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
         rival = np.abs(every - h.freq_hz[k])
         # its own beginning, while it was loud
         pitch_fall = (chain == chain[k]) & foreign | (rival < FAR * h.freq_hz[k]) & (decay > FASTER * decay[k])
-        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > SELF * h.freq_hz[k]) & ~pitch_fall
+        near = (rival > 1e-9) & (strength > 0.05 * strength[k]) & (rival > self * h.freq_hz[k]) & ~pitch_fall
         # the louder one of a bent mode's lines stands for it
-        same = (rival < SELF * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~pitch_fall
+        same = (rival < self * h.freq_hz[k]) & (strength > 3 * strength[k]) & ~pitch_fall
         gap = rival[near].min() if near.any() else np.inf
         width = min(
-            0.8 * gap, max([WIDTH_HZ[1], *(2 * rival + decay / np.pi)[pitch_fall & (strength > 0.05 * strength[k])]])
+            0.8 * gap, max([width_hz[1], *(2 * rival + decay / np.pi)[pitch_fall & (strength > 0.05 * strength[k])]])
         )
-        if width >= max(WIDTH_HZ[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
+        if width >= max(width_hz[0], 0.6 * h.decay_per_s[k]) and not same.any() and int(2 * sr / width) < n // 4:
             selected.append(k)
             window.append(int(2 * sr / width) | 1)
-    if len(selected) > MOST_LINES:
-        keep = np.unique(np.linspace(0, len(selected) - 1, MOST_LINES).astype(int))
+    if len(selected) > most_lines:
+        keep = np.unique(np.linspace(0, len(selected) - 1, most_lines).astype(int))
         selected, window = [selected[i] for i in keep], [window[i] for i in keep]
     return selected, window
 
@@ -239,6 +238,7 @@ def falls(e: Envelopes, q: int, fitted: float) -> float:
     fitted : float
         Decay by a linear fit, returned where too few frames are clear.
     """
+    held = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
     top = bottom = 0.0
     for s in range(len(e.z)):
         use = e.good[s, q]
@@ -246,10 +246,10 @@ def falls(e: Envelopes, q: int, fitted: float) -> float:
             continue
         t, size = e.time_s[q, use], np.abs(e.z[s, q, use])
         off = np.gradient(e.phase[s, q, use], t) / (2 * np.pi) * e.window_s[q]
-        w = e.worth(s, q)[use] * (np.abs(off) < HELD)
+        w = e.worth(s, q)[use] * (np.abs(off) < held)
         if (w > 0).sum() < 8:
             continue
-        off = np.clip(off, -HELD, HELD)
+        off = np.clip(off, -held, held)
         # while its frequency drifts, it is observed through the window's skirt
         level = np.log(size * (1 - off**2) / np.sinc(off))
         t = t - np.average(t, weights=w)

@@ -16,11 +16,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 
-ABOVE = 30.0  # times the power beside it
 STEADY = 1.6  # loudest over softest recording
-FEWEST_RECORDINGS, LEAST_S = 2, 0.2  # recordings, and the length of their tails
-# multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
-LOW, UNLIKE = 2, 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +57,10 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     Hum or None
         None where no tone has one amplitude in all recordings, and from first to last.
     """
+    above = 30.0  # times the power beside it
+    fewest_recordings, least_s = 2, 0.2  # recordings, and the length of their tails
+    # multiples where no mode is to be expected; loudest over softest peak of strikes, with which a mode would go
+    low, unlike = 2, 2.0
     still = 0.2  # ln of its amplitude in the second half of the tails over that in the first, at most: modes fade
     most = 8  # multiples
     from scipy.optimize import minimize_scalar
@@ -68,7 +68,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     start = signals.shape[1] - signals.shape[1] // 3
     tail = signals[:, start:]
     n = tail.shape[1]
-    if len(signals) < (1 if known_hz else FEWEST_RECORDINGS) or n < LEAST_S * sr:
+    if len(signals) < (1 if known_hz else fewest_recordings) or n < least_s * sr:
         return None
     shape = np.hanning(n)
     spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
@@ -88,7 +88,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
         tone = np.array(
             [(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in multiple]
         )
-        score = np.log1p(tone / ABOVE).sum(axis=0)
+        score = np.log1p(tone / above).sum(axis=0)
         at = int(score.argmax())
         if score[at] > (1.0 if best is None else best[0]):
             best = float(score[at]), int(near[at]), least
@@ -117,11 +117,11 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     fades = np.diff(np.log(np.abs(parts @ turn) + 1e-300), axis=0)[0].mean(axis=0)  # (i,)
     steady = (
         (size.max(axis=0) < STEADY * size.min(axis=0))
-        & (np.abs(wave) ** 2 > ABOVE * least.T).all(axis=0)
+        & (np.abs(wave) ** 2 > above * least.T).all(axis=0)
         & (np.abs(fades) < still)
     )
     peak = np.abs(signals).max(axis=1)
-    alone = steady.sum() == 1 and not steady[:LOW].any() and peak.max() < UNLIKE * peak.min()
+    alone = steady.sum() == 1 and not steady[:low].any() and peak.max() < unlike * peak.min()
     if not steady.any() or (alone and not known_hz):
         return None
     last = int(np.flatnonzero(steady).max()) + 1

@@ -26,7 +26,6 @@ from sonic_bullet.records import Array
 FRAME_S = 0.012
 DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
 LEAST = 4  # frames: in less no tail shows
-NODES = 8  # of a window's quadrature
 DECAYS = np.geomspace(0.5, 600.0, 31)
 SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
@@ -256,9 +255,10 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
     Returns the first frame's mean, the variances (n,) of a tail of unit reverberant level along directions that are
     uncorrelated, for white noise of unit variance, and the frames' means and directions there (n, 1 + n).
     """
+    nodes = 8  # of a window's quadrature
     faint = 1e-25  # of the direct sound's power
     at = np.array(time)
-    node, weight = (np.arange(NODES) + 0.5) / NODES * FRAME_S, np.hanning(NODES + 2)[1:-1]
+    node, weight = (np.arange(nodes) + 0.5) / nodes * FRAME_S, np.hanning(nodes + 2)[1:-1]
     weight = weight / weight.sum()
     t = (at[:, None] + node).ravel()
     gap = 2 * (decay - delta)
@@ -266,8 +266,8 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
     both = np.exp(-decay * np.abs(t[:, None] - t[None, :])) * np.where(
         t[:, None] < t[None, :], var[:, None], var[None, :]
     )
-    both = weight @ both.reshape(len(at), NODES, -1)
-    both = both.reshape(len(at), len(at), NODES) @ weight
+    both = weight @ both.reshape(len(at), nodes, -1)
+    both = both.reshape(len(at), len(at), nodes) @ weight
     both[both < faint] = 0.0  # or the solver works on numbers that processors are a hundred times slower with
     white = _whitener(time)
     value, vector = np.linalg.eigh(white @ both @ white)

@@ -22,7 +22,6 @@ from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
-FAINT = 40.0  # nepers after which a mode is over
 STEP = 1024  # samples between two exact phasors
 
 
@@ -107,14 +106,15 @@ def sounded(ring: Ring, impact: Impact, n: int, sr: int) -> Array:
     (n,)
         The sound in units of the ring's amplitudes.
     """
+    faint = 40.0  # nepers after which a mode is over
     out = np.zeros(n)
     use = (ring.freq_hz < 0.5 * sr) & (np.abs(ring.amplitude) > 0)
     if not use.any():
         return out
     f, d, a = ring.freq_hz[use], ring.decay_per_s[use], ring.amplitude[use] * impact.spectrum(ring.freq_hz[use])
     length = np.full(len(f), n, np.int64)
-    alive = d * n / sr > FAINT
-    length[alive] = (FAINT / d[alive] * sr).astype(np.int64)
+    alive = d * n / sr > faint
+    length[alive] = (faint / d[alive] * sr).astype(np.int64)
     pole = (-d + 2j * np.pi * f) / sr
     bent = (ring.bend[use] != 0) | (ring.damping_growth[use] != 0)
     for delay, share in zip(impact.delay_s, impact.share, strict=True):

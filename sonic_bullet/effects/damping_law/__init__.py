@@ -26,7 +26,6 @@ from sonic_bullet.records import Array, Material, ModalModel
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
 OMEGA_1 = 2000 * np.pi
 BETTER = 6.0  # in BIC, than Rayleigh's law
-TAKEN, MOST = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
 FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
 
 
@@ -103,6 +102,7 @@ class DampingLaw:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Fit each law to the decays of all lines; None where no law is better than Rayleigh's."""
+        taken, most = 0.1, 0.95  # of what other effects take of a line's decay: how unsure it is; of the decay, at most
         scatter = 0.02  # of a decay about its law, relative, that no law is asked to explain
         omega = np.concatenate([h.omega for h in evidence.observed])
         decay = np.concatenate([h.decay_per_s for h in evidence.observed])
@@ -110,9 +110,9 @@ class DampingLaw:
         rayleigh = 0.5 * (evidence.alpha_per_s + evidence.beta_s * omega**2)
         # what effects found so far take
         extra = np.clip(
-            np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, MOST * decay
+            np.concatenate([h.expected_decay_per_s for h in evidence.observed]) - rayleigh, 0.0, most * decay
         )
-        decay, spread = decay - extra, np.hypot(spread, TAKEN * extra)
+        decay, spread = decay - extra, np.hypot(spread, taken * extra)
         good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
         if good.sum() < (FEWEST_LINES if evidence.known is None else AGAIN):
             return None

@@ -23,9 +23,6 @@ from sonic_bullet.effects.common.proofs import finite
 from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
-ROOM_K = 293.15
-"""Temperature of bodies, 20 °C."""
-
 
 @dataclass(frozen=True)
 class ThermoelasticLoss:
@@ -66,7 +63,8 @@ class ThermoelasticLoss:
     @property
     def strength(self) -> float:
         """Zener's relaxation strength of a beam, Δ = Eα²T/C."""
-        return self.youngs_pa * self.expansion_per_k**2 * ROOM_K / (self.density_kg_m3 * self.heat_capacity_j_kg_k)
+        room_k = 293.15  # Temperature of bodies, 20 °C
+        return self.youngs_pa * self.expansion_per_k**2 * room_k / (self.density_kg_m3 * self.heat_capacity_j_kg_k)
 
     @property
     def diffusivity_m2_s(self) -> float:

@@ -20,9 +20,6 @@ from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
 from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
-# or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the tensor
-IN_A_ROOM = 30.0
-
 
 @dataclass(frozen=True)
 class Orthotropy:
@@ -88,6 +85,9 @@ class Orthotropy:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Search for the tensor that explains all lines best; None where isotropy does as well."""
+        # or in BIC, with a line more within the cap: half of those in a room are no modes, and beyond it whatever the
+        # tensor
+        in_a_room = 30.0
         least = 0.03  # of ln E_i/E_j or ln of Zener's ratio: less is the mesh's
         nearer = 0.7  # of isotropy's rms of ln f, lines beyond the cap counted at the cap
         better = 10.0  # in BIC, than isotropy
@@ -107,7 +107,7 @@ class Orthotropy:
         plain, best = found
         gain, dry = plain.bic - best.bic, any(h.dry for h in evidence.observed)
         anisotropic = gain > better and best.off < nearer * plain.off
-        anisotropic |= dry and gain > IN_A_ROOM and round(lines * (best.matched - plain.matched)) >= 1
+        anisotropic |= dry and gain > in_a_room and round(lines * (best.matched - plain.matched)) >= 1
         if not anisotropic or departure(best) < least:
             return None
         return cls.of(best, bodies[0].elastic.material.density_kg_m3)

@@ -16,9 +16,6 @@ from sonic_bullet.effects.protocol import Elastic, Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 
 CAP = 0.012  # of ln f: a line farther off is no such mode
-# of a line's energy in phase with the impact, where phases are true: a mode moves with it or against it, noise as it
-# likes
-REAL = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +56,9 @@ def ringing(h: ObjectEvidence) -> Array:
 
     Others belong to a click, a filter, a room or noise.
     """
+    # of a line's energy in phase with the impact, where phases are true: a mode moves with it or against it, noise as
+    # it likes
+    real = 0.75
     short = 2.0  # times its frequency a mode's decay at most: a loss factor of 0.64, more than soft rubber's
     brief = 10.0  # times the modes' usual decay
     decay = np.nan_to_num(h.foreign_decay_per_s)
@@ -67,7 +67,7 @@ def ringing(h: ObjectEvidence) -> Array:
         own &= decay < brief * max(float(np.nanmedian(h.decay_per_s)), 1.0)
     if h.elastic is not None and h.elastic.phased and h.signed and len(h.foreign_amplitude) > 1:
         a = np.nan_to_num(h.foreign_amplitude)
-        own &= (a.real**2).sum(axis=0) >= REAL * (np.abs(a) ** 2).sum(axis=0)
+        own &= (a.real**2).sum(axis=0) >= real * (np.abs(a) ** 2).sum(axis=0)
     return np.asarray(own)
 
 

@@ -41,7 +41,6 @@ from sonic_bullet.records import Array
 
 FLOOR = 3e-4  # of ln f: less is not identifiable
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
-PRIOR_N, PRIOR_G = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
 STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 STARTS, BLIND = 24, 12  # of those sifted, taken further; without patterns
 # in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
@@ -49,7 +48,6 @@ HINTED, HOP = 10.0, 2.0
 HOPPERS, HOPS = 3, 6  # ends that are gone on from, and how often
 FIRST = 10  # lines that decide where no pattern does
 FREED = (0, 1, 3)  # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
-NIL = 5.0  # of WIDE: farther off nothing is in common
 # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
 REACH, WIDE = 2.0, 0.014
 
@@ -171,6 +169,7 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
 
 def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Array:
     """Correlate lines, each weighted by first (k,), and modes whose ln λ is shifted (n,): (n,)."""
+    nil = 5.0  # of WIDE: farther off nothing is in common
     place = seen.log_hz + shift[:, None] / 2
     worth = np.interp(place, lines.log_hz, first, 0.0, 0.0)  # (n, m)
     weight = lines.worth[:, None] * first[:, None] * seen.alike**2
@@ -178,7 +177,7 @@ def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Arra
     step = (shift[1] - shift[0]) / 2
     # (k, m, a few)
     at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(
-        -round(NIL * WIDE / step), round(NIL * WIDE / step) + 1
+        -round(nil * WIDE / step), round(nil * WIDE / step) + 1
     )
     near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / WIDE) ** 2)
     here = (at >= 0) & (at < len(shift))
@@ -253,11 +252,12 @@ def _jacobian(symmetry: str, q: Array, of: Callable[[Array], Array]) -> Array:
 
 def _prior(guess: Array) -> Callable[[Array], Array]:
     """Return the function of p that gives the prior's six residuals, in spreads."""
+    prior_n, prior_g = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
 
     def of(p: Array) -> Array:
         e = p[:3]
         goes = 0.5 * np.array([e[1] + e[2], e[0] + e[2], e[0] + e[1]]) - np.log(2 * (1 + p[3:6]))
-        return np.concatenate([(p[3:6] - guess[3:6]) / PRIOR_N, (p[6:] - goes) / PRIOR_G])
+        return np.concatenate([(p[3:6] - guess[3:6]) / prior_n, (p[6:] - goes) / prior_g])
 
     return of
 

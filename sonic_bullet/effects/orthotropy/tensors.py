@@ -17,8 +17,6 @@ SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "h
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 RATIOS = (0.04, 0.1, 0.25, 0.6, 1.5, 4.0, 10.0)
 MILD = (0.16, 0.4, 1.0, 2.5, 6.0)
-ZENER = (0.4, 0.5, 0.62, 0.77, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0, 2.5)
-POISSON = (-0.1, 0.0, 0.1)  # beside the guess'
 
 
 def stiffness(p: Array) -> Array:
@@ -83,9 +81,11 @@ def p_of(stiffness_m2_s2: Array) -> Array:
 
 def cubes(start: Array) -> list[Array]:
     """Return cubic tensors p to start a search from, about an isotropic one."""
+    zener = (0.4, 0.5, 0.62, 0.77, 0.9, 1.0, 1.15, 1.35, 1.6, 2.0, 2.5)
+    poisson = (-0.1, 0.0, 0.1)  # beside the guess'
     found = []
-    for ratio in ZENER:
-        for more in POISSON:
+    for ratio in zener:
+        for more in poisson:
             p = np.array(start)
             p[3:6] = np.clip(p[3:6] + more, 0.05, 0.42)
             p[6:] = p[:3] - np.log(2 * (1 + p[3:6])) + np.log(ratio)

@@ -29,7 +29,6 @@ from sonic_bullet.effects.rebound.later_hits import (
 )
 from sonic_bullet.records import Array
 
-NEAR = 0.03  # of ln t: delays that agree
 MOST, FEW = (
     0.6,
     0.05,
@@ -39,10 +38,8 @@ MOST, FEW = (
 FADE = 2.0  # nepers over what is looked at
 # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
 ALL, CLEARLY, HALF = 0.25, 1.35, 0.5
-RATIOS = (0.75, 0.9, 1.0)
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
-SOUGHT = 0.07  # of what is left, that a third hit looked for at every lag must take: some lag always takes something
 
 
 @dataclass(frozen=True)
@@ -182,6 +179,9 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
 
     Returns what is left, up to a constant, and the fitted fields. known: whether start is near the solution.
     """
+    ratios = (0.75, 0.9, 1.0)
+    # of what is left, that a third hit looked for at every lag must take: some lag always takes something
+    sought = 0.07
     held = 0.999  # of the energy of what is played again
     assert h.signal is not None
     n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
@@ -223,7 +223,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     tries = [
         np.array([e, 0.0, r])
         for e in (first[0], *RESTITUTIONS)
-        for r in (first[2:] if start.shrink is None else (first[2], e, *RATIOS))
+        for r in (first[2:] if start.shrink is None else (first[2], e, *ratios))
     ]
     best = min(tries, key=left)
     found = _nearby(left, best)
@@ -233,7 +233,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
         whole[:, :, loud] = both, own
         e = third_hit(gap, whole[0], whole[1], total, h.sr, fade)
         other = _nearby(left, np.array([e, 0.0, e]))
-        found = other if found[0] - other[0] > SOUGHT * (len(level) + found[0]) else found
+        found = other if found[0] - other[0] > sought * (len(level) + found[0]) else found
     return found[0], of(found[1])
 
 
@@ -267,9 +267,10 @@ def _agreed(value: list[Array], share: list[Array]) -> tuple[float, float, list[
 
     Returns (sum of shares, value, which of each strike's or -1).
     """
+    nearby = 0.03  # of ln t: delays that agree
     best: tuple[float, float, list[int]] = (0.0, 0.0, [-1] * len(value))
     for centre in np.concatenate([*value, np.zeros(0)]):
-        near = [np.where(np.abs(v - centre) < NEAR, s, 0.0) for v, s in zip(value, share, strict=True)]
+        near = [np.where(np.abs(v - centre) < nearby, s, 0.0) for v, s in zip(value, share, strict=True)]
         total = float(sum(s.max(initial=0.0) for s in near))
         if total > best[0]:
             which = [int(s.argmax()) if s.any() else -1 for s in near]

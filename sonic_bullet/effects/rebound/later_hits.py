@@ -15,12 +15,10 @@ from sonic_bullet.effects.common.ringing import direct_as_expected
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
-FINER, LOWEST = 4, 0.15  # lags to a sample; restitution
 SPAN_S = (1.2e-3, 0.25)
 MOST_HITS = 8
 OWN = 0.02  # of the energy of a later hit: what the first does not say as well, at least
 LEAST = 0.06  # of the first hit's share
-GAIN = 0.02  # of what is left must go with another hit
 EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
 
@@ -95,15 +93,16 @@ def third_hit(gap_s: Array, both: Array, own: Array, total: Array, sr: int, fade
     fade : float
         Rate in 1/s of the exponential by which both are weighted.
     """
+    finer, lowest = 4, 0.15  # lags to a sample; restitution
     size = 2 * (both.shape[1] - 1)
-    cross, auto = (np.fft.irfft(x, FINER * size, axis=1) * (FINER * size / 2) for x in (both, own))
-    e = np.arange(LOWEST, 1.0, 1 / (FINER * sr * gap_s.max()))
+    cross, auto = (np.fft.irfft(x, finer * size, axis=1) * (finer * size / 2) for x in (both, own))
+    e = np.arange(lowest, 1.0, 1 / (finer * sr * gap_s.max()))
     said = np.zeros(len(e))
     for c, a, g, energy in zip(cross, auto, gap_s, total, strict=True):
         late = g * (1 + e)
         second, third = e * np.exp(-fade * g), e**2 * np.exp(-fade * late)
         c_2, c_3, a_2, a_3, a_23 = (
-            _lagged(x, np.rint(t * sr * FINER).astype(int))
+            _lagged(x, np.rint(t * sr * finer).astype(int))
             for x, t in ((c, g), (c, late), (a, g), (a, late), (a, late - g))
         )
         product = c[0] + second * c_2 + third * c_3
@@ -125,6 +124,7 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
     Matching pursuit [Mallat & Zhang 1993]: the sound of one hit, by the lines and the model, is sought later in what is
     left; after every find all shares are solved together.
     """
+    gain = 0.02  # of what is left must go with another hit
     assert h.signal is not None
     sound = direct_as_expected(h)
     reach = min(int(SPAN_S[1] * h.sr), h.signal.shape[1])
@@ -140,7 +140,7 @@ def hits_by_strike(h: ObjectEvidence) -> list[list[tuple[float, float]]]:
             trial = [*lags, lag]
             new, made = _solved(x, y, trial, h.sr)
             before, after = ((y - left) ** 2).sum(), ((y - made) ** 2).sum()
-            if after > (1 - GAIN) * before or new[-1] < LEAST * new[0]:
+            if after > (1 - gain) * before or new[-1] < LEAST * new[0]:
                 break
             lags, share, left = trial, new, made
         rest = sorted(

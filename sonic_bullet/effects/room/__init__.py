@@ -27,12 +27,7 @@ RT60 = float(np.log(1e3))
 RATES = np.geomspace(1.7, 70.0, 16)  # of δ in 1/s: rt60 of 4 to 0.1 s
 FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
 LINES = 24  # the strongest
-CAP = 20.0  # of ln likelihood: what one line can speak against a rate
 FASTER, FEWEST_LINES, SHARE = 1.25, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
-# ln likelihood a line gains; of all lines: so few will do where FEWEST_LINES tell it as plainly as that
-PLAINLY, LESS = 100.0, 0.25
-# ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
-TELLS, ALIKE = 10.0, 0.3
 # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
 TURNS, AGAIN, FULLY = 150, 40, 400
 
@@ -198,17 +193,22 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
 
 
 def _agreed(r: reverberant_tail.Read) -> Array:
-    """Compute ln likelihood (t,) of each rate, no line's influence larger than CAP."""
-    return np.asarray(np.maximum(r.ln_likelihood - r.ln_likelihood.max(axis=0), -CAP).sum(axis=1))
+    """Compute ln likelihood (t,) of each rate, no line's influence larger than cap."""
+    cap = 20.0  # of ln likelihood: what one line can speak against a rate
+    return np.asarray(np.maximum(r.ln_likelihood - r.ln_likelihood.max(axis=0), -cap).sum(axis=1))
 
 
 def _one(r: reverberant_tail.Read, best: int) -> bool:
     """Decide whether lines that decay faster than the room end with it, all of them alike."""
+    # ln likelihood a line gains; of all lines: so few will do where FEWEST_LINES tell it as plainly as that
+    plainly, less = 100.0, 0.25
+    # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
+    tells, alike = 10.0, 0.3
     gain, delta = r.ln_likelihood[best] - r.plain, r.delta[best]
-    mine = (r.decay_per_s[best] > FASTER * delta) & (gain > TELLS)
+    mine = (r.decay_per_s[best] > FASTER * delta) & (gain > tells)
     off = np.abs(np.log(r.delta[r.ln_likelihood.argmax(axis=0)] / delta))[mine]
-    many = mine.mean() > SHARE or (mine.mean() > LESS and (gain[mine] > PLAINLY).sum() >= FEWEST_LINES)
-    return bool(mine.sum() >= FEWEST_LINES and many and np.median(off) < ALIKE and (off < 2 * ALIKE).mean() > 0.7)
+    many = mine.mean() > SHARE or (mine.mean() > less and (gain[mine] > plainly).sum() >= FEWEST_LINES)
+    return bool(mine.sum() >= FEWEST_LINES and many and np.median(off) < alike and (off < 2 * alike).mean() > 0.7)
 
 
 def identified(

@@ -14,8 +14,6 @@ import numpy as np
 from sonic_bullet.records import Array
 
 LEAST, MOST = 2e-3, 0.08  # of |ln(1 + ε)|: closer ones are degenerate modes; 14 m/s of a reflector
-NEAR = 3e-4  # of ln f: echoes that agree
-ALIKE, DECAY = 0.97, 0.1  # cosine over the strikes; of ln d
 # pairs; of all lines, in pairs: what comes late is no sum of modes, and leaves other lines besides
 FEWEST_PAIRS, SHARE = 5, 0.2
 ALL = 0.5  # of all two lines alike: then strikes tell none apart
@@ -36,6 +34,8 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
     float or None
         None where fewer than SHARE of all lines recur.
     """
+    nearby = 3e-4  # of ln f: echoes that agree
+    alike, decay = 0.97, 0.1  # cosine over the strikes; of ln d
     chance = 1e-6  # that so many agree on any ratio, of pairs that fall anywhere
     from scipy.stats import poisson
 
@@ -45,15 +45,15 @@ def copied(freq_hz: Array, decay_per_s: Array, amplitude: Array) -> float | None
         return None
     size = size / np.maximum(np.linalg.norm(size, axis=0), 1e-300)
     up, slower = np.log(f[None, :] / f[:, None]), np.log(d[None, :] / d[:, None])
-    like = np.abs(size.conj().T @ size) > ALIKE
+    like = np.abs(size.conj().T @ size) > alike
     if like.mean() > ALL:
         return None
-    lower, upper = np.nonzero((up > LEAST) & (up < MOST) & (np.abs(slower - up) < DECAY) & like)
+    lower, upper = np.nonzero((up > LEAST) & (up < MOST) & (np.abs(slower - up) < decay) & like)
     ratio = up[lower, upper]
-    near = np.abs(ratio[:, None] - ratio) < NEAR
+    near = np.abs(ratio[:, None] - ratio) < nearby
     pairs = [min(len(np.unique(lower[row])), len(np.unique(upper[row]))) for row in near]
     many = max(pairs, default=0)
-    wide = 2 * NEAR / (MOST - LEAST)
+    wide = 2 * nearby / (MOST - LEAST)
     if (
         many < FEWEST_PAIRS
         or 2 * many < SHARE * len(f)

@@ -23,7 +23,6 @@ from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import NEARER, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
 
-FEWEST_LINES, AGAIN = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
 LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
 
 
@@ -76,10 +75,11 @@ class SupportDamping:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Search for dashpots on the object with most lines; None where there are none."""
+        fewest_lines, again = 6, 4  # lines: to look for dashpots, and to fit them again to a part of them
         observed = max(evidence.observed, key=lambda h: len(h.freq_hz) if h.model is not None else 0)
         if (
             observed.model is None
-            or len(observed.freq_hz) < (FEWEST_LINES if evidence.known is None else AGAIN)
+            or len(observed.freq_hz) < (fewest_lines if evidence.known is None else again)
             or not np.isfinite(observed.decay_per_s).all()
         ):
             return None

@@ -38,13 +38,7 @@ LEVEL = 0.3  # of ln of a line's level
 MISSED = 9.0
 GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
 LOST = 2 * GROSS + MISSED  # that a line costs at most
-AT_ONCE = 100  # trials whose poles are found together: (100, m, m) complex, 64 MB of 200 modes
 MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewhere
-# of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its
-# degenerate partner
-WEAK, HALF = 0.05, 0.5
-# quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that it hides
-CLEAR, LONGER = 0.25, 2.0
 # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
 RUN, WIDE = 10, 20
 
@@ -119,6 +113,9 @@ class DashpotFit:
     @classmethod
     def of(cls, h: ObjectEvidence) -> DashpotFit:
         """Prepare the fit of an object."""
+        # of the worth of a line that the model does not expect: it may be a click or another body's; near a mode, its
+        # degenerate partner
+        weak, half = 0.05, 0.5
         x = h.model
         assert x is not None
         lone = np.zeros(len(h.foreign_hz))
@@ -133,7 +130,7 @@ class DashpotFit:
         strength = np.nan_to_num(size).max(axis=0)
         worth = np.clip(
             1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1
-        ) * np.where(is_mode, 1, np.where(at_home, HALF, WEAK))
+        ) * np.where(is_mode, 1, np.where(at_home, half, weak))
         amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
         into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
@@ -174,9 +171,10 @@ class DashpotFit:
         return self._pairs(omega, x.decay_per_s, self._alike(omega, x.decay_per_s, self.into * self.out))[:2]
 
     def poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> Iterator[tuple[Array, Array]]:
-        """Yield poles (m,) and turns (m, m) of many trials; modes couple within runs only; AT_ONCE are in memory."""
-        for first in range(0, len(trials), AT_ONCE):
-            yield from self._poles(trials[first : first + AT_ONCE], runs)
+        """Yield poles (m,) and turns (m, m) of many trials; modes couple within runs only; at_once are in memory."""
+        at_once = 100  # trials whose poles are found together: (100, m, m) complex, 64 MB of 200 modes
+        for first in range(0, len(trials), at_once):
+            yield from self._poles(trials[first : first + at_once], runs)
 
     def _poles(self, trials: list[Dashpots], runs: tuple[Array, ...]) -> list[tuple[Array, Array]]:
         """Compute poles and turns of some trials."""
@@ -257,19 +255,22 @@ class DashpotFit:
 
     def _unobserved(self, mode: Array, omega: Array, decay: Array, push: Array) -> float:
         """Compute the cost of modes (m,) without a line that would be observable; mode (p,): those with a line."""
+        # quantile of the energy of modes that are observed, for one that would be; times a line's decay, for one that
+        # it hides
+        clear, longer = 0.25, 2.0
         freq = omega / (2 * np.pi)
         level = np.abs(push).max(axis=0) * self._through(freq)
         paired = np.bincount(mode, minlength=len(omega)) > 0
         energy = level**2 / np.maximum(decay, 1e-3)
         loud = (
             ~paired
-            & (energy > np.quantile(energy[paired], CLEAR))
+            & (energy > np.quantile(energy[paired], clear))
             & (freq > freq[paired].min())
             & (freq < freq[paired].max())
         )
         near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * WIDTH
         # a line of unknown decay may be any
-        hidden = (near & ~(self.rings_per_s[:, None] > LONGER * decay[loud])).any(axis=0)
+        hidden = (near & ~(self.rings_per_s[:, None] > longer * decay[loud])).any(axis=0)
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[paired].max(), 1e-300), 1e-6)), 0.1, 1)
         return float(MUTE * worth[~hidden].sum())
 

@@ -11,14 +11,13 @@ import numpy as np
 from sonic_bullet.effects.common.points import solved
 from sonic_bullet.records import Array
 
-# of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes as
-# ω²
-TAU_S = (1e-5, 3e-5, 1e-4)
-
 
 def smooth_columns(omega: Array) -> Array:
     """Compute the columns (k, 3 + τ) of a smooth law of ω (k,) in rad/s."""
-    peak = [(omega * tau) ** 2 / (1 + (omega * tau) ** 2) for tau in TAU_S]
+    # of relaxations that peak in what is heard, between slow ones, whose decay is a constant, and fast ones, whose goes
+    # as ω²
+    tau_s = (1e-5, 3e-5, 1e-4)
+    peak = [(omega * tau) ** 2 / (1 + (omega * tau) ** 2) for tau in tau_s]
     return 0.5 * np.stack([np.ones(len(omega)), omega / 1e4, (omega / 1e4) ** 2, *peak], axis=1)
 
 

@@ -17,8 +17,6 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
 POINTS, SPOTS = 90, 500  # vertices where another dashpot is looked for; and where the first is, or one that is moved
-STEPS = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
-FINER, COARSER = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
 # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
 LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10
 NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
@@ -155,9 +153,10 @@ def _spread(t: DashpotFit, count: int) -> Array:
 
 
 def _strengths(t: DashpotFit) -> Array:
-    """Return STEPS times the strength in N·s/m that doubles the typical decay."""
+    """Return steps times the strength in N·s/m that doubles the typical decay."""
+    steps = (0.06, 0.25, 1.0, 4.0, 16.0)  # of the strength that doubles the typical decay
     square = float((t.model.shape[t.body].astype(float) ** 2).sum(axis=1).mean()) / 3
-    return np.array(STEPS) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
+    return np.array(steps) * 2 * float(np.median(t.decay_per_s)) / max(square, 1e-300)
 
 
 def refined(
@@ -196,16 +195,17 @@ def refined(
 
 def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Dashpot]:
     """Return variants of a dashpot: elsewhere with the same strength or loss, stronger, weaker, other direction."""
+    finer, coarser = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
     if not np.isfinite(reach_m):
         some = spots[: 2 * POINTS].tolist()
         return (
             [_moved(t, d, v) for v in some]
             + [replace(d, vertex=v) for v in some]
-            + [replace(d, c=d.c * f) for f in COARSER]
+            + [replace(d, c=d.c * f) for f in coarser]
         )
     near = _within(t, d, reach_m, spots)
     near = near[:NEAR] if len(near) >= FEW else _within(t, d, reach_m, t.body)
-    found = [replace(d, c=d.c * f) for f in FINER]
+    found = [replace(d, c=d.c * f) for f in finer]
     found.append(replace(d, along="every" if d.along == "normal" else "normal"))
     some = near[:: max(1, len(near) // NEAR)].tolist()
     return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]

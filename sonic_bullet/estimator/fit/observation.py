@@ -19,8 +19,6 @@ from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-OFF_SURFACE = 0.02  # of the body's diagonal: farther from the surface a point is not on it
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
@@ -89,8 +87,9 @@ def observation(
 
 
 def _row(family: Family, position: tuple[float, float, float], direction: Array, what: str) -> Array:
+    off_surface = 0.02  # of the body's diagonal: farther from the surface a point is not on it
     rows, distance = family.points(np.array([position]), direction[None, :])
-    if not distance[0] <= OFF_SURFACE * family.length_m:
+    if not distance[0] <= off_surface * family.length_m:
         place = ", ".join(f"{x:g}" for x in position)
         raise MeshError(
             f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface",

@@ -27,7 +27,6 @@ DEGENERATE_SPLIT = 6e-4
 MESHED = 2.5  # times as far apart where elements have split them
 MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
 GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
-MISSED_ENERGY = 0.3
 HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
 # times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first
 # milliseconds are made of such lines, bodies' modes seldom
@@ -197,6 +196,7 @@ def best_pairs(
 
 def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple[Array, Array, float]:
     """Lines and modes paired at the least price: (p,), (p,), price. width: of ln f."""
+    missed_energy = 0.3
     from scipy.optimize import linear_sum_assignment
 
     size, strength, alike = _patterns(lines, seen, group.pattern)
@@ -212,7 +212,7 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
     # where no pattern tells modes apart, those between the lines that nobody observed count against
     if not _usable(lines, seen).any():
         between = (group.freq_hz > lines.freq_hz.min() * 0.98) & (group.freq_hz < lines.freq_hz.max() * 1.02)
-        missed = MISSED_ENERGY * float((between & ~np.isin(np.arange(len(between)), column)).sum())
+        missed = missed_energy * float((between & ~np.isin(np.arange(len(between)), column)).sum())
     return row, column, float(line_worth.sum() + (worth * (price - 1.0))[row, column].sum()) + missed
 
 

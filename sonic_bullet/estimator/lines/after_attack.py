@@ -25,14 +25,12 @@ from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-LISTENED_S = 2.0
 BAND_HZ, PASS_WIDTHS, STOP_WIDTHS, OVERSAMPLED = (
     400.0,
     0.5,
     1.5,
     2.0,
 )  # of a band's width from its centre; rate over width
-MATRIX_ROWS, MATRIX_COLUMNS, MOST_POLES = 240, 800, 40  # of a band's data matrix; poles looked for
 OWN_SHARE = 0.5
 WIDTHS_AROUND = 7  # widths, from two on, above and below a line
 
@@ -52,12 +50,13 @@ class _Band:
 
 def ringing_lines(signals: Array, sr: int, band_hz: tuple[float, float], *, signed: bool) -> Lines:
     """Lines of signals (s, n) that start at the onset; none where nothing rings."""
+    listened_s = 2.0
     attack_s = 0.005  # and a band's filter, 16 ms: together twice what it lasts in real takes
     false_alarms = 0.05  # of a recording of noise alone
     from scipy.special import chdtri
 
     late = round(attack_s * sr)
-    rest = signals[:, late : late + int(LISTENED_S * sr)]
+    rest = signals[:, late : late + int(listened_s * sr)]
     least = float(chdtri(2 * len(signals), false_alarms / (1.5 * rest.shape[1])) / 2)
     found = parallel_map(lambda band: _lines_of(band, sr, least), _bands(rest, sr, band_hz))
     pole, amplitude, spread, amplitude_sd, energy = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
@@ -147,15 +146,16 @@ def _lines_of(band: _Band, sr: int, least: float) -> tuple[Array, Array, Array, 
 
 def _candidates(y: Array) -> Array:
     """Poles (k,) per sample of series (s, m)."""
+    matrix_rows, matrix_columns, most_poles = 240, 800, 40  # of a band's data matrix; poles looked for
     from scipy.linalg import eigh
     from scipy.linalg.blas import zherk
 
     m = y.shape[1]
-    rows = min(MATRIX_ROWS, m // 3)
+    rows = min(matrix_rows, m // 3)
     if rows < 8:
         return np.zeros(0, complex)
-    data = np.concatenate([sliding_window_view(row, rows)[:: 1 + (m - rows) // MATRIX_COLUMNS] for row in y])
-    most = min(MOST_POLES, rows // 2)
+    data = np.concatenate([sliding_window_view(row, rows)[:: 1 + (m - rows) // matrix_columns] for row in y])
+    most = min(most_poles, rows // 2)
     gram = zherk(1.0, data.T, lower=1)
     vector = eigh(gram, subset_by_index=(rows - most, rows - 1), check_finite=False)[1]
     last = vector[-1]  # of orthonormal columns: V₁ᴴV₁ = I − v̄ vᵀ, by which the shift needs no least squares

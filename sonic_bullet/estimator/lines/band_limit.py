@@ -11,7 +11,6 @@ from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
 LOWEST_HEARD_HZ = 20.0  # of what is heard
-PERIODS, BAND_ORDER = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
 
 
 def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
@@ -31,14 +30,15 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     (n,) array
         The filtered samples, at the same times.
     """
+    periods, band_order = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
     fall = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
     from scipy.fft import irfft, next_fast_len, rfft
 
     low, high = band_hz
-    reach = min(len(signal), round(PERIODS / max(low, 1.0) * sr))
+    reach = min(len(signal), round(periods / max(low, 1.0) * sr))
     # a hum or a tone goes on, and fades: one that is cut off would begin and end with a click, which is in every band
     fade = _raised(np.arange(reach), reach, 0)
-    ends = [predicted_on(part, BAND_ORDER, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
+    ends = [predicted_on(part, band_order, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
     whole = np.concatenate([ends[0][::-1], signal, ends[1]])
     size = next_fast_len(2 * len(whole))
     freq = np.arange(size // 2 + 1) * sr / size

@@ -18,7 +18,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
 ONSET_BLOCK_S = 1e-3
-SHOWN_HITS = 6  # hits whose times are said
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +35,9 @@ class Span:
 
     def describe_hits(self, sr: int) -> str:
         """Say how many hits there are, and when; nothing of a single one."""
-        times = [f"{at / sr:.2f}" for at in (self.start, *self.later)][:SHOWN_HITS]
-        more = ", …" if self.hits > SHOWN_HITS else f" and {times.pop()}"
+        shown_hits = 6  # hits whose times are said
+        times = [f"{at / sr:.2f}" for at in (self.start, *self.later)][:shown_hits]
+        more = ", …" if self.hits > shown_hits else f" and {times.pop()}"
         return f"{self.hits} hits, at {', '.join(times)}{more} s" if self.later else ""
 
 

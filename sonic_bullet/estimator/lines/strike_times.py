@@ -13,7 +13,6 @@ import numpy as np
 from sonic_bullet.estimator.lines.linear_prediction import prediction_error_filter
 from sonic_bullet.records import Array
 
-SHARPENED_ORDER = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
 STRIKE_BLOCK_S, GAP_S = 1e-3, 0.05
 
 
@@ -32,6 +31,7 @@ def find_strikes(signal: Array, sr: int) -> Array:
     (s,) array
         Times in s from the first sample, in order; empty where nothing stands out of what could be predicted.
     """
+    sharpened_order = 64  # terms of the recursion: 32 modes, or fewer and a noise's colour
     near_s = 0.25
     above_db = 12.0  # over the median of the blocks within near_s: gaussian noise of 1 ms stays below 3 dB
     below_db = 26.0  # a strike that much below the largest is a neighbour's, a cable's or a reflection's
@@ -41,7 +41,7 @@ def find_strikes(signal: Array, sr: int) -> Array:
     count = len(signal) // block
     if count < 20 or not np.any(signal):
         return np.zeros(0)
-    left = np.convolve(signal, prediction_error_filter(signal, SHARPENED_ORDER))
+    left = np.convolve(signal, prediction_error_filter(signal, sharpened_order))
     power = (left[: count * block].reshape(count, block) ** 2).mean(axis=1)
     near = median_filter(power, min(round(2 * near_s / STRIKE_BLOCK_S), count) | 1, mode="nearest")
     stands = power > np.maximum(near * 10 ** (above_db / 10), power.max() * 10 ** (-below_db / 10))

@@ -16,9 +16,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-# of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
-ROUNDING = 1e-7
-
 
 def low_pass(passed: float, stopped: float, stop_db: float) -> Array:
     """Taps (l,), l odd, of a linear-phase low-pass with gain 1 at 0 Hz.
@@ -80,6 +77,8 @@ def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -
 
     widest: of the window; most: how many poles.
     """
+    # of the largest singular value, by way of H Hᴴ: enough for what a converter writes; exact_modes.py is for the rest
+    rounding = 1e-7
     columns_most = 1200
     n = len(band)
     window = min(widest, n // 3)
@@ -90,7 +89,7 @@ def _shift_poles(band: Array, noise: float, widest: int = 140, most: int = 40) -
     hankel = band[first[None, :] + np.arange(window)[:, None]]
     power, left = np.linalg.eigh(hankel @ hankel.conj().T)
     size, left = np.sqrt(np.maximum(power[::-1], 0)), left[:, ::-1]
-    edge = max(1.05 * noise * (np.sqrt(len(first)) + np.sqrt(window)), ROUNDING * size[0])
+    edge = max(1.05 * noise * (np.sqrt(len(first)) + np.sqrt(window)), rounding * size[0])
     order = min(int((size > edge).sum()), window - 2, most)
     if order == 0:
         return np.zeros(0, complex)

@@ -12,8 +12,6 @@ from sonic_bullet.files.gltf.gltf_writer import FLOAT
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 
-INDEX_TYPES = (5123, 5125)
-
 
 def named_values(
     tree: GltfTree,
@@ -28,13 +26,14 @@ def named_values(
 
     name: whose it is, in words; kind: SCALAR, VEC3; count: of how many; whole: indices.
     """
+    index_types = (5123, 5125)
     index, all_of_them = entry.get(key), tree.tree.get("accessors", ())
     if index is None:
         raise tree.error(f"{name} has no {key}", tree.remedy)
     if not isinstance(index, int) or not 0 <= index < len(all_of_them):
         raise tree.error(f"{name}: {key} is accessor {shown(index)} of {len(all_of_them)}", tree.remedy)
     it = all_of_them[index]
-    types = INDEX_TYPES if whole else (FLOAT,)
+    types = index_types if whole else (FLOAT,)
     if it.get("type") != kind or it.get("componentType") not in types:
         raise tree.error(
             f"{name}: {key} are {it.get('type')} of component type {it.get('componentType')}, wanted {kind} of "

@@ -23,9 +23,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import SonicBulletError
 
-COMPONENT = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GltfTree:
@@ -43,8 +40,10 @@ class GltfTree:
 
     def accessor(self, index: int) -> Array:
         """Read an accessor (n, width) as float, or integer where it is not normalised; raises ``error``."""
+        component = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+        width_limit = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
         it = self.tree["accessors"][index]
-        kind, width, count = np.dtype(COMPONENT[it["componentType"]]), WIDTH[it["type"]], int(it["count"])
+        kind, width, count = np.dtype(component[it["componentType"]]), width_limit[it["type"]], int(it["count"])
         if "sparse" in it or "bufferView" not in it:
             raise self.error("an accessor is sparse or empty", "export with full accessors")
         view = self.tree["bufferViews"][it["bufferView"]]

@@ -22,7 +22,6 @@ from sonic_bullet.records.errors import FileError
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
-LARGEST_BYTES = 1 << 30
 
 
 @dataclass(slots=True)
@@ -60,7 +59,8 @@ class GltfBuffer:
 
 def write_gltf(path: str | os.PathLike[str], tree: dict[str, Any], buffer: GltfBuffer) -> None:
     """Write a tree with its buffer, whole or not at all: .glb, else .gltf; raises FileError."""
-    if buffer.size > LARGEST_BYTES:
+    largest_bytes = 1 << 30
+    if buffer.size > largest_bytes:
         raise FileError(f"cannot write {path}: it would hold over a gigabyte", "keep fewer modes or points")
     data = b"".join(buffer.parts)
     binary = Path(path).suffix.lower() == ".glb"

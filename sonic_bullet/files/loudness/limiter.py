@@ -17,8 +17,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LOOKAHEAD_S = 0.005
-"""One period of 200 Hz: the descent is too slow to be audible as a click, and the strike after it masks it."""
 RELEASES_DB_S = (100.0, 400.0, 1600.0, 6400.0)
 """6 dB in 60 ms, longer than a period of 20 Hz: low tones are not distorted. Struck bodies decay faster;
 where their loudness asks for it, the next is taken."""
@@ -28,13 +26,15 @@ MARGIN_DB = 0.25
 
 def limiter_factor(peak_db: Array, sr: int, ceiling_db: float, release_db_s: float) -> Array:
     """Return factors (n,) that bring true peaks (n,) in dB down to at most ``ceiling_db``."""
+    # One period of 200 Hz: the descent is too slow to be audible as a click, and the strike after it masks it
+    lookahead_s = 0.005
     from scipy.ndimage import minimum_filter1d
     from scipy.signal import oaconvolve
 
     wanted = np.minimum(0.0, ceiling_db - peak_db)
     slope = release_db_s / sr * np.arange(len(wanted))
     held = np.minimum.accumulate(wanted - slope) + slope
-    width = 2 * round(LOOKAHEAD_S * sr / 2) + 1
+    width = 2 * round(lookahead_s * sr / 2) + 1
     padded = np.concatenate([held, np.repeat(held[-1:], width - 1)])
     # of frames i … i + width - 1, at i; the mean at i is then of those that began i - width + 1 … i, all of which saw i
     ahead = minimum_filter1d(np.minimum(padded, 0.0), width, origin=-(width // 2))[: len(wanted)]

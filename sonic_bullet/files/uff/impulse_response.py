@@ -27,7 +27,6 @@ LOWEST_MEASURED_HZ = 20.0
 BAND = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
 BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
 OFF_RATE = 5e-5  # relative: six figures of a step, and their last
-PREDICTION_ORDER = 128  # of the prediction: two for each of 64 modes that begin at the jump
 MOTION_ORDER = {"acceleration": -1, "velocity": 0, "displacement": 1}
 """Powers of iω from a quantity to velocity."""
 
@@ -76,8 +75,9 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
 
 def _predicted_back(sound: Array, jump: int) -> Array:
     """Predict the first samples of a recording (n,) from later ones; unchanged where it is too short."""
+    prediction_order = 128  # of the prediction: two for each of 64 modes that begin at the jump
     exact = 1e-13  # of the largest eigenvalue: below it are rounding errors
-    order = min(PREDICTION_ORDER, (len(sound) - jump) // 8)
+    order = min(prediction_order, (len(sound) - jump) // 8)
     if order < 2:
         return sound
     window = np.lib.stride_tricks.sliding_window_view(sound[jump : jump + 7 * order], order + 1)

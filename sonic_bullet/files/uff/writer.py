@@ -18,7 +18,6 @@ from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-VELOCITY, FORCE_TYPE, FREQUENCY = 11, 13, 18
 TITLE = 80
 
 
@@ -152,6 +151,7 @@ def _mode(shapes: ModalShapes, k: int, title: str) -> dict[str, Any]:
 
 def _function(one: Mobility, title: str) -> dict[str, Any]:
     """Make dataset 58 of a response."""
+    velocity, force_type, frequency = 11, 13, 18
     return {
         "type": 58,
         "func_type": 4,
@@ -162,9 +162,9 @@ def _function(one: Mobility, title: str) -> dict[str, Any]:
         "ref_node": one.strike.node,
         "ref_dir": one.strike.axis,
         "abscissa_spacing": 1,
-        "abscissa_spec_data_type": FREQUENCY,
-        "ordinate_spec_data_type": VELOCITY,
-        "orddenom_spec_data_type": FORCE_TYPE,
+        "abscissa_spec_data_type": frequency,
+        "ordinate_spec_data_type": velocity,
+        "orddenom_spec_data_type": force_type,
         "x": one.step_hz * np.arange(len(one.value)),
         "data": np.asarray(one.value, complex),
     }

@@ -25,8 +25,6 @@ SIZED: dict[Any, tuple[ShapeKind, Callable[[float, float, float], tuple[float, f
     GEOM.mjGEOM_BOX: ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
 }
 """Kind of shape, and its size_m of a geom's size: MuJoCo's are half lengths."""
-ELLIPSOID_RINGS = 24
-"""Rings of triangles of an ellipsoid, of twice as many each."""
 
 
 def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, placed: bool = True) -> Shape:
@@ -75,9 +73,10 @@ def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, pl
 
 def _ellipsoid(radius_m: Array) -> tuple[Array, Array]:
     """Return vertices and triangles of an ellipsoid about the origin."""
+    ellipsoid_rings = 24  # Rings of triangles of an ellipsoid, of twice as many each
     from trimesh.creation import uv_sphere
 
-    made = uv_sphere(radius=1, count=[ELLIPSOID_RINGS, 2 * ELLIPSOID_RINGS])
+    made = uv_sphere(radius=1, count=[ellipsoid_rings, 2 * ellipsoid_rings])
     vertex, face = np.array(made.vertices), made.faces.astype(np.int32)
     fuller = np.cbrt(4 / 3 * np.pi / volume_m3(vertex, face))  # of the same volume
     return fuller * vertex * radius_m, face

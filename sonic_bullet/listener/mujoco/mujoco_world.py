@@ -29,17 +29,6 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import Values, finite
 
-MUJOCO_OPTIONS = (
-    "timestep",
-    "impratio",
-    "tolerance",
-    "iterations",
-    "noslip_iterations",
-    "integrator",
-    "cone",
-    "solver",
-)
-
 
 class MujocoWorld(MotionWorld):
     """A `World` that reads one MjModel and MjData.
@@ -111,9 +100,19 @@ class MujocoWorld(MotionWorld):
 
     def engine(self) -> Values:
         """Return MuJoCo's options."""
+        mujoco_options = (
+            "timestep",
+            "impratio",
+            "tolerance",
+            "iterations",
+            "noslip_iterations",
+            "integrator",
+            "cone",
+            "solver",
+        )
         option = self.model.opt
         gravity = {f"gravity_{axis}": float(x) for axis, x in zip("xyz", option.gravity, strict=True)}
-        return finite({**{name: float(getattr(option, name)) for name in MUJOCO_OPTIONS}, **gravity})
+        return finite({**{name: float(getattr(option, name)) for name in mujoco_options}, **gravity})
 
     def versions(self) -> dict[str, str]:
         """Return MuJoCo's version."""

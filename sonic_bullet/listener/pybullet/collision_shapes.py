@@ -39,8 +39,6 @@ from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, hull, joined
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
-SAME_SPACE = 0.1
-
 
 def shapes_of(client_id: int, body: int, link: int) -> tuple[Shape, ...]:
     """Return all pieces of the collision geometry of a link that exists.
@@ -174,10 +172,11 @@ def _unfiled(client_id: int, body: int, link: int, hulls: list[tuple[Piece, Arra
 
 def _same_space(one: Array, other: Array) -> bool:
     """Tell whether two point sets have the same bounding box within a tenth of its diagonal."""
+    same_space = 0.1
     size = np.linalg.norm(np.ptp(other, axis=0))
     return bool(
-        np.abs(one.min(0) - other.min(0)).max() < SAME_SPACE * size
-        and np.abs(one.max(0) - other.max(0)).max() < SAME_SPACE * size
+        np.abs(one.min(0) - other.min(0)).max() < same_space * size
+        and np.abs(one.max(0) - other.max(0)).max() < same_space * size
     )
 
 

@@ -29,11 +29,6 @@ from sonic_bullet.listener.pybullet.urdf_meshes import MeshSurface, lid_height_m
 from sonic_bullet.records.errors import MeshError, SceneError
 from sonic_bullet.records.simulated import with_body_id
 
-LONGEST_STEP_S = 1 / 120
-SMALLEST_M = 1e-3
-DENSITY_RATIO = 3.0
-LID_SHARE = 0.15
-
 
 def diagnose_world(
     world: PyBulletWorld | Any, steps: int = 0, *, seen: Mapping[int, SetValues] | None = None
@@ -73,6 +68,7 @@ def diagnose_world(
 
 
 def _settings(client_id: int) -> list[Finding]:
+    longest_step_s = 1 / 120
     found = []
     settings = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)
     if settings["numSubSteps"] > 1:
@@ -85,7 +81,7 @@ def _settings(client_id: int) -> list[Finding]:
                 "set numSubSteps=0 and divide the time step instead",
             )
         )
-    if settings["fixedTimeStep"] > LONGEST_STEP_S * (1 + 1e-9):
+    if settings["fixedTimeStep"] > longest_step_s * (1 + 1e-9):
         found.append(
             Finding(
                 "long-step",
@@ -137,6 +133,7 @@ def _masses(client_id: int) -> list[Finding]:
 
 def _lids(client_id: int) -> list[Finding]:
     """Find moving meshes whose hull closes an opening, by object, as Bullet makes a hull of each object of a file."""
+    lid_share = 0.15
     found = []
     for body, link in all_links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0:
@@ -145,7 +142,7 @@ def _lids(client_id: int) -> list[Finding]:
         for vertex, face in _hulled(client_id, body, link):
             size = float(np.prod(np.maximum(np.ptp(vertex, axis=0), 1e-9)) ** (1 / 3))
             deep = max(deep, lid_height_m(vertex, face) / size)
-        if deep > LID_SHARE:
+        if deep > lid_share:
             found.append(
                 Finding(
                     "hull-lid",
@@ -185,6 +182,7 @@ def _sounding(world: PyBulletWorld | Any) -> set[tuple[int, int]]:
 
 
 def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
+    smallest_m = 1e-3
     found = []
     for body, link in all_links(client_id):
         if pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)[0] == 0 or not collision_pieces(
@@ -193,7 +191,7 @@ def _scale(client_id: int, sounding: set[tuple[int, int]]) -> list[Finding]:
             continue
         low, high = np.array(pybullet.getAABB(body, link, physicsClientId=client_id))
         size = float((high - low).max())
-        if size < SMALLEST_M or (size > LARGEST_M and (body, link) not in sounding):
+        if size < smallest_m or (size > LARGEST_M and (body, link) not in sounding):
             found.append(
                 Finding(
                     "scale",
@@ -268,6 +266,7 @@ def _oversized(world: PyBulletWorld) -> list[Finding]:
 
 
 def _densities(world: PyBulletWorld) -> list[Finding]:
+    density_ratio = 3.0
     found = []
     for body in world.bodies:
         if body.material is None or body.until_step >= 0 or body.mass_kg == 0:
@@ -277,7 +276,7 @@ def _densities(world: PyBulletWorld) -> list[Finding]:
             if body.model is not None and body.model.mass_kg > 0
             else body.material.density_kg_m3 * body.volume_m3
         )
-        if expected > 0 and not 1 / DENSITY_RATIO <= body.mass_kg / expected <= DENSITY_RATIO:
+        if expected > 0 and not 1 / density_ratio <= body.mass_kg / expected <= density_ratio:
             found.append(
                 Finding(
                     "density",

@@ -50,8 +50,6 @@ DYNAMICS_IN_ORDER = (
     "frictionAnchor",
 )
 """Positional arguments of changeDynamics."""
-SETTERS = ("changeDynamics", "setPhysicsEngineParameter", "removeBody", "resetSimulation")
-BODY_KEYWORDS = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
 
 
 class Watcher(Protocol):
@@ -87,9 +85,10 @@ class Listening:
 
 def body_argument(args: tuple[Any, ...], kwargs: dict[str, Any]) -> int:
     """Return the body id among a PyBullet function's arguments."""
+    body_keywords = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId")
     if args:
         return int(args[0])
-    return int(next(kwargs[name] for name in BODY_KEYWORDS if name in kwargs))
+    return int(next(kwargs[name] for name in body_keywords if name in kwargs))
 
 
 class Hooks:
@@ -262,8 +261,9 @@ def module_steps(client_id: int, after: Callable[[], object]) -> Iterator[None]:
 @contextmanager
 def seen_settings() -> Iterator[dict[int, SetValues]]:
     """Record the values set on engines and links within the block, by client id."""
+    setters = ("changeDynamics", "setPhysicsEngineParameter", "removeBody", "resetSimulation")
     seen: dict[int, SetValues] = {}
-    forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in SETTERS}
+    forward, real = BulletClient.__getattr__, {name: getattr(pybullet, name) for name in setters}
 
     def setter(name: str) -> Callable[..., Any]:
         def setting(*args: Any, **kwargs: Any) -> Any:
@@ -281,7 +281,7 @@ def seen_settings() -> Iterator[dict[int, SetValues]]:
 
         return setting
 
-    ours = {name: setter(name) for name in SETTERS}
+    ours = {name: setter(name) for name in setters}
 
     def forward_setting(self: Any, name: str) -> Any:
         return partial(ours[name], physicsClientId=self._client) if name in ours else forward(self, name)

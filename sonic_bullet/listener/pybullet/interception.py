@@ -63,10 +63,7 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
     "changeConstraint": ("userConstraintUniqueId",),
 }  # fmt: skip
 """Positional arguments, by PyBullet's names for them."""
-BESIDES = ("stepSimulation", "setAdditionalSearchPath")
-"""Functions that are intercepted though they set nothing."""
 BODY_ARGUMENT = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
-CONSTRAINT = "userConstraintUniqueId"
 SHAPE_ARGUMENTS = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
 PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "specularColor"}
 
@@ -115,7 +112,9 @@ class Interception:
     @contextmanager
     def watching(self) -> Iterator[None]:
         """Replace the module's functions within the block."""
-        self._real = {name: getattr(pybullet, name) for name in (*watched(), *BESIDES)}
+        # Functions that are intercepted though they set nothing
+        besides = ("stepSimulation", "setAdditionalSearchPath")
+        self._real = {name: getattr(pybullet, name) for name in (*watched(), *besides)}
         ours: dict[str, Any] = {name: functools.partial(self._called, name) for name in watched()}
         ours |= {"stepSimulation": self._step, "setAdditionalSearchPath": self._search}
         forward = BulletClient.__getattr__
@@ -207,14 +206,15 @@ class Interception:
         return found
 
     def _by_value(self, name: str, given: Mapping[str, Any]) -> Call:
+        constraint = "userConstraintUniqueId"
         whom: Who | None = None
         arguments: dict[str, Any] = {}
         for key, raw in given.items():
             if key in PICTURES:
                 continue
             value = _plain(raw)
-            if BODY_ARGUMENT.match(key) or key == CONSTRAINT:
-                value = self.who(int(raw), "constraint" if key == CONSTRAINT else "body")
+            if BODY_ARGUMENT.match(key) or key == constraint:
+                value = self.who(int(raw), "constraint" if key == constraint else "body")
                 whom = whom or value
             elif key in SHAPE_ARGUMENTS:
                 value = mapped(value, lambda index: self._shapes.get(index, index))

@@ -56,9 +56,6 @@ RECORD = np.dtype(
         ],
     }
 )
-MARK = 0xBBAA
-LETTERS = b"IfIiiiifffffffffff"
-REWIND_BYTES = 1 << 26
 
 
 @dataclass(slots=True)
@@ -107,12 +104,15 @@ class SubstepLog:
 
     def records(self) -> Array:
         """Read the records (k,) of RECORD written since the last call; SceneError where the file is not as measured."""
+        mark = 0xBBAA
+        letters = b"IfIiiiifffffffffff"
+        rewind_bytes = 1 << 26
         with open(self.path, "rb") as file:
             if self.offset == 0:
                 header = file.readline() + file.readline()
                 if not header:
                     return np.zeros(0, RECORD)
-                if header.split(b"\n")[1] != LETTERS:
+                if header.split(b"\n")[1] != letters:
                     raise SceneError(
                         "numSubSteps is above 1 and this PyBullet writes an unknown contact log", SUBSTEP_REMEDY
                     )
@@ -122,10 +122,10 @@ class SubstepLog:
         if len(data) % RECORD.itemsize:
             raise SceneError("numSubSteps is above 1 and Bullet's contact log ends within a record", SUBSTEP_REMEDY)
         rows = np.frombuffer(data, RECORD)
-        if (rows["mark"] != MARK).any():
+        if (rows["mark"] != mark).any():
             raise SceneError("numSubSteps is above 1 and Bullet's contact log is damaged", SUBSTEP_REMEDY)
         self.offset += len(data)
-        if self.offset > REWIND_BYTES:
+        if self.offset > rewind_bytes:
             self.open()
         return rows
 

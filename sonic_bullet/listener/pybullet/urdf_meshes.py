@@ -14,8 +14,6 @@ from sonic_bullet.records.errors import MeshError
 
 __all__ = ["MeshSurface", "hull", "joined", "lid_height_m", "read_surfaces"]
 
-LID_GRID = 5
-
 
 def read_surfaces(path: Path) -> list[MeshSurface]:
     """Read the objects of a mesh file, (vertices (v, 3), faces (f, 3)) each, identical vertices merged.
@@ -65,14 +63,15 @@ def hull(vertex_m: Array) -> MeshSurface:
 def lid_height_m(vertex_m: Array, face: Array) -> float:
     """Return the largest distance of the convex hull from the surface: the depth of a bowl, 0 for a convex body.
 
-    Sampled on a grid of LID_GRID points a side on each triangle of the hull.
+    Sampled on a grid of lid_grid points a side on each triangle of the hull.
     """
+    lid_grid = 5
     try:
         shell_m, shell = hull(vertex_m)
     except MeshError:
         return 0.0
-    i, j = (part.ravel() for part in np.meshgrid(np.arange(LID_GRID), np.arange(LID_GRID)))
-    inside = i + j < LID_GRID
-    share = np.stack([i, j, LID_GRID - 1 - i - j], axis=1)[inside] / (LID_GRID - 1)
+    i, j = (part.ravel() for part in np.meshgrid(np.arange(lid_grid), np.arange(lid_grid)))
+    inside = i + j < lid_grid
+    share = np.stack([i, j, lid_grid - 1 - i - j], axis=1)[inside] / (lid_grid - 1)
     point = np.unique(np.einsum("gc,fcx->fgx", share, shell_m[shell]).reshape(-1, 3), axis=0)
     return float(closest_point(vertex_m, face, point)[2].max())

@@ -11,9 +11,6 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 
-LEAST_MAGNITUDE = 1e-6
-"""Magnitude, of the largest, below which a response is taken as that: -120 dB."""
-
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class SensorResponse:
@@ -47,6 +44,7 @@ class SensorResponse:
 
     def at(self, freq_hz: Array) -> Array:
         """Interpolate the magnitude at frequencies (n,), 0 Hz included."""
-        level = np.log(np.maximum(self.magnitude, LEAST_MAGNITUDE * self.magnitude.max()))
+        least_magnitude = 1e-6  # Magnitude, of the largest, below which a response is taken as that: -120 dB
+        level = np.log(np.maximum(self.magnitude, least_magnitude * self.magnitude.max()))
         asked = np.log(np.maximum(freq_hz, self.freq_hz[0]))
         return np.asarray(np.exp(np.interp(asked, np.log(self.freq_hz), level)))

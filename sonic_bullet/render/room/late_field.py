@@ -24,15 +24,10 @@ from sonic_bullet.render.space.ambisonic_encoding import harmonics
 from sonic_bullet.render.space.ear_filters import MARGIN, ear_filters
 from sonic_bullet.synth.minimum_phase import minimum_phase
 
-LOWEST_HZ = 125.0
-"""Of the octaves that absorption is given for: those of the tables [ISO 354:2003]."""
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 WAVES = 32
 """Plane waves that noise comes as: more than the 16 channels of third order, which they tell apart."""
-DECAY_DB = 90.0
-"""How far the noise is followed down: 16 bits hold no more."""
 LONGEST_S = 30.0
-EARLY_TAPS = 512
 
 
 def reverberation_time_s(room: ShoeboxRoom, air: Air) -> Array:
@@ -50,22 +45,25 @@ def _decay(room: ShoeboxRoom, air: Air) -> Array:
 
 def band_weights(frequency_hz: Array, bands: int) -> Array:
     """Compute how much of each band is in frequencies: (bands, f), 1 in sum."""
-    place = np.clip(np.log2(np.maximum(frequency_hz, 1e-3) / LOWEST_HZ), 0, bands - 1)
+    lowest_hz = 125.0  # of the octaves that absorption is given for: those of the tables [ISO 354:2003]
+    place = np.clip(np.log2(np.maximum(frequency_hz, 1e-3) / lowest_hz), 0, bands - 1)
     return np.asarray(np.maximum(0, 1 - np.abs(place - np.arange(bands)[:, None])))
 
 
 def early_filters(room: ShoeboxRoom, orders: Array, sr: int) -> Array:
     """Make filters (g, t) of so many reflections each: of least phase, for a wall sends nothing back ahead of time."""
-    size = 4 * EARLY_TAPS
+    early_taps = 512
+    size = 4 * early_taps
     alpha = room.absorption @ band_weights(np.fft.rfftfreq(size, 1 / sr), len(room.absorption))
-    return minimum_phase(0.5 * np.asarray(orders)[:, None] * np.log(np.maximum(1 - alpha, 1e-12)))[:, :EARLY_TAPS]
+    return minimum_phase(0.5 * np.asarray(orders)[:, None] * np.log(np.maximum(1 - alpha, 1e-12)))[:, :early_taps]
 
 
 def late_filters(
     room: ShoeboxRoom, air: Air, receivers: Sequence[tuple[Microphone, int]], channels: int, sr: int, begin_s: float
 ) -> Array:
     """Make filters (channels, 4, t) from the four far microphones, times their distance, to channels of receivers."""
-    longest_s = min(float(reverberation_time_s(room, air).max()) * DECAY_DB / 60, LONGEST_S)
+    decay_db = 90.0  # how far the noise is followed down: 16 bits hold no more
+    longest_s = min(float(reverberation_time_s(room, air).max()) * decay_db / 60, LONGEST_S)
     taps = int(np.ceil(max(longest_s - begin_s, 0.0) * sr))
     made = np.zeros((channels, len(TETRAHEDRON), taps))
     if not taps:

@@ -19,7 +19,6 @@ from sonic_bullet.records.simulated import with_body_id
 
 MOMENTS = 1000
 """At most so many steps are looked at: of 4 s at 240 Hz every one."""
-WITHIN_M = 1e-6
 
 
 class RoomPlace(NamedTuple):
@@ -32,6 +31,7 @@ class RoomPlace(NamedTuple):
 
 def place_room(room: ShoeboxRoom, log: ContactLog, microphones: Sequence[Microphone]) -> RoomPlace:
     """Place a room round a log. Raises SceneError where it is smaller than what is in it."""
+    within_m = 1e-6
     named: list[tuple[str, Array]] = []
     for index, box in sorted(body_boxes(log).items()):
         body = log.bodies[index]
@@ -53,7 +53,7 @@ def place_room(room: ShoeboxRoom, log: ContactLog, microphones: Sequence[Microph
         corner = np.array([middle[0], middle[1], least[2]])
     for name, (low, high) in named:
         out = np.maximum(corner - low, high - corner - room.size_m)
-        if out.max() > WITHIN_M:
+        if out.max() > within_m:
             size = " x ".join(f"{x:g}" for x in room.size_m)
             raise SceneError(
                 f"{name} is up to {out.max():.3g} m outside the room of {size} m along {'xyz'[int(out.argmax())]}",

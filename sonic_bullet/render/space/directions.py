@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 TURNED = 0.02
 """Radians, 1.1°: a sixth of the pattern's grid. Less costs more steps that are looked at one by one."""
-TOGETHER = 16
-"""Steps that are looked at ahead, at most: where bodies turn all the time, each is looked at so often."""
 
 
 @dataclass(slots=True, eq=False)
@@ -92,13 +90,14 @@ def _grid(one: Resonator, voice: ResidualVoice | None, air: Air) -> Array | None
 
 def until_turned(setup: Setup, state: State, steps: Sequence[Step]) -> int:
     """Count the steps up to the next one, after the first, in which a body has turned."""
+    together = 16  # steps that are looked at ahead, at most: where bodies turn all the time, each is looked at so often
     directions = state.directions
     if directions is None:
         return len(steps)
     moves = any(one.moves for one in setup.sensors if isinstance(one, Microphone))
     if moves or state.mapped or state.present is not state.body or state.taken < LOOKAHEAD:
         return 1
-    steps = steps[:TOGETHER]
+    steps = steps[:together]
     slots = [number % SPAN for number in range(state.taken - LOOKAHEAD, state.taken)]
     place = np.concatenate([state.window.position_m[slots], [one.position_m for one in steps]])[: len(steps), None]
     turn = np.concatenate([state.window.quaternion_xyzw[slots], [one.quaternion_xyzw for one in steps]])

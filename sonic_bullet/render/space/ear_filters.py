@@ -21,8 +21,6 @@ from sonic_bullet.records import Array, Head
 
 ONSET_SHARE = 0.1
 """Of a response's peak: where it begins. 20 dB is what ITD is measured by [Katz, Noisternig, JASA 2014, table I]."""
-FINER = 16
-"""Onsets are found at so many times the rate: 1.3 µs at 48 kHz."""
 MARGIN = 16
 """Samples before and behind a response, for what delays that are no whole samples spread."""
 
@@ -95,11 +93,12 @@ def resampled(response: Array, sr: int, to: int) -> Array:
 
 def onsets(response: Array) -> Array:
     """Find (…) samples after which a response (…, n) first passes `ONSET_SHARE` of its peak."""
+    finer = 16  # Onsets are found at so many times the rate: 1.3 µs at 48 kHz
     from scipy.signal import resample_poly
 
-    fine = np.abs(resample_poly(response, FINER, 1, axis=-1))
+    fine = np.abs(resample_poly(response, finer, 1, axis=-1))
     peak = fine.max(axis=-1, keepdims=True)
-    return np.asarray(np.argmax(fine >= ONSET_SHARE * np.maximum(peak, 1e-300), axis=-1) / FINER)
+    return np.asarray(np.argmax(fine >= ONSET_SHARE * np.maximum(peak, 1e-300), axis=-1) / finer)
 
 
 def triangles(direction: Array) -> Array:

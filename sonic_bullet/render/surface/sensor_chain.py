@@ -23,10 +23,6 @@ REACH = 0.85
 """Fraction of half the rate up to which the derivative is exact to 0.1 %."""
 RESPONSE_TAPS = 2048
 """Of a response: 12 Hz between two points of it, at 48 kHz, where it is that narrow."""
-LEFT_OUT = 1e-5
-"""Of the taps' norm: what a response's tail is cut at, -100 dB."""
-NOISE_BLOCK = 1024
-"""Samples of noise that are drawn at once, on the grid of absolute time."""
 
 
 @lru_cache(maxsize=8)
@@ -41,11 +37,12 @@ def differentiator(sr: int) -> Array:
 @WhileAlive
 def response_taps(response: SensorResponse, sr: int) -> Array:
     """Return taps (≤ RESPONSE_TAPS,) of a response at a rate in Hz, of minimum phase."""
+    left_out = 1e-5  # of the taps' norm: what a response's tail is cut at, -100 dB
     size = 4 * RESPONSE_TAPS
     magnitude = response.at(np.fft.rfftfreq(size, 1 / sr))
     taps = minimum_phase(np.log(magnitude))[:RESPONSE_TAPS]
     rest = np.sqrt(np.cumsum(taps[::-1] ** 2)[::-1])
-    return np.asarray(taps[: max(1, int(np.count_nonzero(rest > LEFT_OUT * rest[0])))])
+    return np.asarray(taps[: max(1, int(np.count_nonzero(rest > left_out * rest[0])))])
 
 
 def sensor_taps(sensor: Sensor, sr: int) -> Array:
@@ -71,8 +68,9 @@ def sensor_noise(density: float, sr: int, key: tuple[int, int], first: int, coun
 
     key: seed, and number of the sensor.
     """
-    blocks = range(first // NOISE_BLOCK, -(-(first + count) // NOISE_BLOCK))
-    drawn = [np.random.Generator(np.random.PCG64([*key, block])).standard_normal(NOISE_BLOCK) for block in blocks]
+    noise_block = 1024  # Samples of noise that are drawn at once, on the grid of absolute time
+    blocks = range(first // noise_block, -(-(first + count) // noise_block))
+    drawn = [np.random.Generator(np.random.PCG64([*key, block])).standard_normal(noise_block) for block in blocks]
     whole = np.concatenate(drawn) if drawn else np.zeros(0)
-    at = first - blocks.start * NOISE_BLOCK
+    at = first - blocks.start * noise_block
     return np.asarray(density * np.sqrt(sr / 2) * whole[at : at + count])

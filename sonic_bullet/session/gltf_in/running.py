@@ -17,20 +17,19 @@ from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
 
-GLTF_MICROPHONE = (0.0, -1.0, 0.5)
-
 
 def run_gltf(
     stage: SceneStage, seconds: float | None, progress: Callable[[float], None] | None, say: Say | None
 ) -> tuple[str, ...]:
     """Run it for so many seconds of physics time; notes a user should read. Raises SonicBulletError."""
+    gltf_microphone = (0.0, -1.0, 0.5)
     from sonic_bullet.listener.pybullet.rigid.rigid_world import build_rigid_scene
 
     scene = read_rigid_scene(stage.path)
     stage.client = client = direct_client()
     watch_settings(client)
     ids, act, notes = build_rigid_scene(client, scene)
-    places = stage.microphones if stage.microphones is not None else GLTF_MICROPHONE
+    places = stage.microphones if stage.microphones is not None else gltf_microphone
     stage.microphones = None
     stage.listener = listener = stage.attached(client, places)
     for body_id, body in zip(ids, scene.bodies, strict=True):

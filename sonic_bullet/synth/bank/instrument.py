@@ -20,9 +20,6 @@ from sonic_bullet.synth.bank.passing import OFF, PASS, SILENCED
 from sonic_bullet.synth.bank.tile import BLOCK
 from sonic_bullet.synth.pulse import pulse_table
 
-FASTEST_DECAY_PER_SAMPLE = 2.0
-SLOWEST_TURN = 1e-3
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bank:
@@ -128,14 +125,16 @@ def audible(omega_rad_s: Array, decay_per_s: Array, sr: int) -> Array:
     Not audible: at or above sr/2, overdamped or all but critically so (ω ≤ d/1000), gone within a sample (d ≥ 2 sr), or
     not finite.
     """
+    fastest_decay_per_sample = 2.0
+    slowest_turn = 1e-3
     omega, decay = np.asarray(omega_rad_s, float), np.asarray(decay_per_s, float)
     with np.errstate(invalid="ignore"):
         return np.asarray(
             (omega < np.pi * sr)
-            & (omega > SLOWEST_TURN * decay)
+            & (omega > slowest_turn * decay)
             & (omega > 0)
             & (decay >= 0)
-            & (decay < FASTEST_DECAY_PER_SAMPLE * sr)
+            & (decay < fastest_decay_per_sample * sr)
         )
 
 

@@ -15,20 +15,19 @@ from numba.extending import intrinsic
 from sonic_bullet.synth.bank.layout import FLUSH
 from sonic_bullet.synth.vector import LANES, Emit, Pair, Value, constant
 
-DEGREE = 14
-SQUARED = 3
-
 
 def _exponential(e: Emit, s: Pair, times: Value) -> Pair:
     """Compute e^{s·times}, |s·times| ≤ 3.73."""
-    scaled = e.builder.fmul(times, constant(0.5**SQUARED))
+    degree = 14
+    squared = 3
+    scaled = e.builder.fmul(times, constant(0.5**squared))
     z = e.builder.fmul(s[0], scaled), e.builder.fmul(s[1], scaled)
-    last = constant(1 / factorial(DEGREE))
-    total = e.fma(last, z[0], constant(1 / factorial(DEGREE - 1))), e.builder.fmul(last, z[1])
-    for k in range(DEGREE - 2, -1, -1):
+    last = constant(1 / factorial(degree))
+    total = e.fma(last, z[0], constant(1 / factorial(degree - 1))), e.builder.fmul(last, z[1])
+    for k in range(degree - 2, -1, -1):
         real, imag = e.product(total, z)
         total = e.builder.fadd(real, constant(1 / factorial(k))), imag
-    for _ in range(SQUARED):
+    for _ in range(squared):
         total = e.product(total, total)
     return total
 

@@ -28,10 +28,6 @@ from sonic_bullet.synth.vector import At
 NODES_PER_PULSE = 24
 CELLS_PER_RADIAN = 4.0
 """Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is the error allowed in its level."""
-MOST_CELLS = 4096
-"""Cells a sample: a pulse shorter than one is even over it."""
-AT_ONCE = 1e-3
-"""Samples: a shorter pulse acts whole at the first sample that any of it has come to."""
 SHORTEST = 1e-12
 """Shortest length of a pulse, in samples; shorter ones get it."""
 
@@ -108,13 +104,14 @@ def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
 
 @uncounted
 def _enter_nodes(slot, b, at, count, delta, pulse, bank):  # pragma: no cover - compiled
+    at_once = 1e-3  # Samples: a shorter pulse acts whole at the first sample that any of it has come to
     strike = bank.strikes[slot]
     total = 0.0
     for i in range(count):
         total += pulse_force((i + 0.5) / count, strike.flat, bank.hertz)
     first = max(int(np.ceil(strike.node_start)), at)
     within = count - 1
-    if strike.length > AT_ONCE:
+    if strike.length > at_once:
         within = min(int(np.floor((first - strike.node_start) / delta)), within)
     phase = max((first - strike.node_start) - within * delta, 0.0)
     whole = int(np.floor(1.0 / delta))
@@ -132,10 +129,11 @@ def _enter_cells(slot, b, bank):  # pragma: no cover - compiled
 
     (1 + i d/ω) (e^{s/cells} - 1)/(s/cells): an impulse that acts evenly over the cell, at the cell's end.
     """
+    most_cells = 4096  # Cells a sample: a pulse shorter than one is even over it
     strike, body = bank.strikes[slot], bank.body[b]
     s = complex(body.rigid_log_pole[0], body.rigid_log_pole[1])
     least = int(np.ceil(CELLS_PER_RADIAN * -s.real))
-    cells = max(least, int(np.ceil(min(NODES_PER_PULSE / strike.length, 1.0 * MOST_CELLS))))
+    cells = max(least, int(np.ceil(min(NODES_PER_PULSE / strike.length, 1.0 * most_cells))))
     strike.cells = cells
     strike.cell_first = int(np.floor(strike.start * cells))
     strike.cell_stop = int(np.ceil((strike.start + strike.length) * cells))

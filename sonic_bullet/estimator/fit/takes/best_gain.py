@@ -27,8 +27,6 @@ from sonic_bullet.records import Array
 GAIN_STEP_DB, WITHIN_DB = 1.0, 2.0
 BELOW_DB, OVER_DB = 10.0, 40.0
 """The grid begins where the loudest cell is that far below its noise, and ends that far over equal energy."""
-GRID_CELLS = 6000
-"""Of a window and of a kind that the grid is searched by, at most: D to some 0.1 dB."""
 REFINED_MINIMA = 2
 """Minima of the grid that are refined."""
 
@@ -141,6 +139,7 @@ def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, 
     Powers of recording and sound, the noise, whether the sound gets it in full, how many cells each stands for. Cells
     that count at any gain are drawn apart from those that may not.
     """
+    grid_cells = 6000  # of a window and of a kind that the grid is searched by, at most: D to some 0.1 dB
     found = []
     for p, m, cell in zip(power, made, noise_spectra(floor, power), strict=False):
         count = min(len(p), len(m))
@@ -151,8 +150,8 @@ def _few_cells(power: tuple[Array, ...], made: tuple[Array, ...], floor: Floor, 
         loud = np.argsort(-theirs / noise, kind="stable")  # those that come to count first, whole; evenly from there
         loud = loud[: int((theirs > 0).sum())]
         rows = []
-        for which in (np.flatnonzero(always), *np.split(loud[~always[loud]], [GRID_CELLS])):
-            some = which[np.linspace(0, len(which) - 1, min(GRID_CELLS, len(which))).round().astype(int)]
+        for which in (np.flatnonzero(always), *np.split(loud[~always[loud]], [grid_cells])):
+            some = which[np.linspace(0, len(which) - 1, min(grid_cells, len(which))).round().astype(int)]
             weight = np.full(len(some), len(which) / max(len(some), 1))
             rows.append(np.stack([ours[some], theirs[some], noise[some], np.full(len(some), float(added)), weight]))
         found.append(np.concatenate(rows, axis=1))

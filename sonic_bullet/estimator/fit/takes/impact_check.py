@@ -18,8 +18,6 @@ FRONT, FRONT_ENERGY, DESCRIBED = 0.3, 0.75, 0.8
 """As of `features`. Takes of 22 measured objects have 0.97 of one or the other; speech and rain 0.45 and 0.62."""
 BEFORE = 0.6
 """Of measured takes 0.43 at most, of speech whose last syllable is the loudest 0.67 and more."""
-LEAST_ENERGY = 0.05
-"""Of a take's energy, over the noise: of less nothing is said."""
 
 
 def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: float) -> str:
@@ -27,12 +25,13 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
 
     before: part of the energy that lies before its loudest rise.
     """
+    least_energy = 0.05  # of a take's energy, over the noise: of less nothing is said
     if before > BEFORE:
         return f"{100 * before:.0f} % of its energy lies before its loudest rise, and does not decay from there"
     noise = float(floor_between([signal]).variance.mean())
     n, front = len(signal), int(FRONT * len(signal))
     whole, first = (float(x @ x) - noise * len(x) for x in (signal, signal[:front]))
-    if whole < LEAST_ENERGY * float(signal @ signal):
+    if whole < least_energy * float(signal @ signal):
         return ""
     rest = signal - lines_sound(lines, take, n, sr)
     described = 1 - max(float(rest @ rest) - noise * n, 0.0) / whole

@@ -42,15 +42,8 @@ MAKERS = {
 """Calls that determine a body's shape, and their positional arguments."""
 ENDERS = {"removeBody": ("bodyUniqueId",), "resetSimulation": ("flags",)}
 """Calls after which ids may be reused."""
-OF_SHAPE = {
-    "createMultiBody": ("baseInertialFramePosition", "baseInertialFrameOrientation"),
-    "loadURDF": ("fileName", "useFixedBase", "flags", "globalScaling"),
-}
-"""Arguments that determine the shape of a body in its own frame."""
 SAME_M, SAME_SHARE = 2e-3, 0.01
 """Tolerances of the boxes of one shape: Bullet's margins of 1 mm, and its rounding."""
-RIGID_BODY = 1
-"""Last entry but one of getDynamicsInfo for a body in maximal coordinates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +121,8 @@ def _remember(client_id: int, name: str, given: dict[str, Any], made: Any, whose
 
 def is_maximal(client_id: int, body: int) -> bool:
     """Tell whether an existing body is in maximal coordinates."""
-    return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == RIGID_BODY)
+    rigid_body = 1  # Last entry but one of getDynamicsInfo for a body in maximal coordinates
+    return bool(pybullet.getDynamicsInfo(body, -1, physicsClientId=client_id)[10] == rigid_body)
 
 
 @contextmanager
@@ -137,14 +131,19 @@ def reduced_body(client_id: int, body: int) -> Iterator[tuple[int, int] | None]:
 
     None where the call is not known, or its result has another bounding box than the body.
     """
+    # Arguments that determine the shape of a body in its own frame
+    of_shape = {
+        "createMultiBody": ("baseInertialFramePosition", "baseInertialFrameOrientation"),
+        "loadURDF": ("fileName", "useFixedBase", "flags", "globalScaling"),
+    }
     given = given_body(client_id, body)
-    if given is None or given.call not in OF_SHAPE or (given.call == "createMultiBody" and given.shape is None):
+    if given is None or given.call not in of_shape or (given.call == "createMultiBody" and given.shape is None):
         yield None
         return
     with quiet_stdout():
         alone = connect(DIRECT)
     try:
-        how = {name: given.arguments[name] for name in OF_SHAPE[given.call] if name in given.arguments}
+        how = {name: given.arguments[name] for name in of_shape[given.call] if name in given.arguments}
         try:
             if given.call == "createMultiBody":
                 assert given.shape is not None

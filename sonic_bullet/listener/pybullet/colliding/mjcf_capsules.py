@@ -31,9 +31,6 @@ from sonic_bullet.listener.quiet import quiet_stdout
 if TYPE_CHECKING:
     from sonic_bullet.listener.pybullet.colliding.pieces import Piece
 
-MARGIN_M = 0.04
-FINE_TURN = 0.2
-LARGEST_FILE = 1 << 24
 LOADED = re.compile(r'^objects = p\.loadMJCF\("(.*)"\)$', re.MULTILINE)
 Ends = tuple[float, ...] | None
 """Both ends of a geom, 6 numbers, or None where it has no fromto."""
@@ -61,7 +58,9 @@ def must_not_be_asked(client_id: int, body: int, drawn: tuple[Piece, ...]) -> bo
 
 def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]) -> tuple[Piece, ...] | None:
     """Return the collision pieces, body frame, of a link that must not be queried; None where they cannot be known."""
-    if fills(client_id, body, link, drawn, fine=FINE_TURN):
+    margin_m = 0.04
+    fine_turn = 0.2
+    if fills(client_id, body, link, drawn, fine=fine_turn):
         return drawn
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     back = pybullet.invertTransform(info[3], info[4])
@@ -71,11 +70,11 @@ def read_capsules(client_id: int, body: int, link: int, drawn: tuple[Piece, ...]
         for geoms in bodies_with_ends(place, place.stat().st_mtime_ns) if place is not None else ():
             placed = _placed(drawn, geoms, back)
             if placed is not None:
-                grown = [MARGIN_M if ends is not None else 0.0 for ends in geoms]
-                if fills(client_id, body, link, placed, grown, fine=FINE_TURN) and placed not in found:
+                grown = [margin_m if ends is not None else 0.0 for ends in geoms]
+                if fills(client_id, body, link, placed, grown, fine=fine_turn) and placed not in found:
                     found.append(placed)
-    all_by_ends = [MARGIN_M if piece.kind == pybullet.GEOM_CAPSULE else 0.0 for piece in drawn]
-    if not found and fills(client_id, body, link, drawn, all_by_ends, fine=FINE_TURN):
+    all_by_ends = [margin_m if piece.kind == pybullet.GEOM_CAPSULE else 0.0 for piece in drawn]
+    if not found and fills(client_id, body, link, drawn, all_by_ends, fine=fine_turn):
         return drawn
     return found[0] if len(found) == 1 else None
 
@@ -95,8 +94,9 @@ def bodies_with_ends(place: Path, _changed_ns: int) -> tuple[tuple[Ends, ...], .
 
     Bodies without one are left out, and each of the world's own geoms is a body.
     """
+    largest_file = 1 << 24
     try:
-        data = place.read_bytes() if place.stat().st_size <= LARGEST_FILE else b""
+        data = place.read_bytes() if place.stat().st_size <= largest_file else b""
         root = ElementTree.fromstring(data) if b"<!" not in data.replace(b"<!--", b"") else None
     except (OSError, ElementTree.ParseError):
         return ()

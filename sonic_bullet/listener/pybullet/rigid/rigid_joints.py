@@ -16,7 +16,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import RigidJoint, RigidScene
 
 HINGE_M = 0.1
-MOST_N = 1e9
 
 
 def make_joints(client: Any, scene: RigidScene, ids: list[int]) -> tuple[str, ...]:
@@ -41,6 +40,7 @@ def _places(joint: RigidJoint) -> list[Array]:
 
 
 def _constrain(client: Any, joint: RigidJoint, ends: list[int], place: Array) -> None:
+    most_n = 1e9
     kind = {
         "fixed": client.JOINT_FIXED,
         "point": client.JOINT_POINT2POINT,
@@ -62,4 +62,4 @@ def _constrain(client: Any, joint: RigidJoint, ends: list[int], place: Array) ->
     made = client.createConstraint(
         ends[0], -1, ends[1], -1, kind, axis.tolist(), pivots[0], pivots[1], turns[0], turns[1]
     )
-    client.changeConstraint(made, maxForce=MOST_N)
+    client.changeConstraint(made, maxForce=most_n)

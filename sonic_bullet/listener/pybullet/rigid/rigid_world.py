@@ -29,7 +29,6 @@ COMBINE_RULES: tuple[CombineRule, ...] = ("average", "minimum", "multiply", "max
 PAIR_OFF = 0.01
 LOCKED = 1e6
 """Times its moments that a body has whose turns are locked."""
-INTEGRAL, PROPORTIONAL = 0.3, 0.7
 
 
 def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callable[[], None], tuple[str, ...]]:
@@ -166,6 +165,7 @@ def _lifter(client: Any, body_id: int, body: RigidBody) -> Callable[[], None]:
 
 def _motor(client: Any, ids: Sequence[int], drive: SpeedDrive, mass_kg: float) -> Callable[[], None]:
     """Make what drives a body: its speed lags by F/damping, as the drive's law says."""
+    integral, proportional = 0.3, 0.7
     along, dt = drive.direction, client.getPhysicsEngineParameters()["fixedTimeStep"]
     kept, last = 0.0, 0.0
 
@@ -177,8 +177,8 @@ def _motor(client: Any, ids: Sequence[int], drive: SpeedDrive, mass_kg: float) -
         other = np.array(client.getBaseVelocity(ids[drive.partner])[0]) if drive.partner >= 0 else np.zeros(3)
         lag = last / drive.damping_n_s_m if drive.damping_n_s_m > 0 else 0.0
         missing = (drive.speed_m_s - lag - float(along @ (own - other))) * mass_kg / dt
-        kept = float(np.clip(kept + INTEGRAL * missing, -drive.most_n, drive.most_n))
-        last = float(np.clip(kept + PROPORTIONAL * missing, -drive.most_n, drive.most_n))
+        kept = float(np.clip(kept + integral * missing, -drive.most_n, drive.most_n))
+        last = float(np.clip(kept + proportional * missing, -drive.most_n, drive.most_n))
         if drive.damping_n_s_m <= 0:
             last = kept = 0.0
         place = client.getBasePositionAndOrientation(ids[drive.body])[0]

@@ -23,16 +23,6 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AnimationError, SceneError
 
-TILT_M = 2e-3
-"""Displacement of the ends of a tilted body, to find the corners of a face that lies on another: Bullet's own perturbed
-queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m)."""
-
-
-MOMENT_S = 1e-6
-"""Length of the step that finds overlaps: nothing moves in it."""
-SAME_FACE = 0.9
-"""Cosine of the largest angle between normals of one face: tilts of small bodies are a quarter of it."""
-
 
 class AnimatedStage:
     """Bodies in a client of their own; see listener.animated.PoseStage."""
@@ -132,6 +122,11 @@ class AnimatedStage:
         return list(pybullet.getClosestPoints(self.ids[a], self.ids[b], reach_m, physicsClientId=self.client_id))
 
     def _pair(self, motion: Array, a: int, b: int, reach_m: float) -> list[Array]:
+        # Displacement of the ends of a tilted body, to find the corners of a face that lies on another: Bullet's own
+        # perturbed queries do as much (btConvexConvexAlgorithm, contact breaking threshold 0.02 m)
+        tilt_m = 2e-3
+        # Cosine of the largest angle between normals of one face: tilts of small bodies are a quarter of it
+        same_face = 0.9
         points = self._nearest(a, b, reach_m)
         if not points:
             return []
@@ -142,12 +137,12 @@ class AnimatedStage:
         low = a if self.extent_m[a] <= self.extent_m[b] else b
         normals: list[Array] = []
         for one in points:
-            if all(np.array(one[7]) @ normal < SAME_FACE for normal in normals):
+            if all(np.array(one[7]) @ normal < same_face for normal in normals):
                 normals.append(np.array(one[7]))
         place, turn = motion[low]["position_m"], motion[low]["quaternion_xyzw"]
-        angle = TILT_M / self.extent_m[low]
+        angle = tilt_m / self.extent_m[low]
         for normal in normals:
-            if sum(np.array(one[7]) @ normal > SAME_FACE for one in points) > 2:  # its corners are there
+            if sum(np.array(one[7]) @ normal > same_face for one in points) > 2:  # its corners are there
                 continue
             side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
             side /= np.linalg.norm(side)
@@ -157,15 +152,15 @@ class AnimatedStage:
                 pybullet.resetBasePositionAndOrientation(
                     self.ids[low], place.tolist(), tilted.tolist(), physicsClientId=self.client_id
                 )
-                for one in self._nearest(a, b, reach_m + TILT_M):
-                    if np.array(one[7]) @ normal < SAME_FACE:
+                for one in self._nearest(a, b, reach_m + tilt_m):
+                    if np.array(one[7]) @ normal < same_face:
                         continue
                     at = [np.array(one[5]), np.array(one[6])]
                     mine = 0 if low == a else 1
                     at[mine] = place + back @ (at[mine] - place)
                     gap = float((at[0] - at[1]) @ normal)
                     row = _raw(self.ids[a], self.ids[b], at[0], at[1], normal, gap)
-                    known = (r for r in rows if r["normal"][0] @ normal > SAME_FACE)
+                    known = (r for r in rows if r["normal"][0] @ normal > same_face)
                     if gap < reach_m and all(np.abs(row["point_a_m"] - r["point_a_m"]).max() > 1e-3 for r in known):
                         rows.append(row)
         pybullet.resetBasePositionAndOrientation(
@@ -255,8 +250,9 @@ class AnimatedStage:
         Bullet would find them a step later. Returns RAW rows and the pairs (b, b); their motion goes into the last of
         `motion`.
         """
+        moment_s = 1e-6  # length of the step that finds overlaps: nothing moves in it
         cid = self.client_id
-        pybullet.setTimeStep(MOMENT_S, physicsClientId=cid)
+        pybullet.setTimeStep(moment_s, physicsClientId=cid)
         pybullet.stepSimulation(physicsClientId=cid)
         points, raw = contact_points(cid) if polled else (pybullet.getContactPoints(physicsClientId=cid), NO_RAW)
         fresh = self._loaded(points) & ~loaded
@@ -273,7 +269,7 @@ class AnimatedStage:
             one["point_b_m"] -= travel_m[1]
             one["gap_m"] -= (travel_m[0] - travel_m[1]) @ one["normal"]
             for force in ("force_n", "friction_1_n", "friction_2_n"):
-                one[force] *= MOMENT_S / dt_s
+                one[force] *= moment_s / dt_s
         return late, fresh
 
 

@@ -18,12 +18,8 @@ from sonic_bullet.listener.pybullet.urdf_meshes import hull
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import AnimationError, MeshError
 
-MOST_PIECES = 64
-"""Most pieces of one body: with more, PyBullet takes longer than for triangles."""
 CONVEX = 0.02
 """Fraction of volume or area by which the hull of a convex part may be larger: rounded corners."""
-FLAT_FACE = 1e-3
-"""Deviation of a flat face's corners, relative to its size."""
 
 
 def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
@@ -34,16 +30,17 @@ def pieces(shape: Shape, name: str, moves: bool) -> list[Array]:
     AnimationError
         A body that moves is flat.
     """
+    most_pieces = 64  # most pieces of one body: with more, PyBullet takes longer than for triangles
     vertex, face = welded(shape.vertex_m, shape.face)
     parts = list(_connected(vertex, face))
     if moves:
         solid = [own for own, _ in parts if len(own) >= 4]
         try:
-            return [hull(own)[0] for own in (solid if 0 < len(solid) <= MOST_PIECES else [vertex])]
+            return [hull(own)[0] for own in (solid if 0 < len(solid) <= most_pieces else [vertex])]
         except MeshError as error:
             raise AnimationError(f"body '{name}': its mesh is flat", "give it thickness") from error
     found = [piece for part in parts for piece in _still(*part)]
-    return found if len(found) <= MOST_PIECES else []
+    return found if len(found) <= most_pieces else []
 
 
 def _connected(vertex: Array, face: Array) -> Iterator[tuple[Array, Array]]:
@@ -80,6 +77,7 @@ def _still(vertex: Array, face: Array) -> Iterator[Array]:
 
 def _flat_faces(vertex: Array, face: Array) -> Iterator[Array]:
     """Yield triangles (f, 3) that are connected by edges and lie in one plane."""
+    flat_face = 1e-3  # Deviation of a flat face's corners, relative to its size
     a, b, c = (vertex[face[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1)
@@ -98,7 +96,7 @@ def _flat_faces(vertex: Array, face: Array) -> Iterator[Array]:
         plane, reached, ahead = normal[first], [first], [first]
         while ahead:
             for other in near[ahead.pop()] & left:
-                if abs(normal[other] @ plane) > 1 - FLAT_FACE**2:
+                if abs(normal[other] @ plane) > 1 - flat_face**2:
                     left.discard(other)
                     reached.append(other)
                     ahead.append(other)

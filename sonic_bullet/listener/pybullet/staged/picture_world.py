@@ -20,11 +20,6 @@ from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, SceneError
 
-FACES_MOST = 40_000
-"""Most faces of a shape: PyBullet takes 131 072 vertices, and here each face has its own three."""
-PICTURE_TILE = 32
-"""Pixels by which the drawn part grows: the renderer allocates its memory anew for every other size."""
-LIGHT = (0.4, -0.6, 1.2)
 FAR_AWAY = (0.0, 0.0, -1e5)
 SMOOTH = 0.001
 """Deviation of a simplified mesh, relative to its size: less than a pixel of a picture that it fills."""
@@ -46,11 +41,13 @@ class PyBulletPictures:
         self._backdrop: tuple[Array, Array] | None = None
 
     def _made(self, figure: Figure) -> list[int]:
-        """Create a body for every `FACES_MOST` triangles."""
+        """Create a body for every `faces_most` triangles."""
+        # most faces of a shape: PyBullet takes 131 072 vertices, and here each face has its own three
+        faces_most = 40_000
         vertex, face = simplified(figure.vertex_m, figure.face)
         normals, bodies = corner_normals(vertex, face), []
-        for at in range(0, len(face), FACES_MOST):
-            corner, normal = vertex[face[at : at + FACES_MOST]], normals[at : at + FACES_MOST]
+        for at in range(0, len(face), faces_most):
+            corner, normal = vertex[face[at : at + faces_most]], normals[at : at + faces_most]
             shape = self._client.createVisualShape(
                 pybullet.GEOM_MESH,
                 vertices=corner.reshape(-1, 3).tolist(),
@@ -80,6 +77,8 @@ class PyBulletPictures:
 
     def _part(self, position_m: Array, radius_m: Array, camera: Camera) -> tuple[int, int, int, int]:
         """Return left, top, right and bottom of the part of the picture that holds spheres, in whole tiles."""
+        # Pixels by which the drawn part grows: the renderer allocates its memory anew for every other size
+        picture_tile = 32
         width, height = self._size
         x, y, z = camera.seen(position_m).T
         if (z <= 2 * radius_m).any():
@@ -89,11 +88,11 @@ class PyBulletPictures:
         wide = 1.5 * focal * radius_m / z * (1 + (x**2 + y**2) / z**2)
         across, down = width / 2 + focal * x / z, height / 2 - focal * y / z
         low = [
-            (edge // PICTURE_TILE) * PICTURE_TILE
+            (edge // picture_tile) * picture_tile
             for edge in ((across - wide).min(initial=1e9), (down - wide).min(initial=1e9))
         ]
         high = [
-            -(-edge // PICTURE_TILE) * PICTURE_TILE
+            -(-edge // picture_tile) * picture_tile
             for edge in ((across + wide).max(initial=-1), (down + wide).max(initial=-1))
         ]
         return (
@@ -104,6 +103,7 @@ class PyBulletPictures:
         self, position_m: Array, quaternion_xyzw: Array, shown: Array, camera: Camera, part: tuple[int, int, int, int]
     ) -> tuple[Array, Array]:
         """Draw a part of the picture: colours (height, width, 3) uint8 and depths (height, width)."""
+        light = (0.4, -0.6, 1.2)
         (width, height), (x0, y0, x1, y1) = self._size, part
         for bodies, place, turn, there in zip(
             self._bodies, position_m.tolist(), quaternion_xyzw.tolist(), shown.tolist(), strict=True
@@ -121,7 +121,7 @@ class PyBulletPictures:
             y1 - y0,
             view,
             projection,
-            lightDirection=LIGHT,
+            lightDirection=light,
             shadow=self._shadow,
             renderer=pybullet.ER_TINY_RENDERER,
             flags=pybullet.ER_NO_SEGMENTATION_MASK,
