@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
-from sonic_bullet.comparing.outcome.sound_effects import HEARD_OCTAVES_HZ, band_levels, level_words, onsets_s, t60_s
+from sonic_bullet.comparing.outcome.sound_effects import AUDIBLE_OCTAVES_HZ, band_levels, level_words, onsets_s, t60_s
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.comparing.tolerance import (
@@ -136,7 +136,7 @@ def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) 
         BASELINE_FORMAT,
         place.name, reason, head(place.parent), not changed_files(place.parent), dict(side.log.versions),
         side.sr, len(x), x.shape[1], samples_digest(side.sound), onsets_s(x, side.sr), t60_s(x, side.sr),
-        list(HEARD_OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
+        list(AUDIBLE_OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
     )  # fmt: skip
     if defines_build(place) and runs:
         known = ensemble(SceneSide(scene), tell, runs)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.comparing.outcome.sound_effects import HEARD_OCTAVES_HZ
+from sonic_bullet.comparing.outcome.sound_effects import AUDIBLE_OCTAVES_HZ
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Call, Who, with_leaves
@@ -193,7 +193,7 @@ def _band_spectra(x: Array, sr: int) -> Array:
     power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
     freq = np.fft.rfftfreq(n, 1 / sr)
     bands = [
-        power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in HEARD_OCTAVES_HZ if f < sr / 2**1.5
+        power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in AUDIBLE_OCTAVES_HZ if f < sr / 2**1.5
     ]
     table = np.array(bands).T
     return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (FLOOR_DB / 10)) + 1e-12))

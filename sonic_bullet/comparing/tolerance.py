@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.comparing.outcome.sound_effects import (
-    HEARD_OCTAVES_HZ,
+    AUDIBLE_OCTAVES_HZ,
     at_common_rate,
     band_levels,
     level_words,
@@ -70,7 +70,7 @@ def closeness(a: SoundMeasures, b: SoundMeasures, tolerance_db: float) -> Closen
     heights = [one for one in (*a.band_db, *b.band_db) if one is not None]
     floor = max(heights, default=0.0) - range_db
     change, most_hz = 0.0, 0.0
-    for f, one, other in zip(HEARD_OCTAVES_HZ, a.band_db, b.band_db, strict=False):
+    for f, one, other in zip(AUDIBLE_OCTAVES_HZ, a.band_db, b.band_db, strict=False):
         old, new = (floor if level is None else max(level, floor) for level in (one, other))
         if abs(new - old) > abs(change):
             change, most_hz = new - old, f

@@ -15,7 +15,7 @@ from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
-HEARD_OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
+AUDIBLE_OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
 QUIET_DB = -80.0
 """Level re the loudest band below which bands are not compared."""
 ONSET_FRAME_S, ONSET_RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
@@ -66,7 +66,7 @@ def band_levels(x: Array, sr: int) -> Array:
     power = (np.abs(np.fft.rfft(faded, axis=1)) ** 2).sum(axis=0) * 2 / n**2
     freq = np.fft.rfftfreq(n, 1 / sr)
     edge = math.sqrt(2)
-    sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in HEARD_OCTAVES_HZ if f / edge < sr / 2]
+    sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in AUDIBLE_OCTAVES_HZ if f / edge < sr / 2]
     with np.errstate(divide="ignore"):
         return np.asarray(10 * np.log10(np.array(sums)))
 
@@ -84,11 +84,11 @@ def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
     total = 10 * math.log10(float(np.square(b).mean()) / float(np.square(a).mean()))
     k = int(np.argmax(np.where(loud, np.abs(change), -1)))
     most = (
-        f"; most in the octave at {_hz(HEARD_OCTAVES_HZ[k])}: {level_words(change[k])}"
+        f"; most in the octave at {_hz(AUDIBLE_OCTAVES_HZ[k])}: {level_words(change[k])}"
         if abs(change[k]) > 0.005
         else ""
     )
-    values: dict[str, Any] = {"total_db": total, "band_hz": list(HEARD_OCTAVES_HZ[: len(change)])}
+    values: dict[str, Any] = {"total_db": total, "band_hz": list(AUDIBLE_OCTAVES_HZ[: len(change)])}
     values["band_db"] = [round(float(x), 4) if good else None for x, good in zip(change, loud, strict=True)]
     return Consequence("level", f"B is {level_words(total)} than A in all{most}", None, values)
 

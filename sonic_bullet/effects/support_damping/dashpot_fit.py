@@ -32,8 +32,7 @@ from sonic_bullet.records import Array, ModalModel
 
 # of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
 SCATTER, LAW, ROUGH = 0.05, 0.02, 0.15
-WIDTH, DECADE = 0.004, 0.4  # of ln f and ln d, of a pair
-LEVEL = 0.3  # of ln of a line's level
+WIDTH, DECADE, LEVEL = 0.004, 0.4, 0.3  # of ln f and ln d, of a pair; of ln of a line's level
 # squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
 MISSED = 9.0
 GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none

@@ -17,7 +17,7 @@ from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.observation import Observation, observation
 from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.estimator.fit.takes.usable_take import refuse_clipped, refuse_short
-from sonic_bullet.estimator.lines.band_limit import LOWEST_HEARD_HZ, limit_band, without_drift
+from sonic_bullet.estimator.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
@@ -236,7 +236,7 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
                 f"{r.file} breaks off after {len(whole) / sr:.3g} s: the digital silence behind is no "
                 "decay, and is left out"
             )
-        if case.band_hz[0] > LOWEST_HEARD_HZ:
+        if case.band_hz[0] > LOWEST_AUDIBLE_HZ:
             drift = ""
             sounds.append(limit_band(whole, sr, (case.band_hz[0], np.inf)))
             limited.append(limit_band(whole, sr, case.band_hz))

@@ -10,7 +10,7 @@ import numpy as np
 from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
 
-LOWEST_HEARD_HZ = 20.0  # of what is heard
+LOWEST_AUDIBLE_HZ = 20.0  # of what is heard
 
 
 def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
@@ -71,10 +71,10 @@ def without_drift(signal: Array, sr: int) -> tuple[Array, str]:
         What to say of it, or nothing.
     """
     drifts = 3.16  # times the rms of all that is heard, most of the time: wind, a warming amplifier
-    edge = np.arange(0, len(signal), max(round(sr / LOWEST_HEARD_HZ / 2), 1))
+    edge = np.arange(0, len(signal), max(round(sr / LOWEST_AUDIBLE_HZ / 2), 1))
     mean = np.add.reduceat(signal, edge) / np.diff(edge, append=len(signal))  # a drift's samples over half a period
     power = np.add.reduceat(signal**2, edge) / np.diff(edge, append=len(signal))
     if not np.median(mean**2 - drifts**2 * (power - mean**2)) > 0:
         return signal, ""
-    above = limit_band(signal, sr, (LOWEST_HEARD_HZ, np.inf))
-    return above, f"a drift below {LOWEST_HEARD_HZ:.0f} Hz, louder than all above it, is taken off"
+    above = limit_band(signal, sr, (LOWEST_AUDIBLE_HZ, np.inf))
+    return above, f"a drift below {LOWEST_AUDIBLE_HZ:.0f} Hz, louder than all above it, is taken off"

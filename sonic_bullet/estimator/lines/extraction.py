@@ -35,14 +35,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
 
-FASTEST_PER_S = 3000.0
-FALSE_ALARMS = 0.05
-BAND_HZ = 500.0
-ROUGH_FIT, QUICK, THOROUGH = (
-    (3, 1e-2),
-    (8, 1e-4),
-    (40, 1e-6),
-)  # steps and tolerance of a fit on the way, and of the last
+FASTEST_PER_S, FALSE_ALARMS, BAND_HZ = 3000.0, 0.05, 500.0
+# steps and tolerance of a fit on the way, and of the last
+ROUGH_FIT, QUICK, THOROUGH = (3, 1e-2), (8, 1e-4), (40, 1e-6)
 FEW_MODES, MANY_MODES = 3, 40
 MOST_BAND_MODES = 140
 LEAST_SAMPLES_A_MODE = 24
