@@ -281,7 +281,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
     # however little the room leaves
-    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=RULES.costly_open_share.at(1e-9)))
+    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=1e-9))
     monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
