@@ -69,6 +69,8 @@ class Diagnosis:
         By split, what could not be compared; empty where all could.
     warnings : tuple of str
         One line each, the fit's among them.
+    unfitted : tuple of Take
+        The strikes of the other splits that have audio.
     """
 
     case: Case
@@ -82,6 +84,7 @@ class Diagnosis:
     unexplained: dict[str, Any]
     not_compared: dict[str, tuple[LeftOut, ...]]
     warnings: tuple[str, ...]
+    unfitted: tuple[Take, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -151,7 +154,8 @@ def diagnose(
         if split == "fit" and isinstance(held, Compared):
             errors["floor"] = least_db(held.takes, made["after"])
     left, warnings = remainder(end, takes), (*found.warnings, *_warnings(end, out))
-    return Diagnosis(case, found, bodies, takes, end, errors, sone, _of_lines(case, bodies, end), left, out, warnings)
+    lines, unfitted = _of_lines(case, bodies, end), tuple(t for split in SPLITS[1:] for t in every[split])
+    return Diagnosis(case, found, bodies, takes, end, errors, sone, lines, left, out, warnings, unfitted)
 
 
 def _before_and_after(end: Closed | NothingCompared, bodies: Sequence[Struck]) -> dict[str, Predictions]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import base64
 import html
+import inspect
 import io
 from typing import Any
 
@@ -21,6 +22,7 @@ from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import predict_takes
 from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
 from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
+from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
@@ -76,12 +78,20 @@ def _effects(d: Diagnosis) -> str:
         )
         for c in d.closed.added
     ]
+    formulas = "".join(f"<h3>{c.id}</h3><pre>{html.escape(_formula(c.effect))}</pre>" for c in d.closed.added)
     return (
         "<h2>What was added</h2>"
         + _table(("effect", "belongs to", "parameters", "nearer on strikes left out", "chance", "source"), rows)
+        + formulas
         if rows
         else ""
     )
+
+
+def _formula(effect: Effect) -> str:
+    """Return the equations at the head of an effect's module, empty where it has none."""
+    said = (inspect.getdoc(inspect.getmodule(type(effect))) or "").split("\n\n")
+    return said[1] if len(said) > 1 and said[1].startswith(" ") else ""
 
 
 def _errors(d: Diagnosis) -> str:
@@ -104,22 +114,26 @@ def _why_none(d: Diagnosis, split: str) -> str:
 
 
 def _players(d: Diagnosis) -> str:
-    shown = 2  # strikes with players
-    parts = []
-    takes = [t for t in d.takes if np.isfinite(t.sample).all()][:shown]
+    drawn = 2  # strikes of a split with pictures; all have players
+    parts, seen = [], dict.fromkeys(("fit", "holdout", "transfer"), 0)
+    takes = [t for t in (*d.takes, *d.unfitted) if np.isfinite(t.sample).all()]
     both = [predict_takes(h, takes) for h in (d.closed.before, d.closed.after)]
     for take in takes:
         before, after = (take.played(made[take.body]) for made in both)
         peak = max(float(np.abs(x).max()) for x in (take.sample, before, after)) or 1.0
         sounds = (("recorded", take.sample), ("before", before), ("after", after))
         row = "".join(
-            f"<p>{label} <audio controls src='{_wav(x / peak * PEAK, take.sr)}'></audio></p>" for label, x in sounds
+            f"{label} <audio controls preload=none src='{_wav(x / peak * PEAK, take.sr)}'></audio> "
+            for label, x in sounds
         )
-        file = take.body.recordings[take.strike].file
-        parts.append(
-            f"<h3>{html.escape(file.name if file else 'strike')}</h3>{row}"
-            f"{_figure(_spectrograms(sounds, take.sr), 'recorded, before, after; dB below the loudest')}"
+        split = take.body.recordings[take.strike].split
+        seen[split] += 1
+        picture = (
+            _figure(_spectrograms(sounds, take.sr), "recorded, before, after; dB below the loudest")
+            if seen[split] <= drawn
+            else ""
         )
+        parts.append(f"<h3>{html.escape(take.name)}, {split}</h3><p>{row}</p>{picture}")
     return "<h2>Hear and see</h2>" + "".join(parts) if parts else ""
 
 

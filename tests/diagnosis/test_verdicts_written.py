@@ -87,9 +87,9 @@ def test_every_verdict_can_be_written(
     module = import_module("sonic_bullet.diagnosis.diagnose")  # as an attribute of its package it is the function
     monkeypatch.setattr(module, "diagnose", lambda *_, **__: found)
     monkeypatch.setattr(diagnose_command, "read_case", lambda _: case)
-    place = tmp_path / "d.json"
+    place, page = tmp_path / "d.json", tmp_path / "d.html" if verdict == "explained" else None
     diagnose_command.run_diagnose(
-        "made", output=None, json_to=str(place), predict=None, report=None, seed=0, propose=True
+        "made", output=None, json_to=str(place), predict=None, report=page and str(page), seed=0, propose=True
     )
     written = json.loads(place.read_text())
     assert written["verdict"] == verdict
@@ -100,6 +100,9 @@ def test_every_verdict_can_be_written(
         assert row["standard_error_db"] > 0 and row["numbers"] == -1 and row["strikes"] == len(takes)
     said = capsys.readouterr().out
     assert ("named, or why not" in said) == bool(written["candidates"])
+    if page is not None:  # every strike is heard thrice, and the effect's equation and the table are read
+        text = page.read_text(encoding="utf-8")
+        assert text.count("<audio") == 3 * len(takes) and "d = ηω/2" in text and "named, or why not" in text
     assert "next strike: " in said
     assert (written["next_strike"] is not None) == bool(written["candidates"])
     if verdict == "explained":
