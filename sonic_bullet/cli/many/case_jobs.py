@@ -133,13 +133,13 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
 
 
 def _fit(source: str, out: Path, options: Mapping[str, Any]) -> None:
-    from sonic_bullet.cli.fit_command import ONE, run_fit
+    from sonic_bullet.cli.fit_command import OF_ONE_TAKE, run_fit
 
     given = {name: _inside(out, options[name]) for name in ("picture", "csv_to", "uff_to")}
     tolerance = options["tolerance_percent"]
     run_fit(
         source, output=str(out / PRESET), json_to=str(out / VALUES), tolerance_percent=tolerance,
-        **given, **dict.fromkeys(ONE),
+        **given, **dict.fromkeys(OF_ONE_TAKE),
     )  # fmt: skip
 
 

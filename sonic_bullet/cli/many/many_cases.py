@@ -75,9 +75,9 @@ def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
     if output is None or output.endswith(".json"):
         given = f"-o {output}" if output else "no -o"
         raise FileError(f"{given} beside several cases", "give a folder for all results: -o DIR")
-    from sonic_bullet.cli.fit_command import ONE
+    from sonic_bullet.cli.fit_command import OF_ONE_TAKE
 
-    if of_one := [name for name in ONE if options.get(name) not in (None, ())]:
+    if of_one := [name for name in OF_ONE_TAKE if options.get(name) not in (None, ())]:
         given = " and ".join(f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one)
         raise FileError(f"{given} given beside cases", "a case says that itself; leave it out")
     taken = {PRESET, VALUES, WORDS, DONE}
