@@ -23,6 +23,22 @@ from sonic_bullet.records.errors import FileError
 
 Point = tuple[float, float, float]
 
+OF_ONE_TAKE = (
+    "mesh",
+    "strike",
+    "direction",
+    "impulse",
+    "material",
+    "scale",
+    "sensor",
+    "sensor_at",
+    "sensor_direction",
+    "onset_s",
+    "fixed",
+    "channel",
+    "medium",
+)
+
 
 def run_fit(
     source: str,
@@ -100,24 +116,9 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     FileError
         The source cannot be read, or options are missing or wrong.
     """
-    of_one_take = (
-        "mesh",
-        "strike",
-        "direction",
-        "impulse",
-        "material",
-        "scale",
-        "sensor",
-        "sensor_at",
-        "sensor_direction",
-        "onset_s",
-        "fixed",
-        "channel",
-        "medium",
-    )
     path = Path(source)
     if path.is_dir() or path.name == "case.json":
-        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one_take if one[name] not in (None, ())]
+        given = [f"--{name.replace('_s', '').replace('_', '-')}" for name in OF_ONE_TAKE if one[name] not in (None, ())]
         if given:
             raise FileError(f"{' and '.join(given)} given beside a case", "a case says that itself; leave it out")
         return read_case(path)
