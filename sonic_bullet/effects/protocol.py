@@ -21,7 +21,6 @@ from sonic_bullet.records import Array, ModalModel
 
 __all__ = [
     "CARRIES",
-    "Alternatives",
     "BaselineChange",
     "ChangesBaseline",
     "Cost",
@@ -202,14 +201,6 @@ class RingsAlong(ABC):
     @abstractmethod
     def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return its frequencies in Hz and decays in 1/s."""
-
-
-class Alternatives(ABC):
-    """An effect with discrete choices that no step of a fit connects."""
-
-    @abstractmethod
-    def others(self) -> tuple[Effect, ...]:
-        """Return the same effect with its other choices."""
 
 
 class Effect(Protocol):

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from sonic_bullet.effects.common.points import solved
-from sonic_bullet.effects.protocol import Alternatives, Evidence, ObjectEvidence, Owner, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
 IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
@@ -28,7 +28,7 @@ ORDERS: tuple[int, ...] = (2, 4)
 
 
 @dataclass(frozen=True)
-class Radiation(Alternatives):
+class Radiation:
     """Loss of modes by radiation, of one equivalent source.
 
     Attributes
@@ -77,10 +77,6 @@ class Radiation(Alternatives):
     def freedom(self) -> int:
         """Count the numbers that were free when it was proposed."""
         return 2
-
-    def others(self) -> tuple[Radiation, ...]:
-        """Return the same loss with the other tilt, as another effect's roll-off may hide or imitate it."""
-        return (replace(self, tilt=0.5 - self.tilt),)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

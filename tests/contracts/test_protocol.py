@@ -108,6 +108,6 @@ def test_no_optional_word_is_a_runtime_protocol() -> None:
         for _, thing in inspect.getmembers(protocol, inspect.isclass)
         if inspect.isabstract(thing) and thing.__module__ == protocol.__name__
     ]
-    assert len(optional) >= 6
+    assert len(optional) >= 5
     for thing in optional:
         assert not vars(thing).get("_is_runtime_protocol", False), thing.__name__

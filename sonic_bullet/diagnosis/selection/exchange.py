@@ -27,7 +27,7 @@ from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
 from sonic_bullet.diagnosis.selection.thresholds import RULES
-from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence
+from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
@@ -86,32 +86,11 @@ def again(
     return refitted(replace(rest, effects=(*before, found or effect, *after)), problem.bodies, evidence.observed)
 
 
-def starts(h: Hypothesis, problem: DiagnosisProblem) -> list[Hypothesis]:
-    """Return the hypothesis, and variants by the effects' discrete choices (``others``).
-
-    With each choice all other effects are looked for anew: what one takes up, another had taken.
-    """
-    found = [h]
-    for i, effect in enumerate(h.effects):
-        for other in effect.others() if isinstance(effect, Alternatives) else ():
-            start = replace(h, effects=(*h.effects[:i], other, *h.effects[i + 1 :]))
-            for j in range(len(h.effects)):
-                start = again(start, j, problem, afresh=True) if j != i else start
-            found.append(start)
-    return found
-
-
-def settled(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
-    """Fit all effects together from all starts, and return the nearest to the fitted strikes; as many numbers each."""
-    ends = parallel_map(lambda start: together(start, problem), starts(h, problem))
-    return min(ends, key=problem.distance_db)
-
-
 def chosen(h: Hypothesis, problem: DiagnosisProblem) -> Hypothesis:
-    """Return the hypothesis, settled where that is nearer to the fitted strikes."""
+    """Return the hypothesis, its effects fitted together where that is nearer to the fitted strikes."""
     if not problem.has_audio:
         return h
-    best = settled(h, problem)
+    best = together(h, problem)
     return best if problem.distance_db(best) <= problem.distance_db(h) else h
 
 
@@ -166,7 +145,7 @@ def exchanged(
             other = again(refitted(with_effects(best, effects, problem.bodies), problem.bodies), place, problem)
             if problem.distance_db(other) > problem.distance_db(best) + RULES.suffices_db:
                 continue  # it would have to gain by strikes it never saw
-            other = settled(other, problem)
+            other = together(other, problem)
             far = left_out_db(best, place, problem) if far is None else far
             now = left_out_db(other, place, problem)
             gain = far - now

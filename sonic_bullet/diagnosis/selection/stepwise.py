@@ -37,11 +37,11 @@ from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
-from sonic_bullet.diagnosis.selection.exchange import chosen, exchanged, rivals
+from sonic_bullet.diagnosis.selection.exchange import exchanged, rivals
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.simplest import examined, pruned, simplest
 from sonic_bullet.diagnosis.selection.thresholds import RULES
-from sonic_bullet.effects.protocol import Alternatives, Dereverberates, Effect, Evidence, Stage
+from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, Stage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -272,8 +272,6 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
         if isinstance(best.effect, Dereverberates) and problem.distance_db(h) > now.distance_db:
             h = reidentified(h, problem.bodies)  # a room's response by lines so far off that it sounds worse than none
-        if len(added) > 1 and any(isinstance(e, Alternatives) for e in h.effects):
-            h = chosen(h, problem)  # or a third effect is found for what only the other choice would say
         now = problem.score(h)
     if len(added) > 1:
         h, added = exchanged(h, added, passed, problem)

@@ -8,7 +8,7 @@ names the change that brought it. What is unknown is removed first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields
 from typing import Any
 
 
@@ -147,7 +147,8 @@ class Thresholds:
 
 def rows(rules: Thresholds) -> list[tuple[str, float, str, str, str]]:
     """Return every name with its number, unit, reason and provenance, in their order."""
-    return [(f.name, getattr(rules, f.name), *(f.metadata[k] for k in WORDS)) for f in fields(rules)]
+    every = zip(fields(rules), astuple(rules), strict=True)
+    return [(f.name, value, *(f.metadata[k] for k in WORDS)) for f, value in every]
 
 
 def table(rules: Thresholds) -> str:
