@@ -21,7 +21,7 @@ from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
 from sonic_bullet.synth.bank import audible
-from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST
+from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
 
 NODES_PER_SAMPLE = 2
 PLAYED_BLOCK = 256
@@ -207,7 +207,7 @@ def pulse_nodes(length: float) -> tuple[Array, Array]:
 
     By the module's first equation.
     """
-    length = max(length, SHORTEST)
+    length = max(length, SHORTEST_PULSE)
     count = max(NODES_PER_PULSE, int(np.ceil(NODES_PER_SAMPLE * length)))
     share = (np.arange(count) + 0.5) / count
     force = np.sin(np.pi * share)

@@ -18,7 +18,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 SIDES = ("before", "after")  # the folders of --predict
-SHOWN = 4  # numbers of a list, in the summary: all of them are in the JSON
+SHOWN_NUMBERS = 4  # numbers of a list, in the summary: all of them are in the JSON
 
 
 def run_diagnose(
@@ -148,8 +148,8 @@ def _number(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list):
-        more = f", and {len(value) - SHOWN} more" if len(value) > SHOWN else ""
-        return "[" + ", ".join(_number(v) for v in value[:SHOWN]) + more + "]"
+        more = f", and {len(value) - SHOWN_NUMBERS} more" if len(value) > SHOWN_NUMBERS else ""
+        return "[" + ", ".join(_number(v) for v in value[:SHOWN_NUMBERS]) + more + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{k} {_number(v)}" for k, v in value.items()) + "}"
     return str(value)

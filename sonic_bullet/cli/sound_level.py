@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sonic_bullet.files.levels import FileLevel
     from sonic_bullet.files.rows.spool import KeptSound
 
-TAIL_DB = -60.0
+DEFAULT_TAIL_DB = -60.0
 OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json", "fade_s")
 
 
@@ -66,7 +66,7 @@ def level_options(command: Any) -> Any:
                 "--tail",
                 "tail_db",
                 type=float,
-                default=TAIL_DB,
+                default=DEFAULT_TAIL_DB,
                 metavar="DB",
                 help="Ring on after the last step, without physics, at most 10 s, until it is that far below the peak: "
                 "-60; 0: not. [default: -60]",
@@ -85,7 +85,7 @@ class LevelWish:
     peak_dbfs: float | None = None
     lufs: float | None = None
     pascals: bool = False
-    tail_db: float = TAIL_DB
+    tail_db: float = DEFAULT_TAIL_DB
     scale_json: bool = False
     fade_s: tuple[float, float] | None = None
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import msgspec
 
 from sonic_bullet.diagnosis.diagnose import Diagnosis
-from sonic_bullet.effects.presets_of_effects import KEPT, stored
+from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS, stored
 from sonic_bullet.effects.protocol import Effect, Owner, Stage
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.estimator.fit.fitted_preset import preset_of as fitted_preset
@@ -48,4 +48,4 @@ def preset_of(d: Diagnosis) -> Preset:
 
 def kept(effect: Effect) -> bool:
     """Decide whether a preset holds the effect."""
-    return effect.owner in (Owner.MATERIAL, Owner.OBJECT) and isinstance(effect, KEPT)
+    return effect.owner in (Owner.MATERIAL, Owner.OBJECT) and isinstance(effect, KEPT_EFFECTS)

@@ -27,7 +27,7 @@ ROUGH = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
 FEWEST_LINES, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
 COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
 STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is observed to what is expected: gains to begin with
-DELAYS_S, FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
+ONSET_DELAYS_S, ONSET_FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
 # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
 SILENT, HIDDEN = 10.0, 0.02
 
@@ -198,8 +198,8 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     def at(delay_s: float) -> float:
         return float(9 * np.log1p((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9).sum())
 
-    middle = min(DELAYS_S, key=at)
-    return min(at(t) for t in middle + FINER_S)
+    middle = min(ONSET_DELAYS_S, key=at)
+    return min(at(t) for t in middle + ONSET_FINER_S)
 
 
 def _golden(f: Any, low: float, high: float) -> float:

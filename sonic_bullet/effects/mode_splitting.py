@@ -15,17 +15,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.common.axes import PAIR, about_axes, pair_at
+from sonic_bullet.effects.common.axes import AXES_PAIR, about_axes, pair_at
 from sonic_bullet.effects.common.proofs import finite, same_length
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 SPLIT = (1e-4, 3e-2)
 LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
-ALIKE = 0.9
+ALIKE_PATTERNS = 0.9
 # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or
 # too far
-SAME, TURNED = 1e-4, 0.3
+SAME, TURNED_PAIR = 1e-4, 0.3
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
         LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0)
     )
     trials: list[tuple[bool, float, int, int, int, float, float]] = []
-    for a in np.flatnonzero(np.diff(model_hz) < PAIR * model_hz[:-1]):
+    for a in np.flatnonzero(np.diff(model_hz) < AXES_PAIR * model_hz[:-1]):
         middle = scale * (model_hz[a] + model_hz[a + 1]) / 2
         near = np.flatnonzero((np.abs(every / middle - 1) < reach) & clear)
         near = np.sort(near[np.argsort(-size[near])][:most])
@@ -160,12 +160,12 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
-            plain = alike > ALIKE
+            plain = alike > ALIKE_PATTERNS
             if not plain and alike > also and len(strike) >= strikes:
                 alike = min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1])
             if plain or (alike > also and len(strike) >= strikes):
                 trials.append(
-                    (plain, float(alike - off / reach * (1 - ALIKE)), int(a), int(low), int(high), split, turn)
+                    (plain, float(alike - off / reach * (1 - ALIKE_PATTERNS)), int(a), int(low), int(high), split, turn)
                 )
     found: list[tuple[float, ...]] = []
     split_off: list[bool] = []
@@ -180,7 +180,7 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
         done.update((mode, mode + 1))
         middle = float((every[low] + every[high]) / 2)
         found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
-        split_off.append(bool(model_hz[mode + 1] / model_hz[mode] - 1 < SAME or abs(np.sin(2 * turn)) > TURNED))
+        split_off.append(bool(model_hz[mode + 1] / model_hz[mode] - 1 < SAME or abs(np.sin(2 * turn)) > TURNED_PAIR))
     return sorted(found) if split_off and np.mean(split_off) >= mostly else []
 
 

@@ -23,7 +23,7 @@ from sonic_bullet.records import Material, ModalModel
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import MaterialError, RecordError
 
-KEPT: tuple[type[Effect], ...] = (
+KEPT_EFFECTS: tuple[type[Effect], ...] = (
     DampingLaw,
     ThermoelasticLoss,
     ModeSplitting,
@@ -58,10 +58,10 @@ def effect_of(data: dict[str, Any]) -> Effect:
         There is no such effect, or a field is wrong; names it.
     """
     name = data.get("id")
-    kind = next((k for k in KEPT if k.id == name), None)
+    kind = next((k for k in KEPT_EFFECTS if k.id == name), None)
     if kind is None:
         raise RecordError(
-            f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT)}"
+            f"there is no effect '{name}' that a preset can hold", f"use one of {', '.join(k.id for k in KEPT_EFFECTS)}"
         )
     field_of = {in_file: field for field, in_file in FILE_NAMES.items()}
     try:

@@ -1,6 +1,6 @@
 """Descriptions of the fields of case.json, and the JSON Schema made of them and of the classes that read the file.
 
-    CaseFields (case_fields.py) -> msgspec's schema + ABOUT -> JSON Schema
+    CaseFields (case_fields.py) -> msgspec's schema + CASE_PARTS -> JSON Schema
     -> `sonic-bullet case schema`, docs/reference/case.md
 
 A field without a description here is an error, so that the page stays complete.
@@ -16,7 +16,7 @@ from sonic_bullet.files.case_fields import CaseFields
 from sonic_bullet.files.cases import CASE_FORMAT
 from sonic_bullet.machine.json_text import json_bytes
 
-ABOUT: dict[str, tuple[str, dict[str, str]]] = {
+CASE_PARTS: dict[str, tuple[str, dict[str, str]]] = {
     "Case": (
         "A case: recorded strikes of known objects. What is not declared is null or absent.",
         {
@@ -124,7 +124,7 @@ def case_schema() -> dict[str, Any]:
     Raises
     ------
     KeyError
-        ABOUT lacks a field.
+        CASE_PARTS lacks a field.
     """
     made = msgspec.json.schema(CaseFields)
     text = json_bytes(made).decode()
@@ -135,7 +135,7 @@ def case_schema() -> dict[str, Any]:
     whole: dict[str, Any] = msgspec.json.decode(text)
     parts = {_public(name): part for name, part in whole["$defs"].items()}
     for name, part in parts.items():
-        what, fields = ABOUT[name]
+        what, fields = CASE_PARTS[name]
         part["description"] = what
         part["properties"] = {
             field: {"description": fields[field], **form} for field, form in part["properties"].items()

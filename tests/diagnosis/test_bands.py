@@ -13,7 +13,7 @@ import pytest
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.remainder import remainder
-from sonic_bullet.diagnosis.selection.band_levels import CENTRE_HZ, HALF, BandOff, in_words, off_in, over_db
+from sonic_bullet.diagnosis.selection.band_levels import CENTRE_HZ, HALF_BAND, BandOff, in_words, off_in, over_db
 from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import EFFECTS
@@ -122,7 +122,7 @@ def test_early_and_late_are_told_apart() -> None:
 
 def test_a_tone_on_a_bands_edge_belongs_to_either_side() -> None:
     """As far off as corrections go: it leaves one band for the next, and neither lacks it."""
-    edges = CENTRE_HZ[(CENTRE_HZ > 400) & (CENTRE_HZ < 6000)][::3] * HALF
+    edges = CENTRE_HZ[(CENTRE_HZ > 400) & (CENTRE_HZ < 6000)][::3] * HALF_BAND
     for hz in edges:
         for off in (0.008, -0.008):
             found = over(tone(hz), tone(hz * (1 + off)), noise=0.01)
@@ -178,7 +178,7 @@ def table(*strikes: list[float]) -> Array:
 ])  # fmt: skip
 def test_a_mean_is_off_by_3_db_and_two_standard_errors(strikes: tuple[list[float], ...], off: bool) -> None:
     found = off_in(table(*strikes))
-    assert [b.from_hz for b in found] == ([pytest.approx(CENTRE_HZ[10] / HALF)] if off else [])
+    assert [b.from_hz for b in found] == ([pytest.approx(CENTRE_HZ[10] / HALF_BAND)] if off else [])
 
 
 def test_bands_in_words() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.evidence.mesh_limits import FAR, beyond
+from sonic_bullet.diagnosis.evidence.mesh_limits import FAR_FOR_MESH, beyond
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import ordered
@@ -65,12 +65,14 @@ def test_upper_modes_two_percent_off_are_the_meshs(off: float) -> None:
     assert end.after_db == end.before_db  # what is played knows nothing of it
 
 
-@parametrize_few("off", [np.r_[np.full(3, 0.02), np.zeros(15)], upper(1.6 * FAR)], 1, ids=["low modes", "too far"])
+@parametrize_few(
+    "off", [np.r_[np.full(3, 0.02), np.zeros(15)], upper(1.6 * FAR_FOR_MESH)], 1, ids=["low modes", "too far"]
+)
 def test_what_no_mesh_does_stays_open(off: np.ndarray) -> None:
-    """Long waves are what meshes get right; and nothing is moved by more than FAR, or to a line of another pattern."""
+    """Long waves are what meshes get right; nothing moves by more than FAR_FOR_MESH, or to another pattern's line."""
     body, h, takes = misjudged(off)
     most = beyond(h, posed((body,), takes))[1]
-    assert most < FAR
+    assert most < FAR_FOR_MESH
     assert closed(h, (body,), takes, (), BAND).verdict == "unexplained"
 
 

@@ -9,7 +9,15 @@ import pytest
 
 from sonic_bullet.effects.orthotropy import tensor_search
 from sonic_bullet.effects.orthotropy.tensor_lines import BodyLines
-from sonic_bullet.effects.orthotropy.tensor_search import CAP, STEP, WIDTHS, _hopped, fitted, isotropic_p, search
+from sonic_bullet.effects.orthotropy.tensor_search import (
+    LINE_CAP,
+    TENSOR_STEP,
+    WIDTHS,
+    _hopped,
+    fitted,
+    isotropic_p,
+    search,
+)
 from sonic_bullet.effects.orthotropy.tensors import constants, stiffness
 from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
@@ -72,13 +80,13 @@ def test_steps_to_either_side_lead_out_of_an_end_whose_upper_pairs_are_wrong(see
         fitted(
             told,
             "orthorhombic",
-            far(seed) + STEP * rng.choice([-1.5, 1.5], 9) * (np.arange(9) // 3 != 1),
+            far(seed) + TENSOR_STEP * rng.choice([-1.5, 1.5], 9) * (np.arange(9) // 3 != 1),
             guess,
             WIDTHS[4:],
         )
         for _ in range(5)
     ]
-    wrong = [end for end in ends if end.off > 0.3 * CAP]
+    wrong = [end for end in ends if end.off > 0.3 * LINE_CAP]
     assert wrong
     near = [_hopped(told, end, guess) for end in wrong]
     assert all(b.bic <= a.bic for a, b in zip(wrong, near, strict=True))

@@ -14,7 +14,7 @@ import pytest
 import soundfile
 
 from sonic_bullet import attach, presets
-from sonic_bullet.effects.presets_of_effects import KEPT
+from sonic_bullet.effects.presets_of_effects import KEPT_EFFECTS
 from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.listener import direct_client, disconnect
 from tests.cli.test_commands import run
@@ -43,7 +43,7 @@ ETA = 4e-3
 METAL = {"youngs_pa": 2e11, "poisson": 0.29, "density_kg_m3": 7860.0}
 
 
-EFFECTS = [*(kind.id for kind in KEPT), "orthotropy"]
+EFFECTS = [*(kind.id for kind in KEPT_EFFECTS), "orthotropy"]
 
 
 def groups(effect: str) -> dict[str, Any]:

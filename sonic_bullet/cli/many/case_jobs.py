@@ -22,7 +22,7 @@ from sonic_bullet.jobs.job_processes import Failed
 from sonic_bullet.machine.progress import shown_by
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
-PRESET, VALUES, WORDS = "preset.json", "result.json", "summary.txt"
+PRESET, VALUES, WORDS_FILE = "preset.json", "result.json", "summary.txt"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +127,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
         except SonicBulletError as error:
             return Failed(str(error).replace(place + os.sep, ""))
         words = (said.getvalue() + warned.getvalue()).replace(place + os.sep, "")
-        (out / WORDS).write_text(words, encoding="utf-8")
+        (out / WORDS_FILE).write_text(words, encoding="utf-8")
         made = {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
     return CaseResult(made, digest(files))
 

@@ -20,7 +20,7 @@ import click
 import msgspec
 
 from sonic_bullet.cli.line_table import finite, write_csv
-from sonic_bullet.cli.many.case_jobs import PRESET, VALUES, WORDS, CaseFolder, CaseResult, digest, run_case
+from sonic_bullet.cli.many.case_jobs import PRESET, VALUES, WORDS_FILE, CaseFolder, CaseResult, digest, run_case
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, write_json
 from sonic_bullet.cli.parameters import ManyOptions, cores
 from sonic_bullet.files.atomic import replacing
@@ -30,7 +30,7 @@ from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
-DONE = "done.json"
+DONE_FILE = "done.json"
 OUTPUTS = {"picture": "--picture", "csv_to": "--csv", "uff_to": "--uff", "predict": "--predict", "report": "--report"}
 """Options that name an output, which here is one of each case's."""
 SPLITS = ("fit", "holdout", "transfer")
@@ -80,7 +80,7 @@ def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
     if of_one := [name for name in OF_ONE_TAKE if options.get(name) not in (None, ())]:
         given = " and ".join(f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one)
         raise FileError(f"{given} given beside cases", "a case says that itself; leave it out")
-    taken = {PRESET, VALUES, WORDS, DONE}
+    taken = {PRESET, VALUES, WORDS_FILE, DONE_FILE}
     for name, option in OUTPUTS.items():
         value = options.get(name)
         if value is None:
@@ -112,7 +112,7 @@ def _cases(sources: Iterable[str]) -> list[CaseFolder]:
 def _is_done(place: Path, case: CaseFolder) -> bool:
     """Tell whether a case, as it is now, has its result."""
     try:
-        before = msgspec.json.decode((place / case.name / DONE).read_bytes())
+        before = msgspec.json.decode((place / case.name / DONE_FILE).read_bytes())
         return bool(before["case_sha256"] == digest(case.contents()))
     except (OSError, SonicBulletError, msgspec.DecodeError, KeyError, TypeError):
         return False
@@ -120,9 +120,9 @@ def _is_done(place: Path, case: CaseFolder) -> bool:
 
 def _keep(folder: Path, found: CaseResult) -> None:
     """Write a case's results, the mark that they are whole last; leave none of them where that fails."""
-    marked = {**found.files, DONE: json_bytes({"case_sha256": found.case_sha256})}
+    marked = {**found.files, DONE_FILE: json_bytes({"case_sha256": found.case_sha256})}
     with written(folder):
-        (folder / DONE).unlink(missing_ok=True)
+        (folder / DONE_FILE).unlink(missing_ok=True)
         for name in marked:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -138,14 +138,14 @@ def _keep(folder: Path, found: CaseResult) -> None:
 def _write_lists(command: str, place: Path, cases: Iterable[CaseFolder], failed: Mapping[CaseFolder, str]) -> None:
     listed = sorted((case.name, why) for case, why in failed.items())
     write_json_lines(place / "failures.jsonl", ({"case": name, "reason": why} for name, why in listed))
-    write_csv(str(place / "summary.csv"), _rows(command, place, cases), COLUMNS[command])
+    write_csv(str(place / "summary.csv"), _rows(command, place, cases), MANY_COLUMNS[command])
 
 
 def _rows(command: str, place: Path, cases: Iterable[CaseFolder]) -> list[dict[str, Any]]:
     """Return a row for each case that has its result."""
     rows = []
     for case in cases:
-        if (place / case.name / DONE).is_file():
+        if (place / case.name / DONE_FILE).is_file():
             found = msgspec.json.decode((place / case.name / VALUES).read_bytes())
             rows.append({"case": case.name, "verdict": found["verdict"], **VALUES_OF[command](found)})
     return rows
@@ -176,7 +176,7 @@ VALUES_OF: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
     "fit": _fit_values,
     "diagnose": _diagnose_values,
 }
-COLUMNS = {
+MANY_COLUMNS = {
     "fit": (
         "case", "gamma_m2_s2", "gamma_sd", "poisson_ratio", "alpha_per_s", "beta_s", "modes", "distance_db", "verdict"
     ),
@@ -188,7 +188,7 @@ COLUMNS = {
 
 def _lines(command: str, rows: Sequence[Mapping[str, Any]], made: int, failed: Mapping[str, str]) -> list[str]:
     """Describe a run, a line a thing."""
-    heads = [name for name in COLUMNS[command] if any(row[name] is not None for row in rows)]
+    heads = [name for name in MANY_COLUMNS[command] if any(row[name] is not None for row in rows)]
     cells = [tuple(_cell(row[name]) for name in heads) for row in rows]
     return [
         *([table(tuple(name.replace("_", " ") for name in heads), cells)] if rows else []),

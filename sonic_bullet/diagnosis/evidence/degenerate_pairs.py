@@ -19,7 +19,7 @@ from sonic_bullet.diagnosis.prediction.prediction import pattern
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
-LIKE = 0.97  # cosine of a line's amplitudes over the strikes and its modes' pattern
+LIKE_PATTERNS = 0.97  # cosine of a line's amplitudes over the strikes and its modes' pattern
 LEAST_STRIKES = 3  # by which a pattern is known
 
 
@@ -45,7 +45,7 @@ def separated(body: Struck) -> Struck:
             min(like(lines.amplitude[:, a], row[:, group[:cut]]), like(lines.amplitude[:, b], row[:, group[cut:]]))
             for a, b in directions
         ]
-        if not fits or max(fits) < LIKE:
+        if not fits or max(fits) < LIKE_PATTERNS:
             continue
         for k, part in zip(directions[int(np.argmax(fits))], (group[:cut], group[cut:]), strict=True):
             line[part] = k

@@ -1,9 +1,9 @@
 """Errors of a mesh: how much of an unexplained distance may be theirs.
 
     modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
-    lines of no mode, that have a mode's pattern and lie FAR from it at most, where waves are short:  the modes put
+    lines of no mode, that have a mode's pattern and lie FAR_FOR_MESH from it at most, where waves are short: modes put
         there     -> what is left   (beyond)
-    modes FAR below the band's edge at most, of which nothing is recorded:                            the modes put
+    modes FAR_FOR_MESH below the band's edge at most, of which nothing is recorded: modes put
         outside   -> the same
 
 A correction is 1 % at most and part of the baseline; finite elements of a coarse mesh err by more in the upper modes,
@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.degenerate_pairs import LEAST_STRIKES, LIKE, like
-from sonic_bullet.diagnosis.evidence.refit import ROUGH, refitted
+from sonic_bullet.diagnosis.evidence.degenerate_pairs import LEAST_STRIKES, LIKE_PATTERNS, like
+from sonic_bullet.diagnosis.evidence.refit import ROUGH_LINES, refitted
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
@@ -29,7 +29,7 @@ from sonic_bullet.estimator.lines.log_spectral import with_noise
 from sonic_bullet.records import Array
 
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
-FAR = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
+FAR_FOR_MESH = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
 
 
 def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
@@ -68,7 +68,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > DEGENERATE_SPLIT)
     free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
-    near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR) > top)
+    near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR_FOR_MESH) > top)
     if not near.any():
         return h, most
     now = problem.distance_db(h)
@@ -100,10 +100,10 @@ def _put(p: Prediction) -> tuple[Array, float]:
     ):
         if lines.freq_hz[k] < upper:
             continue
-        near = np.unique(group[~matched & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR)])
+        near = np.unique(group[~matched & (np.abs(np.log(model.freq_hz / lines.freq_hz[k])) < FAR_FOR_MESH)])
         members = [np.flatnonzero(group == g) for g in near]
         alike = [like(lines.amplitude[:, k], row[:, who]) if not matched[who].any() else 0.0 for who in members]
-        if not alike or max(alike) < LIKE:
+        if not alike or max(alike) < LIKE_PATTERNS:
             continue
         who = members[int(np.argmax(alike))]
         step = float(lines.freq_hz[k] / model.freq_hz[who].mean() - 1)
@@ -146,6 +146,6 @@ def _roughened(body: Struck, rng: np.random.Generator) -> Struck:
     at = slice(body.surface_count(), len(shape) - 1)
     most = np.abs(np.einsum("sxm,sx->sm", shape[at], body.direction[:-1])).max(axis=0)
     shape[at] += (
-        ROUGH * most * rng.standard_normal((body.strikes, 1, len(most))) * body.direction[:-1, :, None]
+        ROUGH_LINES * most * rng.standard_normal((body.strikes, 1, len(most))) * body.direction[:-1, :, None]
     ).astype(np.float32)
     return replace(body, model=replace(body.model, shape=shape))

@@ -35,8 +35,8 @@ from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
 
-ROUGH = 0.02
-NEAR, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
+ROUGH_LINES = 0.02
+NEAR_LINES, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
 def refitted(
@@ -231,7 +231,7 @@ def _damped(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     guess = (max(h.alpha_per_s, 1e-3), max(h.beta_s, 1e-12))
     lines, rest, spread, whole_decay, lost = (np.concatenate(many) for many in (lam, left, sd, all_of_it, air))
     if h.air and lost.any():
-        factor = air_factor(lines, rest + lost, np.hypot(spread, ROUGH * whole_decay), lost / h.air)
+        factor = air_factor(lines, rest + lost, np.hypot(spread, ROUGH_LINES * whole_decay), lost / h.air)
         h, rest = replace(h, air=factor), rest + (1 - factor / h.air) * lost
     rest = np.maximum(rest, 1e-3 * whole_decay)
     found = rayleigh(lines, rest, spread, guess, whole_decay)
@@ -269,7 +269,7 @@ def whole(one: ObjectEvidence) -> Array:
     alike = (
         np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE
     )
-    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR) & alike
+    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR_LINES) & alike
     return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
 
 
@@ -306,7 +306,7 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
             expected = np.where(dependent, np.nan, expected)  # of an amplitude-dependent mode a linear fit takes a part
         modeled.append(expected.ravel())
         seen.append(np.abs(whole(one)).ravel())
-        rough = np.broadcast_to(ROUGH * np.nan_to_num(expected).max(axis=0, keepdims=True), expected.shape)
+        rough = np.broadcast_to(ROUGH_LINES * np.nan_to_num(expected).max(axis=0, keepdims=True), expected.shape)
         spread.append(np.stack([one.amplitude_sd.ravel(), rough.ravel()]))
     if not modeled:
         return h

@@ -23,7 +23,7 @@ from sonic_bullet.effects.common.envelope import Envelopes, alone, shifted
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
-STEP = 0.1  # of 1/duration: steps of δ
+DELTA_STEP = 0.1  # of 1/duration: steps of δ
 AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
@@ -94,7 +94,7 @@ def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> fl
         return 0.0
     longest = max(float(np.ptp(t)) for t, _ in rows)
     frame = min(float(np.median(np.diff(t))) for t, _ in rows)
-    step, reach = STEP / longest, min(most_hz, 0.4 / frame)
+    step, reach = DELTA_STEP / longest, min(most_hz, 0.4 / frame)
 
     def agree(delta: Array) -> Array:
         return np.asarray(np.sum([np.abs(u @ np.exp(-2j * np.pi * np.outer(t, delta))) for t, u in rows], axis=0))

@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
 
 CORRECTION = 0.01
-SKIRT, WIDE = 4.0, 40.0  # half widths to both sides: where a mode is looked for, and taken out
+SKIRT, WIDE_SKIRT = 4.0, 40.0  # half widths to both sides: where a mode is looked for, and taken out
 
 
 def settled(h: Hypothesis, bodies: tuple[Struck, ...]) -> tuple[Struck, ...]:
@@ -97,7 +97,7 @@ def sought(p: Prediction, which: Array, *, alone: Array | None = None) -> Array:
                 left, push, decay, own[j], correction[j], n=n, sr=observed.sr, most=most, band_hz=body.band_hz
             )
             if ratio != correction[j]:
-                half = 2 * CORRECTION * own[j] + WIDE * (decay / (2 * np.pi) + observed.sr / n)
+                half = 2 * CORRECTION * own[j] + WIDE_SKIRT * (decay / (2 * np.pi) + observed.sr / n)
                 bins = _bins(own[j], half, n, observed.sr)
                 was, will = (
                     _line(own[j] * (1 + r), decay, bins, n, observed.sr, body.band_hz) for r in (correction[j], ratio)

@@ -38,7 +38,7 @@ from sonic_bullet.records.counts import format_count
 
 # rms of a noisy take of a cell with power over noise ABOVE
 EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * ABOVE_NOISE))
-KEPT = 24  # takes whose spectra are kept
+KEPT_SPECTRA = 24  # takes whose spectra are kept
 
 
 class Judged(Protocol):
@@ -233,7 +233,7 @@ class Take:
         return _stated(distance_at(again, power, _spectra(self)[1], gain))
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=KEPT_SPECTRA)
 def _spectra(take: Take) -> tuple[tuple[Array, ...], Floor]:
     """Compute the powers of a take, and its noise in the band that is recorded."""
     return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)

@@ -27,7 +27,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
-HALF = 2 ** (1 / 6)  # of a third octave, to each side
+HALF_BAND = 2 ** (1 / 6)  # of a third octave, to each side
 SHOWN = 4  # in words
 
 
@@ -105,7 +105,7 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     """Compute the same of one part of the sounds."""
     windows = (512, 1024, 2048, 4096, 8192)
     found = np.full(len(CENTRE_HZ), np.nan)
-    low, high = CENTRE_HZ / HALF, CENTRE_HZ * HALF
+    low, high = CENTRE_HZ / HALF_BAND, CENTRE_HZ * HALF_BAND
     inside = (low >= band_hz[0]) & (high <= min(band_hz[1], sr / 2))
     fits = [w for w in windows if w <= len(recorded)]
     window = np.array([next((w for w in fits if RULES.band_cells * sr / w <= wide), 0) for wide in high - low])
@@ -154,8 +154,8 @@ def off_in(over: Array) -> tuple[BandOff, ...]:
         if abs(d.mean()) > max(RULES.band_apart_db, RULES.standard_errors * error):
             found.append(
                 BandOff(
-                    float(CENTRE_HZ[b] / HALF),
-                    float(CENTRE_HZ[b] * HALF),
+                    float(CENTRE_HZ[b] / HALF_BAND),
+                    float(CENTRE_HZ[b] * HALF_BAND),
                     part == 0,
                     float(d.mean()),
                     float(error),

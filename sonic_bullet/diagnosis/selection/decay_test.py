@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.refit import ROUGH
+from sonic_bullet.diagnosis.evidence.refit import ROUGH_LINES
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves_itself
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.selection.thresholds import RULES
@@ -75,7 +75,7 @@ def _cost(made: Predictions, one: ObjectEvidence) -> Array:
     """Compute ρ (k,) of lines' decays (k,) against those of their modes."""
     per_s = next(p.model.decay_per_s for body, p in made.items() if body.recorded is one.source)
     model = np.array([per_s[m].mean() for m in one.mode])
-    sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), ROUGH)
+    sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), ROUGH_LINES)
     with np.errstate(divide="ignore"):
         z = np.log(one.decay_per_s / np.maximum(model, 1e-9)) / sd
     return np.asarray(RULES.standard_errors**2 * np.log1p((z / RULES.standard_errors) ** 2))

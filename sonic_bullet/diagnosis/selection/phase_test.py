@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
-from sonic_bullet.diagnosis.evidence.refit import ROUGH
+from sonic_bullet.diagnosis.evidence.refit import ROUGH_LINES
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict_fitted
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
@@ -42,7 +42,7 @@ def _misfit(p: Prediction) -> float:
     expected = np.nan_to_num(expected)
     if not good.any() or not np.abs(expected[good]).any():
         return 0.0
-    rough = np.broadcast_to(ROUGH * np.abs(expected).max(axis=0, keepdims=True), expected.shape)[good]
+    rough = np.broadcast_to(ROUGH_LINES * np.abs(expected).max(axis=0, keepdims=True), expected.shape)[good]
     omega = np.broadcast_to(one.omega, expected.shape)[good]
     x, y, sd = expected[good], seen[good], one.amplitude_sd[good]
     if not one.signed:

@@ -26,7 +26,7 @@ from sonic_bullet.effects.amplitude_damping.damped_lines import (
     would,
 )
 from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
-from sonic_bullet.effects.common.axes import ANGLES, PAIR, turned
+from sonic_bullet.effects.common.axes import ANGLES, AXES_PAIR, turned
 from sonic_bullet.effects.common.envelope import envelopes, levels
 from sonic_bullet.effects.common.proofs import finite, one_of, same_length
 from sonic_bullet.effects.protocol import (
@@ -204,7 +204,7 @@ def _fitted(lines: list[DecayFrames], known: float | None) -> _Fit | None:
 def _held(line: DecayFrames, known: AmplitudeDamping) -> DecayFrames:
     """Restrict a line to the known angle of its degenerate modes."""
     turn = next(
-        (t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < PAIR), 0.0
+        (t for f, t in zip(known.freq_hz, known.turn_rad, strict=True) if abs(f / line.freq_hz - 1) < AXES_PAIR), 0.0
     )
     return under(line, int(np.abs(ANGLES - turn).argmin())) if len(line.amplitude) > 1 else line
 

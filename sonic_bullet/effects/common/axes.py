@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
-PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
+AXES_PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
 # relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they would
 # be two others
 ONE = 1e-4
@@ -25,7 +25,7 @@ ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the degenerate mod
 
 def pair_at(freq: Array, f: float) -> tuple[int, int]:
     """Find the two modes of a pair about a frequency; (-1, -1) where there is none."""
-    near = np.flatnonzero(np.abs(freq / f - 1) < 2 * PAIR)
+    near = np.flatnonzero(np.abs(freq / f - 1) < 2 * AXES_PAIR)
     if len(near) < 2:
         return -1, -1
     gaps = np.abs(freq[near[:-1]] + freq[near[1:]] - 2 * f) + 4 * np.diff(freq[near])

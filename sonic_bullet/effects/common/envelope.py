@@ -25,7 +25,7 @@ from sonic_bullet.records import Array
 # or up
 FAR, FASTER = 0.15, 5.0
 CLEAR = 12.0  # of |z| over the noise in it
-STEP = 1024  # samples between two exact phasors
+PHASOR_STEP = 1024  # samples between two exact phasors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,9 +147,9 @@ def _running(y: Array, omega: float, theta: float) -> Array:
     for a in range(3):
         step, total = omega - (a - 1) * theta, 0j
         z = np.exp(-1j * step)
-        for block in range(0, len(y), STEP):
+        for block in range(0, len(y), PHASOR_STEP):
             power = np.exp(-1j * step * block)
-            for n in range(block, min(block + STEP, len(y))):
+            for n in range(block, min(block + PHASOR_STEP, len(y))):
                 total += y[n] * power
                 power *= z
                 out[a, n + 1] = total

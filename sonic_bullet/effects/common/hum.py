@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 
-STEADY = 1.6  # loudest over softest recording
+STEADY_HUM = 1.6  # loudest over softest recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +116,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     turn = np.exp(-2j * np.pi * exact * np.outer(np.arange(half) / sr, multiple))
     fades = np.diff(np.log(np.abs(parts @ turn) + 1e-300), axis=0)[0].mean(axis=0)  # (i,)
     steady = (
-        (size.max(axis=0) < STEADY * size.min(axis=0))
+        (size.max(axis=0) < STEADY_HUM * size.min(axis=0))
         & (np.abs(wave) ** 2 > above * least.T).all(axis=0)
         & (np.abs(fades) < still)
     )

@@ -27,7 +27,7 @@ FRAME_S = 0.012
 DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
 LEAST = 4  # frames: in less no tail shows
 DECAYS = np.geomspace(0.5, 600.0, 31)
-SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
+TAIL_SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
 PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not identifiable
 # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
@@ -287,7 +287,7 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
     # (n,), (k, n, Δ) real and imaginary side by side
     m, b = turn[:, 0], turn[:, 1:] @ moved.view(float).reshape(len(z), len(at), -1)
     b = b.view(complex)
-    scale = (np.abs(z[:, 0] / mean) ** 2)[:, None] * SHARES  # (k, w): |A|² w²
+    scale = (np.abs(z[:, 0] / mean) ** 2)[:, None] * TAIL_SHARES  # (k, w): |A|² w²
     over = 1 / (scale[:, :, None] * value + noise[:, None, None])  # (k, w, n)
     power, size = over @ (b.real**2 + b.imag**2), over @ m**2  # (k, w, Δ), (k, w)
     cross = ((over * m) @ b.view(float)).view(complex)

@@ -22,7 +22,7 @@ from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
-STEP = 1024  # samples between two exact phasors
+RINGING_STEP = 1024  # samples between two exact phasors
 
 
 class _Modes(NamedTuple):
@@ -47,9 +47,9 @@ def _linear(out, start, pole, amplitude, length):
         first = int(np.ceil(start))
         last = min(len(out), first + length[k])
         z = np.exp(pole[k])
-        for block in range(first, last, STEP):
+        for block in range(first, last, RINGING_STEP):
             power = amplitude[k] * np.exp(pole[k] * (block - start))
-            for n in range(block, min(block + STEP, last)):
+            for n in range(block, min(block + RINGING_STEP, last)):
                 out[n] += power.real
                 power *= z
 
@@ -64,9 +64,9 @@ def _level(out, start, sr, modes, length):
         c, d = damping_growth[k], decay[k]
         share = c / (1.0 + c)
         size, angle = abs(amplitude[k]), np.angle(amplitude[k])
-        for block in range(first, last, STEP):
+        for block in range(first, last, RINGING_STEP):
             fall, step = np.exp(-d * (block - start) / sr), np.exp(-d / sr)
-            for n in range(block, min(block + STEP, last)):
+            for n in range(block, min(block + RINGING_STEP, last)):
                 t = (n - start) / sr
                 if abs(share) < 1e-4:
                     level = fall

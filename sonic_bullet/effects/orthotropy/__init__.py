@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensor_lines import CAP, body_lines_of, ringing
+from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, ringing
 from sonic_bullet.effects.orthotropy.tensor_search import WIDTHS, Tensor, fitted, isotropic_p, search
 from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
 from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
@@ -128,12 +128,12 @@ def _fits(h: ObjectEvidence) -> bool:
         return False
     off, own = np.log(h.freq_hz / h.model_hz), ringing(h)
     shift = float(np.median(off))
-    left = np.minimum(np.abs(off - shift), CAP)
+    left = np.minimum(np.abs(off - shift), LINE_CAP)
     if own.any():
         model = h.plain or h.model
         modes = model.freq_hz if model is not None else h.all_hz
         strange = np.abs(np.log(h.foreign_hz[own][:, None] / modes[None, :]) - shift).min(axis=1)
-        left = np.concatenate([left, np.minimum(strange, CAP)])
+        left = np.concatenate([left, np.minimum(strange, LINE_CAP)])
     size = np.concatenate(
         [np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])]
     )

@@ -15,7 +15,7 @@ from sonic_bullet.effects.orthotropy.tensors import stiffness
 from sonic_bullet.effects.protocol import Elastic, Evidence, ObjectEvidence
 from sonic_bullet.records import Array
 
-CAP = 0.012  # of ln f: a line farther off is no such mode
+LINE_CAP = 0.012  # of ln f: a line farther off is no such mode
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +91,7 @@ def _body_lines(h: ObjectEvidence) -> BodyLines:
     )
     log_hz = np.log(np.hypot(2 * np.pi * freq, np.nan_to_num(decay)) / (2 * np.pi))[order]
     wide = np.nan_to_num(decay)[order] / (2 * np.pi * np.exp(log_hz))
-    worth = worth / (1 + (wide / CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
+    worth = worth / (1 + (wide / LINE_CAP) ** 2)  # a line broader than that stands for whatever is beside it, too
     row = h.strike_vertex - h.sensor_vertex  # from the end: the sensor is the last
     known = np.isfinite(amplitude).all() and len(row) > 1
     return BodyLines(log_hz, np.nan_to_num(sd, nan=1e-4)[order], worth, amplitude if known else None, row, h.elastic)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensor_lines import CAP, BodyLines, Seen, body_lines_of, paired, seen_by
+from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, BodyLines, Seen, body_lines_of, paired, seen_by
 from sonic_bullet.effects.orthotropy.tensors import (
     MILD,
     NAMES,
@@ -39,9 +39,9 @@ from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-FLOOR = 3e-4  # of ln f: less is not identifiable
+LEAST_SPREAD = 3e-4  # of ln f: less is not identifiable
 WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
-STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
+TENSOR_STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 STARTS, BLIND = 24, 12  # of those sifted, taken further; without patterns
 # in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
 HINTED, HOP = 10.0, 2.0
@@ -80,7 +80,7 @@ class Tensor:
     scatter: float
     matched: float
     held: tuple[str, ...] = ()
-    off: float = CAP
+    off: float = LINE_CAP
 
     @property
     def stiffness_m2_s2(self) -> Array:
@@ -130,7 +130,7 @@ def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
     Lourenço, Martin & Stützle 2003].
     """
     for _ in range(HOPS):
-        sides = [p for p in (best.p + sign * one for one in np.diag(STEP) for sign in (-1, 1)) if sound(p)]
+        sides = [p for p in (best.p + sign * one for one in np.diag(TENSOR_STEP) for sign in (-1, 1)) if sound(p)]
         end = min(
             parallel_map(lambda p: fitted(bodies, "orthorhombic", p, guess, WIDTHS[FREED[-1] :]), sides),
             key=lambda e: e.bic,
@@ -265,7 +265,7 @@ def _prior(guess: Array) -> Callable[[Array], Array]:
 def _step(
     pairs: list[tuple[BodyLines, Seen, Array, Array]], symmetry: str, q: Array, guess: Array, width: float
 ) -> Array:
-    """Compute one step of the least squares of the module's docstring, at most STEP."""
+    """Compute one step of the least squares of the module's docstring, at most TENSOR_STEP."""
     prior = _prior(guess)
     own, bent = prior(expanded(symmetry, q)), _jacobian(symmetry, q, prior)
     turn = _jacobian(symmetry, q, constants)
@@ -282,7 +282,7 @@ def _step(
             slope.T @ (weight * off) / (width / 2) ** 2 - bent.T @ own,
         )
         weight = worth / (1 + ((off - slope @ step) / width) ** 2)
-    most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / STEP
+    most = np.abs(expanded(symmetry, q + step) - expanded(symmetry, q)) / TENSOR_STEP
     return np.asarray(step / max(1.0, float(most.max())))
 
 
@@ -294,9 +294,9 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
     turn = _jacobian(symmetry, q, constants)
     for t in bodies:
         s = seen_by(t, p)
-        line, mode, _ = paired(t, s, CAP / 3)
-        mine = np.full(len(t.log_hz), CAP)
-        mine[line] = np.clip(np.abs(t.log_hz[line] - s.log_hz[mode]), 0, CAP)
+        line, mode, _ = paired(t, s, LINE_CAP / 3)
+        mine = np.full(len(t.log_hz), LINE_CAP)
+        mine[line] = np.clip(np.abs(t.log_hz[line] - s.log_hz[mode]), 0, LINE_CAP)
         off.append(mine)
         strikes = 1 if t.amplitude is None or (s.alike == 1).all() else len(t.amplitude)
         other = np.full(len(t.log_hz), 1 - 1 / strikes)  # of patterns that have nothing to do with each other
@@ -305,15 +305,15 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
         numbers += (strikes - 1) * len(t.log_hz)
         slopes.append(0.5 * s.slope(mode).T @ turn)
     left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])
-    inside, n = left < CAP, len(left)
-    square = float(np.average(np.maximum(left, FLOOR) ** 2, weights=worth))
+    inside, n = left < LINE_CAP, len(left)
+    square = float(np.average(np.maximum(left, LEAST_SPREAD) ** 2, weights=worth))
     bic = (
         n * np.log(square)
         + numbers * np.log(np.average(np.concatenate(unlike), weights=worth))
         + SYMMETRIES[symmetry] * np.log(n)
     )
-    scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else CAP
-    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, FLOOR))
+    scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else LINE_CAP
+    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, LEAST_SPREAD))
     return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))
 
 

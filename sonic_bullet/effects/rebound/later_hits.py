@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 
 SPAN_S = (1.2e-3, 0.25)
 MOST_HITS = 8
-OWN = 0.02  # of the energy of a later hit: what the first does not say as well, at least
+OWN_RINGING = 0.02  # of the energy of a later hit: what the first does not say as well, at least
 LEAST = 0.06  # of the first hit's share
 EXPONENTS = (0.0, 1.0, 0.5, -0.2)
 
@@ -55,7 +55,7 @@ def second_hit(h: ObjectEvidence, level: Array) -> list[tuple[float, float, floa
     inside = energy - np.concatenate([np.zeros((len(x), 1)), np.cumsum((x**2)[:, ::-1], axis=1)], axis=1)[:, :reach]
     says = (
         np.maximum(both, 0.0) ** 2
-        / np.maximum(inside - own**2 / energy, OWN * energy)
+        / np.maximum(inside - own**2 / energy, OWN_RINGING * energy)
         / np.maximum((left**2).sum(axis=1, keepdims=True), 1e-300)
     )
     says[:, : int(SPAN_S[0] * h.sr)] = 0.0

@@ -21,13 +21,13 @@ import numpy as np
 from sonic_bullet.radiation.far_field import spread_directions
 from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Microphone, ShoeboxRoom
 from sonic_bullet.render.space.ambisonic_encoding import harmonics
-from sonic_bullet.render.space.ear_filters import MARGIN, ear_filters
+from sonic_bullet.render.space.ear_filters import FILTER_MARGIN, ear_filters
 from sonic_bullet.synth.minimum_phase import minimum_phase
 
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 WAVES = 32
 """Plane waves that noise comes as: more than the 16 channels of third order, which they tell apart."""
-LONGEST_S = 30.0
+LONGEST_NOISE_S = 30.0
 
 
 def reverberation_time_s(room: ShoeboxRoom, air: Air) -> Array:
@@ -63,7 +63,7 @@ def late_filters(
 ) -> Array:
     """Make filters (channels, 4, t) from the four far microphones, times their distance, to channels of receivers."""
     decay_db = 90.0  # how far the noise is followed down: 16 bits hold no more
-    longest_s = min(float(reverberation_time_s(room, air).max()) * decay_db / 60, LONGEST_S)
+    longest_s = min(float(reverberation_time_s(room, air).max()) * decay_db / 60, LONGEST_NOISE_S)
     taps = int(np.ceil(max(longest_s - begin_s, 0.0) * sr))
     made = np.zeros((channels, len(TETRAHEDRON), taps))
     if not taps:
@@ -109,5 +109,5 @@ def _response_of(microphone: Microphone, direction: Array, frequency_hz: Array, 
     if isinstance(microphone, Binaural):
         response = ear_filters(microphone.head, sr).at(away[None])[0]
         size = 2 * (len(frequency_hz) - 1)
-        return np.asarray(np.fft.rfft(response, size) * np.exp(2j * np.pi * MARGIN / sr * frequency_hz))
+        return np.asarray(np.fft.rfft(response, size) * np.exp(2j * np.pi * FILTER_MARGIN / sr * frequency_hz))
     return np.ones((1, 1))

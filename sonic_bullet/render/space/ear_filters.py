@@ -21,7 +21,7 @@ from sonic_bullet.records import Array, Head
 
 ONSET_SHARE = 0.1
 """Of a response's peak: where it begins. 20 dB is what ITD is measured by [Katz, Noisternig, JASA 2014, table I]."""
-MARGIN = 16
+FILTER_MARGIN = 16
 """Samples before and behind a response, for what delays that are no whole samples spread."""
 
 
@@ -72,8 +72,8 @@ def ear_filters(head: Head, sr: int) -> EarFilters:
     if head.sr != sr:
         response = resampled(response, head.sr, sr)
     taps = response.shape[2]
-    size = 2 * -(-(taps + 2 * MARGIN) // 2)
-    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (MARGIN, size - taps - MARGIN))))
+    size = 2 * -(-(taps + 2 * FILTER_MARGIN) // 2)
+    spectrum = np.fft.rfft(np.pad(response, ((0, 0), (0, 0), (FILTER_MARGIN, size - taps - FILTER_MARGIN))))
     delay = onsets(response)
     turn = np.exp(2j * np.pi / size * delay[..., None] * np.arange(spectrum.shape[-1]))
     corner = triangles(head.direction)

@@ -2,7 +2,7 @@
 
     rows of the step being rendered, load less strikes -> each row to the tracked point near it, or a new one
         -> n += a (load of its rows − n),   a = 1 − e^{−dt/SMOOTH_S}
-        -> HELD: up to MOST points a pair, sum and moment those of the rows, smoothed
+        -> HELD: up to PATCH_POINTS points a pair, sum and moment those of the rows, smoothed
     sets or loads that differ from those of the present poles -> STAND.stale of both bodies
 
 A resting box shows two, three or four of its corners, another choice each step; sum and moment alone are right. Each
@@ -19,17 +19,17 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.synth.strikes import NOW, SPAN
 
-MOST = 4
+PATCH_POINTS = 4
 """Points of a pair: a solver of convex shapes gives no more at a time."""
 SMOOTH_S = 0.03
 """Time constant of loads: of 20 to 50 ms, seven steps at 240 Hz, within which each corner of a box is loaded."""
-NEAR = 0.15
+SAME_POINT = 0.15
 """Of the smaller body's size: rows nearer than this to a tracked point are the same point."""
-LEAST = 0.02
+LEAST_PATCH = 0.02
 """Fraction of a pair's load below which a point is dropped."""
 LEAST_N = 1e-9
 """Newtons below which nothing is carried."""
-FAR_OFF, OFF = 1.6, 1.1
+FAR_OFF, OFF_PATCH = 1.6, 1.1
 """Factors by which a load must differ from the one of the present poles before new ones are computed: at once, 17 % of
 a Hertz spring, and after REST_S, 3 %."""
 REST_S = 0.2
@@ -37,12 +37,12 @@ REST_S = 0.2
 HELD = np.dtype(
     [
         ("count", "i8"),
-        ("point_m", "f8", (MOST, 2, 3)),  # in either body's frame
-        ("load_n", "f8", (MOST,)),
+        ("point_m", "f8", (PATCH_POINTS, 2, 3)),  # in either body's frame
+        ("load_n", "f8", (PATCH_POINTS,)),
         ("outward", "f8", (2, 3)),  # of either body's surface, its frame, mean over the points
         ("used", "i8"),  # of the set that poles were made for: how many points
-        ("used_m", "f8", (MOST, 2, 3)),
-        ("used_n", "f8", (MOST,)),
+        ("used_m", "f8", (PATCH_POINTS, 2, 3)),
+        ("used_n", "f8", (PATCH_POINTS,)),
         ("used_s", "f8"),  # since then
     ],
     align=True,
@@ -63,7 +63,7 @@ STAND = np.dtype(
 )
 """Support state of a body."""
 
-SHARE = 0.06
+POLES_SHARE = 0.06
 """Fraction of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes a third more,
 and live sound is never late for it. The body that waits longest is served first, moving ones before fixed ones."""
 SAVED_S = 0.03
@@ -80,7 +80,7 @@ def hold_contacts(here, rows, table, pairs, stand):
     """
     (row, stop), dt_s, bodies = here.row, here.dt_s, table.bodies
     follow = 1.0 - np.exp(-dt_s / SMOOTH_S)
-    target, place = np.empty(MOST), np.empty((MOST + 1, 2, 3))
+    target, place = np.empty(PATCH_POINTS), np.empty((PATCH_POINTS + 1, 2, 3))
     for i in range(pairs.count[0]):
         slot = pairs.active[i]
         pair, one = pairs.pair[slot], pairs.held[slot]
@@ -102,7 +102,7 @@ def hold_contacts(here, rows, table, pairs, stand):
         for side in range(2):
             if bodies[pair.body[side]].volume_m3 > 0.0:
                 size = min(size, bodies[pair.body[side]].size_m)
-        near = NEAR * size if size < np.inf else np.inf
+        near = SAME_POINT * size if size < np.inf else np.inf
         share = min(pair.support_n[0] / pair.force_n[NOW], 1.0) / dt_s if pair.force_n[NOW] > 0.0 else 0.0
         _smooth(one, rows[begin:row], share, near, follow, target, place)
         one.used_s += dt_s
@@ -142,12 +142,12 @@ def _nearest(one, point, count):
 def _smooth(one, rows, share, near, follow, target, place):
     """Update the tracked points by a pair's rows, whose loads in N·s times ``share`` are newtons.
 
-    target (MOST,), place (MOST + 1, 2, 3): scratch for the rows' loads, and for their normals.
+    target (PATCH_POINTS,), place (PATCH_POINTS + 1, 2, 3): scratch for the rows' loads, and for their normals.
     """
     old = one.count
     total = _take_rows(one, rows, share, near, target, place)
     if total > 0.0:
-        _lean(one, place[MOST], total, follow if old else 1.0)
+        _lean(one, place[PATCH_POINTS], total, follow if old else 1.0)
     whole = 0.0
     for k in range(one.count):
         one.load_n[k] += follow * (target[k] - one.load_n[k])
@@ -159,7 +159,7 @@ def _smooth(one, rows, share, near, follow, target, place):
                     one.point_m[k, side, x] += share * (place[k, side, x] / target[k] - one.point_m[k, side, x])
     kept = 0
     for k in range(one.count):
-        if one.load_n[k] >= max(LEAST * whole, LEAST_N) or target[k] > 0.0:
+        if one.load_n[k] >= max(LEAST_PATCH * whole, LEAST_N) or target[k] > 0.0:
             one.load_n[kept] = one.load_n[k]
             _copy(one.point_m[k], one.point_m[kept])
             kept += 1
@@ -170,7 +170,7 @@ def _smooth(one, rows, share, near, follow, target, place):
 def _take_rows(one, rows, share, near, target, place):
     """Assign each row to the tracked point near it, or to a new one; return the sum of the loads in N.
 
-    target (MOST,): loads; place (MOST + 1, 2, 3): their moments and, last, that of the normals.
+    target (PATCH_POINTS,): loads; place (PATCH_POINTS + 1, 2, 3): their moments and, last, that of the normals.
     """
     target[:], place[:] = 0.0, 0.0
     old, total, most = one.count, 0.0, 0.0
@@ -179,7 +179,7 @@ def _take_rows(one, rows, share, near, target, place):
         if load <= 0.0:
             continue
         k, off = _nearest(one, rows[r].point_m, one.count)
-        if off > near and one.count < MOST:
+        if off > near and one.count < PATCH_POINTS:
             k = one.count
             one.count += 1
             one.load_n[k] = 0.0
@@ -192,7 +192,7 @@ def _take_rows(one, rows, share, near, target, place):
         for side in range(2):
             for x in range(3):
                 place[k, side, x] += load * rows[r].point_m[side, x]
-                place[MOST, side, x] += load * rows[r].outward[side, x]
+                place[PATCH_POINTS, side, x] += load * rows[r].outward[side, x]
     return total
 
 
@@ -204,7 +204,7 @@ def _lean(one, outward, total, follow):
     """
     for side in range(2):
         length, mean = _length(outward[side]), one.outward[side]
-        if length < LEAST * total:
+        if length < LEAST_PATCH * total:
             continue
         for x in range(3):
             mean[x] += follow * (outward[side, x] / length - mean[x])
@@ -232,7 +232,7 @@ def _differs(one, near):
     """Return whether points or loads differ from those that the present poles were computed for."""
     if one.count != one.used:
         return True
-    off = OFF if one.used_s > REST_S else FAR_OFF
+    off = OFF_PATCH if one.used_s > REST_S else FAR_OFF
     for k in range(one.count):
         if not one.used_n[k] / off <= one.load_n[k] <= one.used_n[k] * off:
             return True
@@ -258,7 +258,7 @@ def choose_bodies(dt_s, table, pairs, supports, bank, scratch):
     Silent bodies wait.
     """
     stand, credit_s, bodies = supports.stand, supports.credit_s, table.bodies
-    credit_s[0] = min(credit_s[0] + SHARE * dt_s, SAVED_S)
+    credit_s[0] = min(credit_s[0] + POLES_SHARE * dt_s, SAVED_S)
     some = False
     for b in range(len(stand)):
         one = stand[b]

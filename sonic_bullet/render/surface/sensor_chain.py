@@ -19,7 +19,7 @@ from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorRespons
 from sonic_bullet.synth.minimum_phase import minimum_phase
 
 TAPS = 16
-REACH = 0.85
+EXACT_REACH = 0.85
 """Fraction of half the rate up to which the derivative is exact to 0.1 %."""
 RESPONSE_TAPS = 2048
 """Of a response: 12 Hz between two points of it, at 48 kHz, where it is that narrow."""
@@ -28,7 +28,7 @@ RESPONSE_TAPS = 2048
 @lru_cache(maxsize=8)
 def differentiator(sr: int) -> Array:
     """Return taps (TAPS,) of d/dt at a rate in Hz, (TAPS - 1)/2 samples late."""
-    omega = np.linspace(0.001, REACH, 400) * np.pi
+    omega = np.linspace(0.001, EXACT_REACH, 400) * np.pi
     lag = np.arange(TAPS // 2) + 0.5
     half = np.linalg.lstsq(2 * np.sin(omega[:, None] * lag) / omega[:, None], np.ones(len(omega)), rcond=None)[0]
     return np.asarray(sr * np.concatenate([half[::-1], -half]))

@@ -18,14 +18,14 @@ import numpy as np
 
 from sonic_bullet.synth.bank import drive, passing, poles, tile
 from sonic_bullet.synth.bank.kernels import uncounted
-from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, MOST_DUE, PAIR, ROOM, Lanes, Stretch
+from sonic_bullet.synth.bank.layout import COLUMNS, DRIVEN, FLOOR, FLUSH, LANE_PAIR, MOST_DUE, ROOM, Lanes, Stretch
 from sonic_bullet.synth.bank.strike_pool import begins, plan_nodes, release_done
-from sonic_bullet.synth.bank.tile import BLOCK, CHUNK, ROW, ROWS
+from sonic_bullet.synth.bank.tile import BLOCK, CHUNK, ROWS, TILE_ROW
 from sonic_bullet.synth.bank.translation import translate
 from sonic_bullet.synth.vector import LANES, At
 
-RING_SCRATCH = (2 + 10 + 2 * ROW + 2 * ROWS) * CHUNK
-PUSH_SCRATCH = COLUMNS // PAIR * ROOM * drive.STEP
+RING_SCRATCH = (2 + 10 + 2 * TILE_ROW + 2 * ROWS) * CHUNK
+PUSH_SCRATCH = COLUMNS // LANE_PAIR * ROOM * drive.SAMPLE_NUMBERS
 DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
@@ -36,8 +36,8 @@ def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover
     Advances z to the next block. False where all modes are below the floor. scratch: RING_SCRATCH numbers.
     """
     now, powers = scratch[: 2 * CHUNK], scratch[2 * CHUNK : 12 * CHUNK]
-    table = scratch[12 * CHUNK : (12 + 2 * ROW) * CHUNK]
-    column = scratch[(12 + 2 * ROW) * CHUNK : RING_SCRATCH]
+    table = scratch[12 * CHUNK : (12 + 2 * TILE_ROW) * CHUNK]
+    column = scratch[(12 + 2 * TILE_ROW) * CHUNK : RING_SCRATCH]
     start, columns, modes = bank.body[b].start, bank.body[b].columns, bank.law.shape[1]
     alive, sets, partners = False, len(bank.observed), bank.passes.shape[1] if bank.ringing[b].passes else 0
     end = start + -(-columns // LANES) * LANES
@@ -217,7 +217,7 @@ def _drive(b, stretch, bank, scratch, work):  # noqa: PLR0912 - a loop a set  # 
             if ringing.strike >= 0:
                 pushes = _press_strikes(b, stretch, column, keep, pushes, bank, work)
             if not pushes:
-                for k in range(drive.STEP):
+                for k in range(drive.SAMPLE_NUMBERS):
                     push[k] = 0.0
             weight = At(bank.weight if j < 0 else bank.pass_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
             if j < 0 and bank.aims[w] >= 0:

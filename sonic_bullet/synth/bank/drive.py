@@ -18,12 +18,12 @@ from llvmlite import binding, ir
 from numba import types
 from numba.extending import intrinsic
 
-from sonic_bullet.synth.bank.layout import FLUSH, PAIR, ROOM
+from sonic_bullet.synth.bank.layout import FLUSH, LANE_PAIR, ROOM
 from sonic_bullet.synth.vector import LANES, Emit, Value, constant
 
 BIT = ir.IntType(1)
 VECTORS = 4
-STEP = VECTORS * LANES  # numbers a sample and pair
+SAMPLE_NUMBERS = VECTORS * LANES  # numbers a sample and pair
 TILE = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # samples whose sums fit the registers
 
 
@@ -118,7 +118,7 @@ def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
             quadrature = _halves(e, law, builder.add(quadrature_at, p))
-            base, here = builder.mul(p, e.index(ROOM * STEP // PAIR)), builder.add(column, p)
+            base, here = builder.mul(p, e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR)), builder.add(column, p)
 
             def tile(k: Value, _: list[Value]) -> list[Value]:
                 def force(f: Value, total: list[Value]) -> list[Value]:
@@ -135,7 +135,7 @@ def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
 
                 total = e.loop(forces, 1, [constant(0)] * (2 * TILE), force)
                 for i in range(TILE):
-                    place = builder.add(base, builder.mul(e.shifted(k, i), e.index(STEP)))
+                    place = builder.add(base, builder.mul(e.shifted(k, i), e.index(SAMPLE_NUMBERS)))
                     for h in range(2):
                         real = total[2 * i + h]
                         e.store(real, push, e.shifted(place, h * LANES))
@@ -145,7 +145,7 @@ def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
             e.loop(count, TILE, [], tile)
             return []
 
-        e.loop(lanes, PAIR, [], pair)
+        e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
     return types.void(push, gains, forces, at, quadrature, lanes, count), codegen
@@ -160,16 +160,16 @@ def clear(typingctx, push, lanes, count):
         push, lanes, count = e.args
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
-            base = builder.mul(p, e.index(ROOM * STEP // PAIR))
+            base = builder.mul(p, e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR))
 
             def vector(k: Value, _: list[Value]) -> list[Value]:
                 e.store(constant(0), push, builder.add(base, k))
                 return []
 
-            e.loop(builder.mul(count, e.index(STEP)), LANES, [], vector)
+            e.loop(builder.mul(count, e.index(SAMPLE_NUMBERS)), LANES, [], vector)
             return []
 
-        e.loop(lanes, PAIR, [], pair)
+        e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
     return types.void(push, lanes, count), codegen
@@ -192,7 +192,7 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
             return builder.load(builder.gep(plan, [e.shifted(builder.mul(k, e.index(3)), what)]))
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
-            here, base = builder.add(at, p), builder.mul(p, e.index(ROOM * STEP // PAIR))
+            here, base = builder.add(at, p), builder.mul(p, e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR))
             row = [builder.add(here, builder.mul(width, e.index(i))) for i in range(8)]
             phasor = [_halves(e, rows, place) for place in row]
 
@@ -225,7 +225,7 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
 
                 total = e.loop(nodes, 1, [constant(0)] * 4, horner)
                 total = e.loop(empty, 1, total, lambda i, total: turned(total))
-                place = builder.add(base, builder.mul(k, e.index(STEP)))
+                place = builder.add(base, builder.mul(k, e.index(SAMPLE_NUMBERS)))
                 for h in range(2):
                     hit = e.product((total[2 * h], total[2 * h + 1]), (r[2 * h], r[2 * h + 1]))
                     for part in range(2):
@@ -239,7 +239,7 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
                 e.store(builder.select(keep, end[i], start[i]), rows, place)
             return []
 
-        e.loop(lanes, PAIR, [], pair)
+        e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
     return types.void(push, rows, width, lanes, plan, keep), codegen
@@ -263,10 +263,10 @@ def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
             p_re, p_im = _halves(e, pole, re), _halves(e, pole, im)
             w_re = _halves(e, weight, at)
             w_im = [builder.fneg(value) for value in _halves(e, weight, builder.add(at, modes))]
-            base = builder.mul(builder.mul(p, pushes), e.index(ROOM * STEP // PAIR))
+            base = builder.mul(builder.mul(p, pushes), e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR))
 
             def sample(k: Value, f: list[Value]) -> list[Value]:
-                place = builder.add(base, builder.mul(builder.mul(k, pushes), e.index(STEP)))
+                place = builder.add(base, builder.mul(builder.mul(k, pushes), e.index(SAMPLE_NUMBERS)))
                 spot = builder.mul(k, e.index(LANES))
                 real, imag = [], []
                 total = e.load(partial, spot)
@@ -284,7 +284,7 @@ def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
                 e.store(builder.select(keep, new[i], f[i]), state, place)
             return []
 
-        e.loop(lanes, PAIR, [], pair)
+        e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
     return types.void(motion, lanes, weight, pushes, count, partial, keep), codegen

@@ -14,7 +14,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.synth.bank.layout import BANK_BODY, FLUSH, PAIR, RINGING, STRIKE
+from sonic_bullet.synth.bank.layout import BANK_BODY, BANK_STRIKE, FLUSH, LANE_PAIR, RINGING
 from sonic_bullet.synth.bank.mode_set import ModeSet, Translation
 from sonic_bullet.synth.bank.passing import OFF, PASS, SILENCED
 from sonic_bullet.synth.bank.tile import BLOCK
@@ -55,7 +55,7 @@ class Bank:
     @property
     def columns(self) -> int:
         """Lanes of the body that has most, in whole groups: gains have as many."""
-        return int((self.body["stop"] - self.body["start"]).max(initial=PAIR))
+        return int((self.body["stop"] - self.body["start"]).max(initial=LANE_PAIR))
 
 
 @dataclass(slots=True, eq=False)
@@ -109,7 +109,7 @@ class BankState:
             return
         pool = len(self.strikes)
         more = max(pool, strikes - free, 4)
-        self.strikes = np.concatenate([self.strikes, np.zeros(more, STRIKE)])
+        self.strikes = np.concatenate([self.strikes, np.zeros(more, BANK_STRIKE)])
         rows = np.empty((pool + more, *self.rows.shape[1:]))
         rows[:pool] = self.rows
         self.rows = rows
@@ -158,8 +158,8 @@ def empty_bank(
     aimed = int(np.count_nonzero(aims >= 0))
     bank = Bank(int(sr), np.zeros(0, BANK_BODY), np.zeros((6, 0)), none, none.astype(bool), aims)
     z, driven, pole, block = np.zeros((4, 0))
-    silent, strikes = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, STRIKE)
-    rows, free = np.zeros((0, 8, PAIR)), np.zeros(1, np.int64)
+    silent, strikes = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, BANK_STRIKE)
+    rows, free = np.zeros((0, 8, LANE_PAIR)), np.zeros(1, np.int64)
     state = BankState(
         int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)), np.zeros((0, passes), PASS),
         np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)),
@@ -178,7 +178,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     for one in bodies:
         _check(one, sets, bank.sr)
     sizes = np.array([len(one.omega_rad_s) for one in bodies], np.int64)
-    stops = np.cumsum(-(-sizes // PAIR) * PAIR)
+    stops = np.cumsum(-(-sizes // LANE_PAIR) * LANE_PAIR)
     total = int(stops[-1]) if len(bodies) else 0
     body = np.zeros(len(bodies), BANK_BODY)
     base = bank.law.shape[1]
@@ -187,7 +187,7 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
     pole, block = np.zeros(total, complex), np.zeros(total, complex)
     observed = np.zeros((sets, len(bodies)), bool)
     for i, (one, stop, size) in enumerate(zip(bodies, stops, sizes, strict=True)):
-        start = int(stop) + (-int(size) // PAIR) * PAIR
+        start = int(stop) + (-int(size) // LANE_PAIR) * LANE_PAIR
         lanes = slice(start, start + int(size))
         body[i]["start"], body[i]["stop"], body[i]["columns"] = base + start, base + stop, size
         body[i]["bent"] = one.bend is not None or one.damping_growth is not None

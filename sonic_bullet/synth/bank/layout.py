@@ -2,10 +2,10 @@
 
     BANK_BODY   a body: its lanes in the flat arrays, and the pole that its three translations share
     RINGING     its activity: flags, the translations' state, the first of its strikes
-    STRIKE      a pulse under way: a pool of rows, those of a body linked in order of start, then of arrival
+    BANK_STRIKE a pulse under way: a pool of rows, those of a body linked in order of start, then of arrival
 
 Modes of all bodies lie in flat arrays, a body's `columns` (audible modes, then the lines of its residual) in whole
-groups of PAIR lanes; spare lanes are zero. m lanes of all bodies:
+groups of LANE_PAIR lanes; spare lanes are zero. m lanes of all bodies:
     law (6, m): decay and turn a sample (s = -d/sr + iω/sr), d/ω, bend, damping growth and its power
     z, driven, pole, block (2·m): real parts first. z: free state at the next block's start; driven: what was driven
     since this block's; pole = e^s, block = e^{256 s}, both bent by level where a body is
@@ -20,7 +20,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.synth.vector import LANES
 
-PAIR = 2 * LANES
+LANE_PAIR = 2 * LANES
 """Lanes that are driven side by side: two vectors hide the latency of each other's multiply-adds."""
 DRIVEN = 32
 """Samples, on the grid of absolute time, that are driven at a time; driven modes keep their bent poles as long."""
@@ -70,7 +70,7 @@ RINGING = np.dtype(
     align=True,
 )
 
-STRIKE = np.dtype(
+BANK_STRIKE = np.dtype(
     [
         ("start", "f8"),  # absolute time of the pulse, of its first node; in samples
         ("node_start", "f8"),

@@ -28,7 +28,7 @@ from sonic_bullet.synth.vector import At
 NODES_PER_PULSE = 24
 CELLS_PER_RADIAN = 4.0
 """Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is the error allowed in its level."""
-SHORTEST = 1e-12
+SHORTEST_PULSE = 1e-12
 """Shortest length of a pulse, in samples; shorter ones get it."""
 
 
@@ -82,7 +82,7 @@ def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
         return 1
     slot = free[free[0]]
     free[0] -= 1
-    length = max(pulse.length, SHORTEST)
+    length = max(pulse.length, SHORTEST_PULSE)
     count = max(NODES_PER_PULSE, int(np.ceil(2.0 * length)))
     delta = length / count
     node_start = pulse.start + 0.5 * delta

@@ -19,9 +19,9 @@ from numba.extending import intrinsic
 
 from sonic_bullet.synth.vector import BITS, I64, LANES, Emit, Pair, Value, constant
 
-ROW = 16
+TILE_ROW = 16
 ROWS = 16
-BLOCK = ROW * ROWS
+BLOCK = TILE_ROW * ROWS
 CHUNK = 32
 
 _TILE_ROWS = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # accumulators that fit the registers
@@ -66,7 +66,7 @@ def turn(typingctx, z, pole, block, lanes, floor, now, powers):  # type: ignore[
 
 @intrinsic
 def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
-    """Fill table (CHUNK, 2·ROW) with Re p^r, then Im p^r, r = 0 … 15, of each mode.
+    """Fill table (CHUNK, 2·TILE_ROW) with Re p^r, then Im p^r, r = 0 … 15, of each mode.
 
     p^r is the product of p, p², p⁴, p⁸ where r has that bit.
     """
@@ -90,7 +90,7 @@ def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
                 factor = builder.select(mask, power[bit][0], one), builder.select(mask, power[bit][1], zero)
                 low = factor if low is None else e.product(low, factor)
             high = e.product(low, power[3])  # type: ignore[arg-type]
-            base = builder.mul(k, e.index(2 * ROW))
+            base = builder.mul(k, e.index(2 * TILE_ROW))
             for i, value in enumerate((low[0], high[0], low[1], high[1])):  # type: ignore[index]
                 e.store(value, table, e.shifted(base, i * LANES))
             return []
@@ -138,14 +138,16 @@ def outer(typingctx, column, table, count, sound):  # type: ignore[no-untyped-de
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         column, table, count, sound = e.args
-        halves = ROW // LANES
+        halves = TILE_ROW // LANES
         for first in range(0, ROWS, _TILE_ROWS):
-            places = [e.index((first + q) * ROW + half * LANES) for q in range(_TILE_ROWS) for half in range(halves)]
+            places = [
+                e.index((first + q) * TILE_ROW + half * LANES) for q in range(_TILE_ROWS) for half in range(halves)
+            ]
 
             def body(k: Value, total: list[Value], first: int = first) -> list[Value]:
-                base = builder.mul(k, e.index(2 * ROW))
+                base = builder.mul(k, e.index(2 * TILE_ROW))
                 real = [e.load(table, e.shifted(base, half * LANES)) for half in range(halves)]
-                imag = [e.load(table, e.shifted(base, ROW + half * LANES)) for half in range(halves)]
+                imag = [e.load(table, e.shifted(base, TILE_ROW + half * LANES)) for half in range(halves)]
                 new = []
                 for q in range(_TILE_ROWS):
                     x, y = (
