@@ -28,11 +28,17 @@ def kinds_of(groups: type) -> dict[str, Any]:
 
 def gather(group: type, *holders: Any) -> Any:
     """Fill a group by name: each field from the first of ``holders`` that has it. Raises AttributeError for none."""
-    found = []
-    for name in group._fields:  # type: ignore[attr-defined]
-        holder = next((one for one in holders if hasattr(one, name)), holders[-1])
-        found.append(getattr(holder, name))
-    return group(*found)
+    key = group, *map(type, holders)
+    if key not in _HOLDERS:
+        fields = group._fields  # type: ignore[attr-defined]
+        _HOLDERS[key] = [
+            (next((i for i, one in enumerate(holders) if hasattr(one, name)), -1), name) for name in fields
+        ]
+    return group(*[getattr(holders[i], name) for i, name in _HOLDERS[key]])
+
+
+_HOLDERS: dict[tuple[type, ...], list[tuple[int, str]]] = {}
+"""Which of the holders, by their types, has each field of a group."""
 
 
 def group_types(groups: type, kinds: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -23,10 +23,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, free_modes, touched_rows
 from sonic_bullet.support.moving import Moving
 
-PAIR_SPLIT = 0.01
-"""Relative difference of two frequencies below which modes are a pair that turns: meshes and made things split those of
-a round body by less."""
-
 
 def first_order(
     body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], before: Array | None = None
@@ -56,7 +52,7 @@ def first_order(
     stiff = both.T @ (spring[:, None] * both)
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
-    chosen, turn = _choose(vector, alike_pairs(body.omega_rad_s), np.eye(m) if before is None else before)
+    chosen, turn = _choose(vector, body.pairs, np.eye(m) if before is None else before)
     vector[:m], both[:, :m] = turn.T @ vector[:m], both[:, :m] @ turn
     q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
     every = spring[:, None] * (both @ vector)
@@ -101,16 +97,6 @@ def first_order(
         decay[:, None] * power / whole,
         ~held,
     )
-
-
-def alike_pairs(omega_rad_s: Array) -> Array:
-    """Find pairs (p,) of neighbouring modes (m,) within PAIR_SPLIT, by the first of each; the nearest pair up first."""
-    apart = np.abs(np.diff(omega_rad_s)) / omega_rad_s[1:]
-    found: set[int] = set()
-    for k in np.argsort(apart, kind="stable").tolist():
-        if apart[k] < PAIR_SPLIT and not found & {k - 1, k + 1}:
-            found.add(k)
-    return np.array(sorted(found), np.int64)
 
 
 def likest(share: Array) -> Array:

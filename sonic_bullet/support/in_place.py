@@ -32,12 +32,12 @@ HELD = 2.0
 class Touch:
     """One point at which a body touches partner number ``partner``.
 
-    own, other: the point on either; spring: of this point alone.
+    own, other: the point on either, or its rows of Φ; spring: of this point alone.
     """
 
     partner: int
-    own: Place
-    other: Place
+    own: Place | Array
+    other: Place | Array
     spring: ContactSpring
 
 

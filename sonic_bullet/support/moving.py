@@ -14,6 +14,10 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
+PAIR_SPLIT = 0.01
+"""Relative difference of two frequencies below which modes are a pair that turns: meshes and made things split those of
+a round body by less."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moving:
@@ -26,6 +30,8 @@ class Moving:
     inertia_kg_m2 : (3, 3) body frame, about its centre
     plate_m_n_s, half_space_m_s_n : y₀ in m/(N·s) and y₂ in m·s/N, of what has neither modes nor mass
     turn : J^{−1/2}, by columns
+    pairs : (p,) modes that are alike with the next one, see `alike_pairs`
+    lam, decay : λ in 1/s² and d in 1/s (m + 6,), with those of the rigid motions
     """
 
     omega_rad_s: Array
@@ -35,35 +41,37 @@ class Moving:
     plate_m_n_s: float = 0.0
     half_space_m_s_n: float = 0.0
     turn: Array = field(init=False, repr=False)
+    pairs: Array = field(init=False, repr=False)
+    lam: Array = field(init=False, repr=False)
+    decay: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Compute J^{−1/2}."""
+        """Compute J^{−1/2}, λ and d."""
         value, vector = np.linalg.eigh(self.inertia_kg_m2)
         least = max(1e-12 * float(value.max()), 1e-300)
         turn = vector / np.sqrt(np.maximum(value, least)) if value.max() > 0 else 0 * vector
-        object.__setattr__(self, "turn", turn)  # J^{−1/2}, by columns
+        object.__setattr__(self, "turn", turn)
+        object.__setattr__(self, "pairs", alike_pairs(self.omega_rad_s))
+        object.__setattr__(self, "lam", np.append(self.omega_rad_s**2 + self.decay_per_s**2, np.zeros(6)))
+        object.__setattr__(self, "decay", np.append(self.decay_per_s, np.zeros(6)))
 
-    @property
-    def lam(self) -> Array:
-        """λ (m + 6,) in 1/s², with those of the rigid motions."""
-        return np.append(self.omega_rad_s**2 + self.decay_per_s**2, np.zeros(6))
+    def moves(self, places: Sequence[Place | Array]) -> Array:
+        """Compute Φ (3c, m + 6): motion along each place's axes of each mode and rigid motion; 0 where it has none.
 
-    @property
-    def decay(self) -> Array:
-        """Decays d (m + 6,)."""
-        return np.append(self.decay_per_s, np.zeros(6))
-
-    def moves(self, places: Sequence[Place]) -> Array:
-        """Compute Φ (3c, m + 6): motion along each place's axes of each mode and rigid motion; 0 where it has none."""
-        rigid = np.zeros((len(places), 3, 6))
+        places: or, where they are known, these rows (3, m + 6) themselves.
+        """
+        points = [one for one in places if isinstance(one, Place)]
+        if not points:
+            return np.concatenate([np.asarray(one) for one in places])
+        rigid = np.zeros((len(points), 3, 6))
         if self.mass_kg > 0:
-            x, y, z = np.array([place.arm_m for place in places]).T
-            turn = np.zeros((len(places), 3, 3))  # turn × arm
+            x, y, z = np.array([point.arm_m for point in points]).T
+            turn = np.zeros((len(points), 3, 3))  # turn × arm
             turn[:, 0, 1], turn[:, 1, 2], turn[:, 2, 0] = z, x, y
             rigid[:, :, :3] = np.eye(3) / np.sqrt(self.mass_kg)
             rigid[:, :, 3:] = (turn - turn.transpose(0, 2, 1)) @ self.turn
-        whole = np.concatenate([np.stack([place.shape for place in places]), rigid], axis=2)
-        return np.asarray((np.stack([place.axes for place in places]) @ whole).reshape(3 * len(places), -1))
+        whole = np.concatenate([np.stack([point.shape for point in points]), rigid], axis=2)
+        return np.asarray((np.stack([point.axes for point in points]) @ whole).reshape(3 * len(points), -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,3 +94,13 @@ def wide_plate_m_n_s(youngs_pa: float, poisson: float, density_kg_m3: float, thi
     """Compute y₀ of a plate whose edges are far, in m/(N·s)."""
     bending = youngs_pa * thickness_m**3 / (12 * (1 - poisson**2))
     return float(1 / (8 * np.sqrt(bending * density_kg_m3 * thickness_m)))
+
+
+def alike_pairs(omega_rad_s: Array) -> Array:
+    """Find pairs (p,) of neighbouring modes (m,) within PAIR_SPLIT, by the first of each; the nearest pair up first."""
+    apart = np.abs(np.diff(omega_rad_s)) / omega_rad_s[1:]
+    found: set[int] = set()
+    for k in np.argsort(apart, kind="stable").tolist():
+        if apart[k] < PAIR_SPLIT and not found & {k - 1, k + 1}:
+            found.add(k)
+    return np.array(sorted(found), np.int64)

@@ -18,6 +18,7 @@ an object's modes, would lose a third of a cycle's energy at 17 kHz.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ from sonic_bullet.records.errors import RecordError
 
 PERSSON = 0.5
 """u₀ over rms roughness: 0.4 to 0.5 of self-affine surfaces [Persson 2007; Akarapu, Sharp & Robbins 2011, PRL 106]."""
-SQUARE = 2 / np.sqrt(np.pi)
+SQUARE = 2 / math.sqrt(math.pi)
 """Half-axes of an ellipse over those of the rectangle that has its area."""
 
 
@@ -86,13 +87,13 @@ class Region:
         """Compute a >= b in m of the ellipse that touches under a load. modulus_pa: E*."""
         if not any(self.half_m):
             small, large = sorted(self.curvature_per_m)
-            mean = (3 * load_n / (4 * modulus_pa * np.sqrt(small * large))) ** (1 / 3)
+            mean = (3 * load_n / (4 * modulus_pa * math.sqrt(small * large))) ** (1 / 3)
             longer = (large / small) ** (1 / 3)
             return mean * longer, mean / longer
         a, b = self.half_m
         if not all(self.half_m):
             curved = self.curvature_per_m[0 if a == 0 else 1]
-            b = float(np.sqrt(2 * load_n / (np.pi * modulus_pa * max(a, b) * curved)))
+            b = math.sqrt(2 * load_n / (math.pi * modulus_pa * max(a, b) * curved))
             a = max(self.half_m)
         return SQUARE * max(a, b), SQUARE * min(a, b)
 
@@ -114,13 +115,15 @@ def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_
     from scipy.special import ellipkm1
 
     load = as_number(load_n, "load of a contact", "give a load above zero", above=0)
-    c = np.array([side.compliance_per_pa for side in sides])
-    a, b = region.half_axes_m(1 / c.sum(), load)
-    smooth = np.pi * a / (c.sum() * float(ellipkm1((b / a) ** 2)))
-    lift = PERSSON * float(np.hypot(sides[0].roughness_m, sides[1].roughness_m))
-    loss = float(c @ [side.loss_factor for side in sides] / c.sum())
+    one, other = sides
+    first, second = one.compliance_per_pa, other.compliance_per_pa
+    whole = first + second
+    a, b = region.half_axes_m(1 / whole, load)
+    smooth = math.pi * a / (whole * float(ellipkm1((b / a) ** 2)))
+    lift = PERSSON * math.hypot(one.roughness_m, other.roughness_m)
+    loss = (first * one.loss_factor + second * other.loss_factor) / whole
     normal = (1 + 1j * loss) / (1 / smooth + lift / load)
-    poisson = float(c @ [side.poisson for side in sides] / c.sum())
+    poisson = (first * one.poisson + second * other.poisson) / whole
     return ContactSpring(normal, normal * 2 * (1 - poisson) / (2 - poisson))
 
 

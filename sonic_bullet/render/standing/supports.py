@@ -13,23 +13,23 @@ its partners as they are free.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.geometry.nearest_point import nearest
 from sonic_bullet.records import Array
-from sonic_bullet.render.contact_place import CREASE_COS, FLAT_CURVATURE, SIZELESS_M
+from sonic_bullet.render.contact_place import FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.render.resonator import Resonator
+from sonic_bullet.render.standing.placed_points import placed_points
 from sonic_bullet.render.standing.turned_modes import turn_modes
 from sonic_bullet.render.strike_pulses import STRUCK_FLAT
 from sonic_bullet.render.synthesis_state import State
 from sonic_bullet.support import (
     ContactSpring,
     InPlace,
-    Place,
     Region,
     Touch,
     contact_spring,
@@ -65,7 +65,8 @@ def _blas() -> ThreadpoolController:
 
 def settle(state: State, number: int) -> None:
     """Update the poles of the bodies that the driver wants, before step ``number`` rings."""
-    with _blas().limit(limits=1, user_api="blas"):
+    many = any(one.user_api == "blas" and one.num_threads != 1 for one in _blas().lib_controllers)
+    with _blas().limit(limits=1, user_api="blas") if many else nullcontext():
         for b in np.flatnonzero(state.stand["wanted"]).tolist():
             state.stand["wanted"][b] = 0
             _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
@@ -159,62 +160,14 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
             partners.append(other)
         if not sum(state.resonators[one].side.compliance_per_pa for one in both):
             continue  # both rigid: their materials are unknown
-        axes = _axes(held, quaternion[both])
-        (own, bent, off), (there, also, away) = (_places(state, both[s], held, s, axes[s]) for s in (side, 1 - side))
+        turns = np.stack([state.resonators[one].moving.turn for one in both])
+        placed = placed_points(state.table, quaternion, held, pairs.pair["body"][slot], turns)
+        own, there = placed.moves[side], placed.moves[1 - side]
         load = held["load_n"][: held["count"]]
-        for i, spring in enumerate(_springs(state, both, held, bent + also, max(off, away), load)):
+        for i, spring in enumerate(_springs(state, both, held, placed.curvature_per_m, placed.off_m, load)):
             touches.append(Touch(partners.index(other), own[i], there[i], spring))
             loads.append(load[i])
     return partners, touches, np.array(loads)
-
-
-def _axes(held: Array, quaternion: Array) -> Array:
-    """Build normal and two tangents (2, 3, 3) as rows in either side's frame, the same directions for both.
-
-    quaternion (2, 4).
-    """
-    turn = [_rotation(one) for one in quaternion]
-    normal = turn[0] @ held["outward"][0]
-    x, y, z = normal.tolist()
-    across = np.array([0.0, z, -y] if abs(x) < 0.6 else [-z, 0.0, x])
-    across /= np.sqrt(across @ across)
-    u, v, w = across.tolist()
-    axes = np.array([normal, across, [y * w - z * v, z * u - x * w, x * v - y * u]])
-    return np.stack([axes @ one for one in turn])
-
-
-def _rotation(quaternion: Array) -> Array:
-    """Build the matrix (3, 3) from a body's frame into space."""
-    x, y, z, w = quaternion.tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def _places(state: State, b: int, held: Array, side: int, axes: Array) -> tuple[list[Place], Array, float]:
-    """Locate a pair's points on one body: places, the surface's curvature (c,), their middle's distance in m."""
-    one, row = state.resonators[b], state.table.bodies[b]
-    point = held["point_m"][: held["count"], side]
-    shape, curvature, off = np.zeros((len(point), 3, one.mode_count)), np.zeros(len(point)), 0.0
-    if one.index is not None and one.body.model is not None:
-        outward = held["outward"][side]
-        asked = np.vstack([point, point.sum(axis=0) / len(point)])
-        face, weight, distance = nearest(one.index, asked, np.tile(outward, (len(asked), 1)))
-        off = float(distance[-1])
-        corner = one.body.model.face[face[:-1]]
-        shape = np.einsum("pc,pcxm->pxm", weight[:-1], one.shape[corner].astype(float))
-        vertex = one.body.model.vertex_m[corner]
-        x, y = vertex[:, 1] - vertex[:, 0], vertex[:, 2] - vertex[:, 0]
-        normal = x[:, [1, 2, 0]] * y[:, [2, 0, 1]] - x[:, [2, 0, 1]] * y[:, [1, 2, 0]]
-        leans = normal @ outward < CREASE_COS * np.sqrt((normal**2).sum(axis=1))
-        curvature = np.where(leans, row["edge_per_m"], one.body.model.curvature_per_m[face[:-1]])
-    if np.isfinite(row["curvature_per_m"]):
-        curvature = np.full(len(point), row["curvature_per_m"])
-    return [Place(s, p, axes) for s, p in zip(shape, point, strict=True)], curvature, off
 
 
 def _springs(

@@ -40,12 +40,14 @@ def turn_modes(state: State, b: int, turn: Array | None) -> None:
     if turn is None and old is None:
         return
     before, after = (np.eye(m) if one is None else one for one in (old, turn))
-    whole = before.T @ after
-    pairs = np.flatnonzero(np.diag(whole, 1))
-    if not len(pairs) or (turn is not None and np.abs(whole - np.eye(m)).max() < SAME_TURN):
+    pairs = np.flatnonzero((np.diag(before, 1) != 0) | (np.diag(after, 1) != 0))
+    both = pairs[:, None] + np.arange(2)
+    block = both[:, :, None], both[:, None]
+    step = before[block].transpose(0, 2, 1) @ after[block]
+    mixes = step[:, 0, 1] != 0
+    if not mixes.any() or (turn is not None and np.abs(step - np.eye(2)).max() < SAME_TURN):
         return
-    step = np.stack([whole[k : k + 2, k : k + 2] for k in pairs.tolist()])
-    _turn_state(state, b, pairs, step)
+    _turn_state(state, b, pairs[mixes], step[mixes])
     state.table.turn(b, turn)
     state.changed()
 
