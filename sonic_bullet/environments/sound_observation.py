@@ -7,7 +7,7 @@ An episode begins in silence when `reset` returns; steps made by `reset` itself 
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from fractions import Fraction
 from math import ceil
 from typing import Any
@@ -23,7 +23,7 @@ from sonic_bullet.environments.repeated_episodes import RepeatedEpisodes
 from sonic_bullet.environments.sounding_cast import Cast, MaterialsLike, add_fillable, as_materials, cast_of, same_cast
 from sonic_bullet.files import check_sr
 from sonic_bullet.records import Air, Array, Material, channels_of
-from sonic_bullet.records.coerce import as_kind, as_number, as_whole
+from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
@@ -56,6 +56,10 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     step_s
         T; None: measured, on another environment of the same spec where one can be made, else by a reset and a step of
         this one.
+    average
+        Whether "audio" is the mean of all channels, one channel, as of contact microphones on one input.
+    joints
+        Of a body's name or id, springs of its joints, see `World.hold_joints`; ``recording`` may vary them.
     recording
         What a recording would add, drawn for each episode by ``seed`` and the seed of its reset, or its number without
         one: info["recording"] of `reset` has the numbers. None: nothing.
@@ -80,9 +84,18 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         seed: int = 0,
         air: Air | None = None,
         recording: ChainSpread | None = None,
+        average: bool = False,
+        joints: Mapping[Any, Mapping[Any, tuple[float, float]]] | None = None,
     ) -> None:
-        given = {"sr": sr, "microphones": microphones, "materials": materials, "client": client, "step_s": step_s}
-        RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given, seed=seed, air=air, recording=recording)
+        given: dict[str, Any] = {
+            "sr": sr,
+            "microphones": microphones,
+            "materials": materials,
+            "client": client,
+            "step_s": step_s,
+        }
+        given |= {"seed": seed, "air": air, "recording": recording, "average": average, "joints": joints}
+        RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given)
         gymnasium.Wrapper.__init__(self, env)
         self._options: dict[str, Any] = {
             "sr": check_sr(sr),
@@ -104,12 +117,14 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         remedy = "give a ChainSpread, or leave it out"
         self._spread = None if recording is None else as_kind(recording, ChainSpread, "recording", remedy)
         self._chain, self._recorded, self._begun = RecordingChain(), RecordingState(), 0
+        self._average = as_flag(average, "average")
+        self._joints = dict(as_kind(joints or {}, dict, "joints", "give a dict from bodies to springs of joints"))
         inner = env.observation_space
         self._is_dict = isinstance(inner, Dict)
         parts = dict(inner.spaces) if isinstance(inner, Dict) else {"observation": inner}
         if AUDIO in parts:
             raise SceneError(f"the observation has '{AUDIO}' already", "wrap the environment once")
-        self._shape = channels_of(self._options["microphone"]), ceil(sr * self._step_s)
+        self._shape = 1 if self._average else channels_of(self._options["microphone"]), ceil(sr * self._step_s)
         self.observation_space = Dict({**parts, AUDIO: Box(-np.inf, np.inf, self._shape, np.float32)})
 
     @property
@@ -139,6 +154,8 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             draw = np.random.default_rng([self._options["seed"], *number])
             self._chain, self._recorded = draw_chain(draw, self._spread), RecordingState()
             info["recording"] = self._chain.to_json()
+        for body, springs in self._joints.items():
+            self._world.hold_joints(body, springs, self._chain.joint_factor)
         self._begun += 1
         return self._with_audio(observation, np.zeros(self._shape, np.float32)), info
 
@@ -159,6 +176,8 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             observation, reward, terminated, truncated, info = self.env.step(action)
         self._check_steps()
         new = self._listener.read()
+        if self._average:
+            new = new.mean(axis=0, keepdims=True)
         if self._spread is not None:
             new, self._recorded = record(new, self._options["sr"], self._chain, None, self._recorded)
         audio = np.zeros(self._shape, np.float32)

@@ -2,9 +2,10 @@
 
     poses, masses, inertias, joints -> Jacobians J (l, 6, d) -> M = Σ Jᵀ diag(m, I) J -> K x = ω² M x -> Ψ = J X
 
-Joints are held by nothing at audio rate, unless a stiffness is given: a motor's controller is too slow, and friction
-and gravity are no impact. The impulse (j, r × j) on link l moves link s by Ψ_s Ψ_lᵀ, that is J_s M⁻¹ J_lᵀ [Khatib 1987,
-eq. 51: its inverse is the effective mass]. d motions, l links.
+Joints are held by nothing at audio rate, unless a spring k (1 + iη) is given: a motor's controller is too slow, and
+friction and gravity are no impact. Its loss damps each motion by d = ω/2 · Σ η k q²/Σ k q², q its joints' part. The
+impulse (j, r × j) on link l moves link s by Ψ_s Ψ_lᵀ, that is J_s M⁻¹ J_lᵀ [Khatib 1987, eq. 51: its inverse is the
+effective mass]. d motions, l links.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class JointedBody:
         True: about the axis; False: along it.
     free : bool
         Whether the base moves.
-    stiffness : Array, shape (d,)
-        Of the joints, N·m/rad or N/m; 0: none.
+    stiffness, loss_factor : Array, shape (d,)
+        k of the joints, N·m/rad or N/m, 0: none; η.
     """
 
     position_m: Array
@@ -49,6 +50,7 @@ class JointedBody:
     turns: Array
     free: bool
     stiffness: Array
+    loss_factor: Array
 
 
 def jacobians(body: JointedBody) -> Array:
@@ -70,8 +72,11 @@ def jacobians(body: JointedBody) -> Array:
     return np.concatenate([np.einsum("lax,lda->lxd", body.rotation, part) for part in parts], axis=1)
 
 
-def rigid_modes(body: JointedBody) -> tuple[Array, Array]:
-    """Compute Ψ (d, l, 6) in 1/√kg and 1/(√kg·m), link frames, and rates (d,) in rad/s, 0 of motions that are free."""
+def rigid_modes(body: JointedBody) -> tuple[Array, Array, Array]:
+    """Compute Ψ (d, l, 6) in 1/√kg and 1/(√kg·m), link frames, rates (d,) in rad/s and decays (d,) in 1/s.
+
+    Both are 0 of motions that are free. A motion's sign is that of its largest number.
+    """
     j = jacobians(body)
     weight = np.concatenate([np.repeat(body.mass_kg[:, None], 3, axis=1), body.inertia_kg_m2], axis=1)
     mass = np.einsum("lxd,lx,lxe->de", j, weight, j)
@@ -83,4 +88,11 @@ def rigid_modes(body: JointedBody) -> tuple[Array, Array]:
     square, turned = np.linalg.eigh(whitened.T @ (stiffness[:, None] * whitened))
     rate = np.sqrt(np.maximum(square, 0.0))
     rate[square <= LEAST_MASS * square.max(initial=0.0)] = 0.0
-    return np.einsum("lxd,de->elx", j, whitened @ turned), rate
+    lost = np.zeros(mass.shape[0])
+    lost[: len(body.stiffness)] = body.stiffness * body.loss_factor
+    joints = whitened @ turned
+    decay = np.where(rate > 0, (lost @ joints**2) / (2 * np.where(rate > 0, rate, 1.0)), 0.0)
+    shape = np.einsum("lxd,de->elx", j, joints)
+    flat = shape.reshape(len(shape), -1)
+    largest = np.take_along_axis(flat, np.abs(flat).argmax(axis=1)[:, None], axis=1)[:, :, None]
+    return np.where(largest < 0, -shape, shape), rate, decay

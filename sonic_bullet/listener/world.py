@@ -13,11 +13,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from sonic_bullet.records import Body, Material, ModalModel, Shape
+from sonic_bullet.records.coerce import as_items, as_number
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.simulated import Simulator
+
+JointSprings = Mapping[int, tuple[float, float]]
+"""By joint: stiffness in N·m/rad, of a sliding one in N/m, and loss factor."""
 
 
 class World(ABC):
@@ -29,6 +33,8 @@ class World(ABC):
     """How often the world has lost all its bodies at once (PyBullet's resetSimulation), as far as that is observed."""
     felt: Collection[int] = ()
     """Ids of the bodies that sensors are on. Of jointed ones, steps tell how their links move (`Step.motions`)."""
+    joint_springs: Mapping[int, JointSprings] = {}
+    """By body: what holds its joints at audio rate, for sensors on its links (`hold_joints`)."""
     logged = True
     """False where no log is kept: data that only a log needs may be dropped, records of removed bodies above all."""
 
@@ -160,6 +166,37 @@ class World(ABC):
             That is not possible.
         """
         raise SceneError("this simulator's bodies bring their names", "leave name out")
+
+    def hold_joints(self, body: int | str, springs: Mapping[int | str, tuple[float, float]], factor: float = 1) -> None:
+        """Let springs hold joints of a body at audio rate, in place of earlier ones: gears and belts, not controllers.
+
+        Parameters
+        ----------
+        body
+        springs
+            By the name or number of the link that a joint moves, "all" for each: stiffness in N·m/rad (of a sliding
+            joint N/m) and loss factor.
+        factor
+            Of each stiffness, such as one that is drawn.
+
+        Raises
+        ------
+        SceneError
+            There is no such body or link.
+        RecordError
+            A number is not what it may be.
+        """
+        held: dict[int, tuple[float, float]] = {}
+        more = as_number(factor, "factor of a joint's stiffness", "give a number above 0", above=0)
+        for link, pair in springs.items():
+            found, links = self.links_called(body, link)
+            name, remedy = f"spring of joint {link}", "give stiffness in N·m/rad and loss factor, such as (2e4, 0.05)"
+            two = as_items(pair, name, remedy)
+            stiffness, loss = (
+                as_number(x, name, remedy, least=0, most=1e15) for x in (two if len(two) == 2 else (None, None))
+            )
+            held.update({one: (more * stiffness, loss) for one in links if one >= 0})
+            self.joint_springs = {**self.joint_springs, found: held}
 
     def link_name(self, body: int, link: int) -> str:
         """Return a link's own name, without its body's."""

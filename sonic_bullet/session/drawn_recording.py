@@ -47,6 +47,8 @@ class ChainSpread:
         Magnitude that nothing exceeds, uniform in its logarithm; None: none.
     robot_db
         Gain of the robot's own noise, uniform.
+    joint_factor
+        Of the stiffness of joints that springs hold (`World.hold_joints`), uniform in its logarithm.
     """
 
     gain_db: Range = (0.0, 0.0)
@@ -56,11 +58,12 @@ class ChainSpread:
     jitter_s: Range = (0.0, 0.0)
     clip: Range | None = None
     robot_db: Range = (0.0, 0.0)
+    joint_factor: Range = (1.0, 1.0)
 
     def __post_init__(self) -> None:
         """Check the fields."""
         remedy = "give two numbers, the lower one first"
-        for name in ("gain_db", "noise_rthz", "latency_s", "jitter_s", "clip", "robot_db"):
+        for name in ("gain_db", "noise_rthz", "latency_s", "jitter_s", "clip", "robot_db", "joint_factor"):
             if name == "clip" and self.clip is None:
                 continue
             least, most = (-200.0, 200.0) if name.endswith("_db") else (0.0, 10.0 if name.endswith("_s") else 1e12)
@@ -70,7 +73,8 @@ class ChainSpread:
                 for x in (pair if len(pair) == 2 else (None, None))
             )
             require(low <= high, f"chain spread: {name} descends", remedy)
-            require(name != "clip" or low > 0, "chain spread: clip is 0", "give a magnitude above 0")
+            above = name not in ("clip", "joint_factor") or low > 0
+            require(above, f"chain spread: {name} is 0", "give two numbers above 0")
             store(self, **{name: (low, high)})
         remedy = "give decibels, 0 or more"
         store(self, response_db=as_number(self.response_db, "chain spread: response_db", remedy, least=0, most=40))
@@ -88,6 +92,7 @@ class RecordingChain:
     clip: float | None = None
     robot_db: float = 0.0
     seed: int = 0
+    joint_factor: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -103,11 +108,12 @@ class RecordingChain:
 def draw_chain(draw: np.random.Generator, spread: ChainSpread) -> RecordingChain:
     """Draw a chain; the same numbers of the generator are used whatever the spread."""
     u, levels, seed = draw.random(6), draw.normal(size=len(NOISE_OCTAVES_HZ)), int(draw.integers(2**63))
+    factor = _in_logarithm(float(draw.random()), spread.joint_factor)  # last: earlier draws are of the same numbers
     ranges = spread.gain_db, spread.latency_s, spread.jitter_s, spread.robot_db
     gain, latency, jitter, robot = (low + x * (high - low) for x, (low, high) in zip(u, ranges, strict=False))
     return RecordingChain(
         gain, spread.response_db * levels, _in_logarithm(u[4], spread.noise_rthz), latency, jitter,
-        None if spread.clip is None else _in_logarithm(u[5], spread.clip), robot, seed,
+        None if spread.clip is None else _in_logarithm(u[5], spread.clip), robot, seed, factor,
     )  # fmt: skip
 
 

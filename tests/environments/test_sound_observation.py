@@ -16,7 +16,7 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.listener import disconnect
+from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.errors import AudioError, MaterialError, RecordError, SceneError, SceneWarning
 from sonic_bullet.session.drawn_recording import ChainSpread, draw_chain, record
 from sonic_bullet.synth.clock import Clock, exact_step
@@ -26,7 +26,8 @@ gymnasium = pytest.importorskip("gymnasium")
 from sonic_bullet.environments import SoundObservation, sound_observation  # noqa: E402
 from sonic_bullet.environments.sounding_cast import cast_of  # noqa: E402
 from tests.made.environments import DT_S, PLATE, Empty, FallingBox, NumberedBox, plates  # noqa: E402
-from tests.made.models import STEEL  # noqa: E402
+from tests.made.jointed import arm_cast, tap_arm  # noqa: E402
+from tests.made.models import STEEL, ball_body  # noqa: E402
 
 MICROPHONES = ((0.0, -1.0, 0.5), (0.5, 0.0, 0.5))
 
@@ -425,3 +426,62 @@ def test_an_episode_is_recorded_as_its_chain_says(opened: Any) -> None:
     assert env.reset(seed=5)[1]["recording"] != info["recording"]
     with pytest.raises(RecordError, match="recording"):
         SoundObservation(FallingBox(), recording=5)
+
+
+class TappedArm(gymnasium.Env[Any, Any]):  # type: ignore[misc]
+    """A ball taps an arm of two links."""
+
+    observation_space = gymnasium.spaces.Discrete(1)
+    action_space = gymnasium.spaces.Discrete(1)
+
+    def __init__(self) -> None:
+        self.physics: Any = direct_client()
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[int, dict[str, Any]]:
+        self.physics.resetSimulation()
+        self.arm, self.ball = tap_arm(self.physics)
+        return 0, {}
+
+    def step(self, action: Any) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        for _ in range(12):
+            self.physics.stepSimulation()
+        return 0, 0.0, False, False, {}
+
+    def close(self) -> None:
+        disconnect(self.physics)
+
+
+def arm_materials(_: Any) -> dict[Any, Any]:
+    return {
+        **{(0, link): how for link, how in arm_cast().items()},
+        1: {"material": STEEL, "model": ball_body(0.01).model},
+    }
+
+
+def test_two_contact_microphones_are_averaged_and_joints_vary(opened: Any) -> None:
+    """The mean of both channels; springs of joints are heard, and their drawn factor is in info."""
+    touching = [sb.ContactMicrophone(0, (x, 0.01, 0), (0, 1, 0), 1) for x in (0.02, 0.08)]
+    how: dict[str, Any] = {"microphones": touching, "materials": arm_materials}
+    springs = {0: {"all": (2e4, 0.05)}}
+
+    def heard(**more: Any) -> tuple[Any, Any]:
+        env = opened(SoundObservation(TappedArm(), **how, **more))
+        _, info = env.reset(seed=3)
+        return env.step(0)[0]["audio"], info.get("recording")
+
+    both, _ = heard()
+    mean, _ = heard(average=True)
+    assert mean.shape == (1, both.shape[1]) and np.abs(both).max() > 0
+    assert np.allclose(mean[0], both.mean(axis=0), atol=1e-6 * np.abs(both).max())
+    held, _ = heard(joints=springs)
+    varied, chain = heard(joints=springs, recording=ChainSpread(joint_factor=(2.0, 4.0)))
+    assert 2 <= chain["joint_factor"] <= 4
+    same, _ = heard(joints={0: {"all": (2e4 * chain["joint_factor"], 0.05)}})
+    assert not np.array_equal(held, both) and not np.array_equal(varied, held)
+    assert np.allclose(varied, same, atol=1e-5 * np.abs(same).max())
+
+
+@pytest.mark.parametrize("joints", [5, {0: {"all": 3.0}}, {0: {"all": (-1.0, 0.1)}}, {0: {"elbow": (1.0, 0.1)}}])
+def test_springs_of_joints_are_checked(opened: Any, joints: Any) -> None:
+    with pytest.raises((RecordError, SceneError), match=r"joint|elbow"):
+        opened(SoundObservation(TappedArm(), materials=arm_materials, joints=joints)).reset()

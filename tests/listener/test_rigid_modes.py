@@ -43,7 +43,7 @@ def test_a_free_robot_moves_as_pybullet_moves_it(client: Any) -> None:
     body, _ = loaded(client, "r2d2.urdf", fixed=False)
     for link in range(-1, client.getNumJoints(body)):
         client.changeDynamics(body, link, linearDamping=0, angularDamping=0, jointDamping=0)
-    shape, rate = rigid_modes(jointed_body(client._client, body))
+    shape, rate, _ = rigid_modes(jointed_body(client._client, body))
     pushed, force = 8, np.array([3.0, -2.0, 5.0])
     turn = np.reshape(client.getMatrixFromQuaternion(client.getLinkState(body, pushed)[1]), (3, 3))
     client.applyExternalForce(body, pushed, force.tolist(), client.getLinkState(body, pushed)[0], p.WORLD_FRAME)
@@ -56,16 +56,17 @@ def test_a_free_robot_moves_as_pybullet_moves_it(client: Any) -> None:
 
 
 def test_a_joint_with_stiffness_swings_at_its_rate() -> None:
-    """A rod on a hinge: ω = √(k/(I + m a²)), and the tip's mobility stays that of the free hinge."""
+    """A rod on a hinge: ω = √(k/(I + m a²)), d = ηω/2, and the tip's mobility stays that of the free hinge."""
     mass, length, stiffness = 0.8, 0.4, 500.0
     moment = mass * length**2 / 12
     rod = JointedBody(
         np.array([[0.0, 0, 0], [length / 2, 0, 0]]), np.stack([np.eye(3)] * 2), np.array([0, mass]),
         np.array([[0.0, 0, 0], [1e-6, moment, moment]]), np.array([[False, True]]), np.array([[0.0, 0, 1]]),
-        np.zeros((1, 3)), np.array([True]), False, np.array([stiffness]),
+        np.zeros((1, 3)), np.array([True]), False, np.array([stiffness]), np.array([0.04]),
     )  # fmt: skip
-    shape, rate = rigid_modes(rod)
+    shape, rate, decay = rigid_modes(rod)
     about_hinge = moment + mass * length**2 / 4
     assert rate == pytest.approx([np.sqrt(stiffness / about_hinge)])
+    assert decay == pytest.approx(0.02 * rate)
     tip = shape[0, 1] @ np.array([0, 1, 0, 0, 0, length / 2])
     assert tip**2 == pytest.approx(length**2 / about_hinge)

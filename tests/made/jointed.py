@@ -38,8 +38,8 @@ def make_arm(client: Any) -> int:
     return int(arm)
 
 
-def tapped_arm(client: Any, sensors: Any, steps: int = 24) -> sb.Listener:
-    """Listen to the arm, whose tip a steel ball taps at 1 m/s along y."""
+def tap_arm(client: Any) -> tuple[int, int]:
+    """Make the arm, and a steel ball that is about to tap its tip at 1 m/s along y; return both."""
     client.setGravity(0, 0, 0)
     arm = make_arm(client)
     ball = client.createMultiBody(
@@ -52,9 +52,23 @@ def tapped_arm(client: Any, sensors: Any, steps: int = 24) -> sb.Listener:
             jointDamping=0,
         )  # fmt: skip
     client.resetBaseVelocity(ball, [0, 1.0, 0])
+    return arm, ball
+
+
+def arm_cast() -> dict[int, dict[str, Any]]:
+    """Keywords of `add` by link."""
+    models = [box_model((length, SIDE_M, SIDE_M), FAR_HZ) for length in LENGTH_M]
+    return {link: {"material": STEEL, "model": model} for link, model in enumerate(models)}
+
+
+def tapped_arm(client: Any, sensors: Any, steps: int = 24, springs: Any = None) -> sb.Listener:
+    """Listen to the tapped arm; springs: of its joints, see `hold_joints`."""
+    arm, ball = tap_arm(client)
     listener = sb.attach(client, microphone=sensors)
-    for link, length in enumerate(LENGTH_M):
-        listener.add(arm, link, material=STEEL, model=box_model((length, SIDE_M, SIDE_M), FAR_HZ))
+    if springs:
+        listener.world.hold_joints(arm, springs)
+    for link, how in arm_cast().items():
+        listener.add(arm, link, **how)
     listener.add(ball, material=STEEL, model=ball_body(0.01).model)
     for _ in range(steps):
         client.stepSimulation()
@@ -66,10 +80,22 @@ def transfer_per_kg(struck_m: tuple[float, float], felt_m: tuple[float, float]) 
 
     Places: (distance from the first hinge, from the second; NaN where the link before it is meant).
     """
+    rows: Array = np.nan_to_num(np.array([felt_m, struck_m]))
+    return float(rows[0] @ np.linalg.solve(mass_matrix(), rows[1]))
+
+
+def held_transfer(f: Array, struck_m: tuple[float, float], felt_m: tuple[float, float], springs: Array) -> Array:
+    """Compute the same at frequencies in Hz of joints held by springs k (1 + iη): jω J (K − ω²M)⁻¹ Jᵀ."""
+    omega = 2 * np.pi * f
+    dynamic = np.diag(springs) - (omega**2)[:, None, None] * mass_matrix()
+    right = np.broadcast_to(np.array(struck_m, complex)[:, None], (len(f), 2, 1))
+    return np.asarray(1j * omega * (np.linalg.solve(dynamic, right)[:, :, 0] @ np.array(felt_m)))
+
+
+def mass_matrix() -> Array:
+    """Compute M (2, 2) of the straight double pendulum."""
     (l1, _), (m1, m2) = LENGTH_M, MASS_KG
     a1, a2 = LENGTH_M[0] / 2, LENGTH_M[1] / 2
     i1, i2 = (m * (one**2 + SIDE_M**2) / 12 for m, one in zip(MASS_KG, LENGTH_M, strict=True))
     both = i2 + m2 * (a2**2 + l1 * a2)
-    mass = np.array([[i1 + m1 * a1**2 + i2 + m2 * (l1**2 + a2**2 + 2 * l1 * a2), both], [both, i2 + m2 * a2**2]])
-    rows: Array = np.nan_to_num(np.array([felt_m, struck_m]))
-    return float(rows[0] @ np.linalg.solve(mass, rows[1]))
+    return np.array([[i1 + m1 * a1**2 + i2 + m2 * (l1**2 + a2**2 + 2 * l1 * a2), both], [both, i2 + m2 * a2**2]])

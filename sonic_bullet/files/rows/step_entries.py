@@ -125,10 +125,12 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
     for wrong in dt[~((dt > 0) & (dt <= 1))][:1]:
         as_number(float(wrong), "dt_s of a physics step", remedy, above=0, most=1, error=LogError)
     step["dt_s"] = dt
+    # logs made before joints could be held have no decays: 0, as of free motions
+    known = {name: one for name, one in MOTION_FIELDS.items() if name != "decay_per_s" or f"motion_{name}" in arrays}
     poses, contacts, motions = (
         {name: take(arrays, f"{kind}_{name}", dtype, (rows, *tail), path) for name, (dtype, tail) in fields.items()}
         for kind, rows, fields in (
-            ("pose", p, POSE_FIELDS), ("contact", k, ROW_FIELDS), ("motion", m, MOTION_FIELDS if m else {})
+            ("pose", p, POSE_FIELDS), ("contact", k, ROW_FIELDS), ("motion", m, known if m else {})
         )
     )  # fmt: skip
     step.flags.writeable = False

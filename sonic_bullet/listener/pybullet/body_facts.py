@@ -309,7 +309,7 @@ class AskedLinks(KnownWorld):
 
         known = {i: self.records[i] for i in step.body.tolist()}
         touched = np.concatenate([step.contacts.a, step.contacts.b])
-        motions = touched_motions(self.client_id, self.felt, known, touched)
+        motions = touched_motions(self.client_id, self.felt, known, touched, self.joint_springs)
         return step if motions is None else step.with_motions(motions)
 
     def versions(self) -> dict[str, str]:

@@ -13,14 +13,17 @@ from sonic_bullet.records.arrays import LARGEST_SI, Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import LogError
 
-LINK_MOTION = np.dtype([("body", "i4"), ("mode", "i4"), ("rate_rad_s", "f8"), ("shape", "f8", (6,))], align=True)
-"""body: index in the log. mode: number of the motion, which links of one body share. rate_rad_s: of a motion that joint
-stiffness holds, 0 of a free one. shape: translation of the centre of mass in 1/√kg, rotation in 1/(√kg·m), body
-frame."""
+LINK_MOTION = np.dtype(
+    [("body", "i4"), ("mode", "i4"), ("rate_rad_s", "f8"), ("decay_per_s", "f8"), ("shape", "f8", (6,))], align=True
+)
+"""body: index in the log. mode: number of the motion, which links of one body share. rate_rad_s, decay_per_s: of a
+motion that joint stiffness holds, 0 of a free one. shape: translation of the centre of mass in 1/√kg, rotation in
+1/(√kg·m), body frame."""
 MOTION_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "body": (np.int32, ()),
     "mode": (np.int32, ()),
     "rate_rad_s": (float, ()),
+    "decay_per_s": (float, ()),
     "shape": (float, (6,)),
 }
 """The same fields one by one, as files hold them."""
@@ -45,7 +48,7 @@ def as_motions(rows: object, body: Array) -> Array:
 
 def check_motions(rows: Array, where: object) -> None:
     """Raise LogError where a number of LINK_MOTION rows is not finite or below what it may be."""
-    numbers = np.column_stack([rows["rate_rad_s"], rows["shape"]])
+    numbers = np.column_stack([rows["rate_rad_s"], rows["decay_per_s"], rows["shape"]])
     finite = numbers.max(initial=0) <= LARGEST_SI and numbers.min(initial=0) >= -LARGEST_SI  # False for NaN too
-    if not finite or (rows["rate_rad_s"] < 0).any() or (rows["mode"] < 0).any():
+    if not finite or min(rows[name].min(initial=0) for name in ("rate_rad_s", "decay_per_s", "mode")) < 0:
         raise LogError(f"{where}: motions that are not finite, or of a negative rate", "use an unbroken contact log")

@@ -2,6 +2,7 @@
 
     pulses, friction of a body -> Σ (j, r × j), body frame, as six further modes of the bank, silent by themselves (V)
     Body: 1/m and I⁻¹, or Step.motions of a jointed one: Ψ_s Ψ_lᵀ       -> gain (6,) of each body at each sensor
+    motions that joint springs hold: Ψ_lᵀ V through s²/(s² + 2ds + ω²)  -> the same, one by one
     n·v of the modes, by body  + gain · V                                -> what the sensor reads
 
 The six are plane functions of the place, which linear triangles hold exactly: e_i and e_i × r. A free body that a pulse
@@ -17,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Body, Sensor, Vibrometer
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.synth.bank import ModeSet
@@ -94,6 +96,39 @@ def enter_mobility(rows: Array, number: Array, motions: Array) -> None:
         row = rows[np.searchsorted(number, body)]
         shape = motions["shape"][motions["body"] == body]
         row["jointed"], row["mobility"] = 1, shape.T @ shape
+
+
+def swing_taps(rate_rad_s: float, decay_per_s: float, sr: int) -> Array:
+    """Return b0, b1, b2, a1, a2 of s²/(s² + 2ds + ω²) at a rate in Hz: a motion that springs hold, of a free one.
+
+    By the bilinear transform, at ω itself without its warp [Oppenheim, Schafer 2010, sec. 7.3].
+    """
+    turn = min(rate_rad_s / sr, 3.0)
+    wide = np.sin(turn) * decay_per_s / rate_rad_s
+    high = (1 + np.cos(turn)) / 2
+    return np.asarray(np.array([high, -2 * high, high, -2 * np.cos(turn), 1 - wide]) / (1 + wide))
+
+
+@njit(nogil=True, error_model="numpy")
+def swing_on(taps, shape, moved, past, swing):  # type: ignore[no-untyped-def]
+    """Filter Σ shape (6,) moved (6, n) by taps (5,) into swing (n,); past (2,): of the samples before, changed."""
+    for n in range(len(swing)):
+        x = 0.0
+        for i in range(len(shape)):
+            x += shape[i] * moved[i, n]
+        y = taps[0] * x + past[0]
+        past[0] = taps[1] * x - taps[3] * y + past[1]
+        past[1] = taps[2] * x - taps[4] * y
+        swing[n] = y
+
+
+def sensor_reading(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence[Array | None], motion: int) -> float:
+    """Return what a sensor reads of a motion's speed of 1; jointed: LINK_MOTION (d,) of the body's links, else None."""
+    reads = np.concatenate([sensor.direction, np.cross(sensor.point_m, sensor.direction)])
+    for body, rows in zip(bodies, jointed, strict=True):
+        if rows is not None and (body.body_id, body.link) == (sensor.body_id, sensor.link):
+            return float(rows["shape"][motion] @ reads)
+    return 0.0
 
 
 def sensor_gains(sensor: Vibrometer, bodies: Sequence[Body], jointed: Sequence[Array | None]) -> Array:

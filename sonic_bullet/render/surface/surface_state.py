@@ -16,7 +16,14 @@ import numpy as np
 
 from sonic_bullet.records import Array, Body, ContactMicrophone, Sensor, Vibrometer, channels_of
 from sonic_bullet.records.contacts import Step
-from sonic_bullet.render.surface.rigid_motion import RIGID_MOTIONS, sensor_gains, surface_sensors
+from sonic_bullet.render.surface.rigid_motion import (
+    RIGID_MOTIONS,
+    sensor_gains,
+    sensor_reading,
+    surface_sensors,
+    swing_on,
+    swing_taps,
+)
 from sonic_bullet.render.surface.sensor_chain import filter_rows, sensor_noise, sensor_taps
 
 
@@ -29,8 +36,9 @@ def start_surface(sensors: tuple[Sensor, ...], sr: int, seed: int, *, apart: boo
 class SurfaceState:
     """State of sensors on surfaces.
 
-    waiting: motions of steps taken in and not rendered, each (r,) of LINK_MOTION. jointed: Ψ (d, 6) by a body's index
-    in the log. past: of each filtered channel (groups, taps - 1), what came last; a group a body where they are
+    waiting: motions of steps taken in and not rendered, each (r,) of LINK_MOTION. jointed: rows (d,) of LINK_MOTION by
+    a body's index in the log; swings (d, 2): what the filters of those that joints hold have of the samples before.
+    past: of each filtered channel (groups, taps - 1), what came last; a group a body where they are
     `apart`.
     """
 
@@ -40,15 +48,16 @@ class SurfaceState:
     apart: bool = False
     waiting: tuple[Array, ...] = ()
     jointed: dict[int, Array] = field(default_factory=dict)
+    swings: dict[int, Array] = field(default_factory=dict)
     past: dict[int, Array] = field(default_factory=dict)
 
     def copy(self) -> SurfaceState:
         """Return an independent copy."""
-        return replace(self, jointed=dict(self.jointed), past=dict(self.past))
+        return replace(self, jointed=dict(self.jointed), swings=dict(self.swings), past=dict(self.past))
 
     def quench(self) -> None:
         """Forget what the chains hold."""
-        self.past = {}
+        self.past, self.swings = {}, {}
 
     def subset(self, keep: Array) -> None:
         """Keep the bodies (k,) of these numbers alone, where each is rendered apart."""
@@ -78,16 +87,41 @@ class SurfaceState:
             for s, gain in gains:
                 for i in range(RIGID_MOTIONS):
                     made[:, s, at:stop] += gain[:, i, None] * moved[:, i, at:stop]
+            self._add_swings(made[:, :, at:stop], moved[:, :, at:stop], number, bodies)
             at = stop
         return made.reshape(len(bodies) * width, total)
 
     def _learn(self, motions: Array) -> None:
         for body in np.unique(motions["body"]).tolist():
-            self.jointed[body] = motions["shape"][motions["body"] == body]
+            self.jointed[body] = motions[motions["body"] == body]
+
+    def _add_swings(self, made: Array, moved: Array, number: Array, bodies: Sequence[Body]) -> None:
+        """Add to made (b, sensors, n) the motions of links that joints hold, from V, moved (b, 6, n)."""
+        for b, index in enumerate(number.tolist()):
+            rows = self.jointed.get(index)
+            held = np.zeros(0, np.int64) if rows is None else np.flatnonzero(rows["rate_rad_s"])
+            if rows is None or not len(held):
+                continue
+            past = self.swings.get(index, np.zeros((len(rows), 2)))
+            past = self.swings[index] = past.copy() if len(past) == len(rows) else np.zeros((len(rows), 2))
+            mine = [(bodies[b].body_id, bodies[b].epoch) == (one.body_id, one.epoch) for one in bodies]
+            there = [self.jointed.get(one) if own else None for own, one in zip(mine, number.tolist(), strict=True)]
+            for d in held.tolist():
+                gains = [
+                    (s, sensor_reading(one, bodies, there, d))
+                    for s, one in enumerate(self.sensors)
+                    if isinstance(one, Vibrometer)
+                ]
+                swing = np.zeros(moved.shape[2])
+                taps = swing_taps(float(rows["rate_rad_s"][d]), float(rows["decay_per_s"][d]), self.sr)
+                swing_on(taps, rows["shape"][d], moved[b], past[d], swing)
+                for s, gain in gains:
+                    made[b, s] += gain * swing
 
     def _gains(self, number: Array, bodies: Sequence[Body]) -> list[tuple[int, Array]]:
         """Return the gains (b, 6) of each sensor on a surface."""
-        jointed = [self.jointed.get(one) for one in number.tolist()]
+        rows = [self.jointed.get(one) for one in number.tolist()]
+        jointed = [None if one is None else one["shape"][one["rate_rad_s"] == 0] for one in rows]
         return [
             (s, sensor_gains(one, bodies, jointed)) for s, one in enumerate(self.sensors) if isinstance(one, Vibrometer)
         ]

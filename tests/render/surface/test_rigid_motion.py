@@ -20,7 +20,7 @@ from sonic_bullet.render.surface.rigid_motion import LOWEST_HZ
 from sonic_bullet.render.surface.sensor_chain import TAPS, differentiator
 from sonic_bullet.soundtrack.stems import render_stems
 from sonic_bullet.synth.pulse import pulse_spectrum
-from tests.made.jointed import FAR_HZ, LENGTH_M, TAPPED_M, tapped_arm, transfer_per_kg
+from tests.made.jointed import FAR_HZ, LENGTH_M, TAPPED_M, held_transfer, tapped_arm, transfer_per_kg
 from tests.made.models import STEEL, box_body, row, wall_body
 from tests.render.test_render_sensors import DATED_M, SR, Pulse, one_strike, only_pulse, rendered
 
@@ -174,6 +174,29 @@ def test_a_link_moves_by_the_effective_mass_of_its_arm(arm: sb.Listener) -> None
     assert passed == pytest.approx(impulse * abs(middle), rel=0.02)
     free = 1 / 0.5 + (TAPPED_M * l2 / 2) / (0.5 * (l2**2 + 0.02**2) / 12)
     assert abs(free / tip - 1) > 0.15  # the link by itself would be another
+
+
+def test_joints_with_springs_swing_as_the_closed_form(client: Any, tmp_path: Path) -> None:
+    """Two links, a spring with a loss in either hinge: jω J (K − ω²M)⁻¹ Jᵀ of the tip within 2 %, from 30 to 400 Hz."""
+    springs = {0: (2e4, 0.06), 1: (8e3, 0.06)}
+    tip = Vibrometer(0, (LENGTH_M[1] / 2, 0.01, 0), (0, 1, 0), 1)
+    listener = tapped_arm(client, tip, steps=160, springs=springs)
+    log, heard = listener.contacts, listener.sound()[0]
+    impulse, (l1, l2) = float(log.rows.impulse_n_s[:, 1].sum()), LENGTH_M
+    n = 1 << 16
+    f = np.fft.rfftfreq(n, 1 / SR)
+    band = (f > 30) & (f < 400)
+    complex_k = np.array([k * (1 + 1j * loss) for k, loss in springs.values()])
+    law = held_transfer(f[band], (l1 + l2 / 2 + TAPPED_M, l2 / 2 + TAPPED_M), (l1 + l2, l2), complex_k)
+    high_pass = 1 / np.sqrt(1 + (LOWEST_HZ / f[band]) ** 4)
+    found = np.abs(np.fft.rfft(heard, n))[band] / SR / impulse
+    off = np.abs(found - np.abs(law) * high_pass).max() / np.abs(law).max()
+    print(f"{off:.4f} of the largest")
+    assert off < 0.02
+    assert np.array_equal(render_log(log)[0], heard)
+    log.save(tmp_path / "held.npz")
+    assert np.array_equal(render_log(read_log(tmp_path / "held.npz"))[0], heard)
+    assert np.array_equal(np.concatenate([*render_blocks(log)], axis=1)[0], heard)
 
 
 def test_live_blocks_replay_and_file_are_the_same_bits(arm: sb.Listener, tmp_path: Path) -> None:
