@@ -213,6 +213,23 @@ def test_what_fails_is_listed_and_the_rest_goes_on(place: Path, capfd: pytest.Ca
     assert "ValueError: too high" in capfd.readouterr().out
 
 
+@pytest.mark.slow
+def test_a_sample_that_takes_all_memory_ends_alone(place: Path) -> None:
+    text = RECIPE.replace(
+        "def build(client, object, height_m):",
+        "def build(client, object, height_m):\n    if height_m > 0.035:\n        list(range(10**12))",
+    )
+    Path("greedy.py").write_text(text)
+    words = [sys.executable, "-m", "sonic_bullet", "dataset", "greedy.py", "-o", "out", "--count", "4", "--sr", "8000"]
+    # 2 GB more than what the command itself takes
+    done = subprocess.run(["bash", "-c", 'ulimit -v 6000000; exec "$@"', "bash", *words], check=False)
+    assert done.returncode == 1
+    failed = [json.loads(line) for line in Path("out", "failures.jsonl").read_text().splitlines()]
+    made = [one["number"] for one in manifest("out")]
+    assert made and failed and sorted(made + [one["number"] for one in failed]) == list(range(4))
+    assert all("MemoryError" in one["reason"] for one in failed)
+
+
 def hang_or_end(number: int) -> int:
     """A job that ends, hangs, or ends its process."""
     if number == 1:
