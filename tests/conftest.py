@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -73,4 +74,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         ("a Chromium", "no Chromium on PATH"),
         ("a disk of one's own", "no mount namespace"),
     ):
-        terminalreporter.write_line(f"{sum(said in one for one in skipped)} tests skipped for want of {what}")
+        of = [one for one in skipped if said in one]
+        names = sorted({name for one in of for name in re.findall(said + r" '?(\w+)", one)})
+        of_what = f": {', '.join(names)}" if names else ""
+        terminalreporter.write_line(f"{len(of)} tests skipped for want of {what}{of_what}")
