@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.support.in_place import HELD, STOPPED, InPlace, Touch, free_modes, touched_rows
+from sonic_bullet.support.in_place import STIFFEST_RATIO, STOPPED_RATIO, InPlace, Touch, free_modes, touched_rows
 from sonic_bullet.support.moving import Moving
 
 
@@ -73,9 +73,13 @@ def first_order(
     shift = shift.real + 1j * np.minimum(shift.imag, 0)  # no mode gains
     own = (q[:m] ** 2).T @ x.decay[:m]
     new = -own + 1j * np.sqrt(omega**2 - shift - own**2)
-    held = (omega > HELD * np.sqrt(x.lam[:m].max())) | (-new.real > STOPPED * np.abs(new)) | ~(new.imag > 0)
+    held = (
+        (omega > STIFFEST_RATIO * np.sqrt(x.lam[:m].max()))
+        | (-new.real > STOPPED_RATIO * np.abs(new))
+        | ~(new.imag > 0)
+    )
     root = np.sqrt(x.lam[:m])
-    new = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), new)
+    new = np.where(held, root * (-STOPPED_RATIO + 1j * np.sqrt(1 - STOPPED_RATIO**2)), new)
     force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
     lifts = np.zeros((3 * len(touches), m))
     lifts[row] = np.abs(times_real(force, q[:m].T))

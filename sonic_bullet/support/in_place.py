@@ -22,9 +22,9 @@ from sonic_bullet.records import Array
 from sonic_bullet.support.moving import Moving, Place
 from sonic_bullet.support.springs import ContactSpring
 
-STOPPED = 0.99
+STOPPED_RATIO = 0.99
 """d over |s| of a motion that no longer oscillates: a touch stops it."""
-HELD = 2.0
+STIFFEST_RATIO = 2.0
 """A new mode above so many times the highest own one is the touches' own stiffness: its motion is stopped."""
 
 

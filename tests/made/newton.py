@@ -23,7 +23,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.support import InPlace, Moving, Touch, first_order
 from sonic_bullet.support.first_order import likest
-from sonic_bullet.support.in_place import HELD, STOPPED, Touched, touched_rows
+from sonic_bullet.support.in_place import STIFFEST_RATIO, STOPPED_RATIO, Touched, touched_rows
 
 STEPS = 12
 """Newton steps at most; three are usual, their order is cubic."""
@@ -64,8 +64,8 @@ def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Arra
     lost = np.where(np.abs(along) > LOST, along, np.inf)
     v = q / lost[:, None]  # velocities where the lane's is 1
     root = np.sqrt(x.lam[:m])
-    held = (s.imag > HELD * root.max()) | ~(-s.real < STOPPED * np.abs(s)) | (s.imag <= 0)
-    s = np.where(held, root * (-STOPPED + 1j * np.sqrt(1 - STOPPED**2)), s)
+    held = (s.imag > STIFFEST_RATIO * root.max()) | ~(-s.real < STOPPED_RATIO * np.abs(s)) | (s.imag <= 0)
+    s = np.where(held, root * (-STOPPED_RATIO + 1j * np.sqrt(1 - STOPPED_RATIO**2)), s)
     v[held] = 0
     decay = np.maximum(-s.real, 0.0)
     force = np.linalg.solve(inverse_w(x, s)[0], (v @ x.own.T)[..., None])[..., 0]

@@ -31,7 +31,7 @@ from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-TURNS = 2
+EXCHANGE_TURNS = 2
 
 Less = Callable[[Evidence], Evidence]
 
@@ -41,7 +41,9 @@ def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]
     return tuple(c for c in found if c is not best and c.mean_db > RULES.most_share * best.mean_db)
 
 
-def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = TURNS, less: Less = lambda e: e) -> Hypothesis:
+def together(
+    h: Hypothesis, problem: DiagnosisProblem, *, turns: int = EXCHANGE_TURNS, less: Less = lambda e: e
+) -> Hypothesis:
     """Fit each effect again with the others.
 
     Parameters
