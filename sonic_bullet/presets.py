@@ -41,6 +41,7 @@ from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import MaterialError, RecordError
+from sonic_bullet.records.touching.surface_form import waves_of
 from sonic_bullet.residual.code import ResidualForm, residual_of
 
 FORMAT = "sonic-bullet-preset/1"
@@ -66,10 +67,15 @@ class Elasticity(PresetPart, frozen=True):
 
 
 class Surface(PresetPart, frozen=True):
-    """Roughness: roughness_m, the rms height of the profile; hurst, the exponent of its spectrum."""
+    """Roughness: roughness_m, the rms height of the profile; hurst, the exponent of its spectrum.
+
+    waviness_m, waviness_length_m: rms height and length of the waves that its making leaves [ISO 4287]; 0: none.
+    """
 
     roughness_m: NotNegative
     hurst: Annotated[float, msgspec.Meta(gt=0, lt=1)]
+    waviness_m: NotNegative | None = None
+    waviness_length_m: Positive | None = None
 
 
 class Restitution(PresetPart, frozen=True):
@@ -242,6 +248,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "beta_s": beta,
         "roughness_m": preset.surface.roughness_m,
         "hurst": preset.surface.hurst,
+        "form": waves_of(preset.surface.waviness_m or 0.0, preset.surface.waviness_length_m or 2e-3),
         "restitution": preset.impact.restitution,
         "effects": _effects(preset, label),
         "includes_radiation": total_damping(preset),

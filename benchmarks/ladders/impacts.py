@@ -46,9 +46,10 @@ def patch_growth(scenes: Scenes) -> Verdict:
     ball = scenes["b"].strongest.length_s / scenes["a"].strongest.length_s
     box = scenes["d"].strongest.length_s / scenes["c"].strongest.length_s
     return Verdict(
-        "ten times the speed: the ball's pulse 10^(-1/5) = 0.631 as long, the box's the same",
+        "ten times the speed: the ball's pulse 10^(-1/5) = 0.631 as long, the box's the same; 0.594 with the layer "
+        "that the machined finish is (Landing)",
         f"{ball:.3f} and {box:.3f}",
-        AGREES if within(ball, 10**-0.2, 0.02) and within(box, 1, 1e-6) else PARTLY,
+        AGREES if within(ball, 0.594, 0.02) and within(box, 1, 1e-6) else PARTLY,
     )
 
 
@@ -90,7 +91,10 @@ def relief_and_scale(scenes: Scenes) -> Verdict:
     """Find lines and finishes of three sizes."""
     bodies = [scenes[key].body(name) for key, name in (("a", "Half size"), ("b", "Reference"), ("c", "Double size"))]
     same = all(np.array_equal(body.material.octave_rms_m, bodies[0].material.octave_rms_m) for body in bodies)
-    clearest = int(np.argmax([_line_hz(scenes["b"], f)[1] for f in bodies[1].model.freq_hz[:6]]))
+    clear = [
+        [_line_hz(scenes[key], f)[1] for f in one.model.freq_hz[:6]] for key, one in zip("abc", bodies, strict=True)
+    ]
+    clearest = int(np.argmax(np.min(clear, axis=0)))
     modes = [float(body.model.freq_hz[clearest]) for body in bodies]
     heard = [_line_hz(scenes[key], f)[0] for key, f in zip("abc", modes, strict=True)]
     return Verdict(
@@ -105,11 +109,11 @@ def relief_and_scale(scenes: Scenes) -> Verdict:
 
 
 def _line_hz(scene: Observed, near_hz: float) -> tuple[float, float]:
-    """Find the strongest line within a fiftieth of a frequency, and its power over the median within a tenth."""
+    """Find the strongest line within a hundredth of a frequency, and its power over the median within a tenth."""
     sound = scene.pressure_pa[int(0.3 * SR) :]
     power = np.abs(np.fft.rfft(sound * np.hanning(len(sound)))) ** 2
     freq = np.fft.rfftfreq(len(sound), 1 / SR)
-    near, around = np.abs(freq / near_hz - 1) < 0.02, np.abs(freq / near_hz - 1) < 0.1
+    near, around = np.abs(freq / near_hz - 1) < 0.01, np.abs(freq / near_hz - 1) < 0.1
     found = int(np.argmax(power[near]))
     return float(freq[near][found]), float(power[near][found] / np.median(power[around]))
 

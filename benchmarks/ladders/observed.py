@@ -128,6 +128,10 @@ class Observed:
         bodies = tuple(replace(body, silent=body.name != name) for body in self.log.bodies)
         return np.asarray(render_log(replace(self.log, bodies=bodies))[0])
 
+    def with_seed_pa(self, seed: int) -> Array:
+        """Sound of the same log with surfaces of another seed."""
+        return np.asarray(render_log(replace(self.log, seed=seed))[0])
+
     def contact_rate_hz(self) -> float:
         """How often the force rises through the load a second [Rice 1944: of a narrow band its frequency]."""
         force = self.force_n

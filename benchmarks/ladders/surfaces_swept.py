@@ -15,9 +15,10 @@ Scenes = Mapping[str, Observed]
 SHOCKS = (
     "The draft lets a face ride on N = N₀ exp(δ/u₀), of stiffness N/u₀ with u₀ ∝ rms height [Persson 2007]. Then "
     "force over load depends on speed and roughness by v√u₀ alone, and the level's exponent of speed is twice that of "
-    "roughness. Measured are 0.63 to 1.16 of roughness and 0.5 to 0.96 of speed [Ben Abdelounis et al. 2010, whom the "
-    "draft lists]: by shocks between asperities, of a deformation that is negligible against the roughness. So do "
-    "ours: it is flights and shocks that are counted, and they go by load, mass and the bulk's stiffness. The draft's "
+    "roughness. Measured are 0.63 to 1.16 of roughness and 0.5 to 0.96 of speed (`studies/rolling_laws.py`). Rough "
+    "flat faces under light load sound by shocks between asperities, of a deformation that is negligible against the "
+    "roughness [Ben Abdelounis et al. 2010, whom the draft lists]. So do ours: flights and shocks are counted, which "
+    "go by load, mass and the bulk's stiffness. The draft's "
     "later text no longer takes the exponential for the force: a mean has no shocks in it"
 )
 
@@ -118,9 +119,11 @@ def face_vs_point(scenes: Scenes) -> Verdict:
         "the box's patch is fixed by its face, the ball's grows with load",
         f"in what slides the box's grows with load^{growth[0]:.2f}, the ball's with load^{growth[1]:.2f}: radii of "
         f"curvature {face.radius_m:.3f}, {point.radius_m:.3f} m; {face.level_db():.1f}, {point.level_db():.1f} dB",
-        AGREES if ball and abs(growth[0]) < 0.05 else PARTLY if ball else DIFFERS,
-        "The draft: a flat punch keeps its radius [Johnson 1985, eq. 3.36]. So do our impacts (PatchGrowth); slides "
-        "do not",
+        AGREES if ball and abs(growth[0]) < 0.05 else ERRS if ball and within(growth[0], 1 / 3, 0.1) else DIFFERS,
+        "A flat punch keeps its radius [Johnson 1985, eq. 3.36], but these faces are not flat: they have the draft's "
+        "waviness, 2 µm over 2 mm. Below a mean pressure of πE*Δ/λ, here 250 MPa, wavy faces touch on their crests "
+        "alone, by Hertz' law [Johnson 1985, sec. 13.2]; this box presses with 1 kPa. The draft's own later text lets "
+        "the region that bears grow with load, too",
     )
 
 
@@ -159,8 +162,7 @@ def bounce_onset(scenes: Scenes) -> Verdict:
         ", ".join(f"{x:.1f} dB" for x in levels) + " with " + ", ".join(f"{100 * x:.0f} %" for x in flight)
         + " of the time in flight, at 0.02, 0.1, 0.7 m/s",
         AGREES if flight[0] < 0.1 < flight[2] else PARTLY,
-        "The draft: hills of curvature κ carry a ball up to v = √(g/κ), some 0.05 m/s. Our ball follows waves whose "
-        "valleys its roundness cannot reach",
+        "",
     )  # fmt: skip
 
 
@@ -171,19 +173,20 @@ def landing(scenes: Scenes) -> Verdict:
         "the finish sets each landing's contact time",
         f"{1e6 * machined:.1f} and {1e6 * cast:.1f} µs",
         AGREES if cast > 1.05 * machined else DIFFERS,
-        "The draft: where a finish is as high as the penetration, a ball is softer than Hertz [Greenwood & Tripp 1967; "
-        "Johnson 1985, sec. 13.5]. Here 100 µm are more than its 10 µm, and our pulses are of smooth bodies",
+        "",
     )
 
 
 def measured_profile(scenes: Scenes) -> Verdict:
-    """Find levels of a stored track and of its statistics."""
-    stored, made = scenes["a"].level_db(), scenes["b"].level_db()
+    """Render a stored track and its statistics with another seed."""
+    stored, made = scenes["a"], scenes["b"]
+    levels = stored.level_db(), made.level_db()
+    same = [np.array_equal(scene.pressure_pa, scene.with_seed_pa(1)) for scene in (stored, made)]
     return Verdict(
         "a stored track is the same sample for sample; its statistics sound alike",
-        f"{stored:.1f} and {made:.1f} dB; a stored track is played by its spectrum",
-        PARTLY if within(stored, made, 0.01) else DIFFERS,
-        "The draft: we do not play heights one by one",
+        f"with another seed the stored track is {'the same' if same[0] else 'another'}, its statistics "
+        f"{'the same' if same[1] else 'another'}; {levels[0]:.1f} and {levels[1]:.1f} dB",
+        AGREES if same == [True, False] and abs(levels[0] - levels[1]) < 3 else PARTLY,
     )
 
 

@@ -55,6 +55,8 @@ class BakedMaterialForm(_Part, frozen=True):
     roughness_m: float | None = None
     hurst: float | None = None
     octave_rms_m: tuple[float, ...] | None = None
+    waviness_m: float | None = None
+    waviness_length_m: float | None = None
     stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
 
 
@@ -133,6 +135,8 @@ ABOUT: dict[str, dict[str, str]] = {
         "roughness_m": "rms height of the surface, m",
         "hurst": "Hurst exponent of its profile",
         "octave_rms_m": "rms heights by wavelength, 100 mm and its halves, in place of both, m",
+        "waviness_m": "rms height of the waves of manufacture above the finish, m",
+        "waviness_length_m": "their wavelength, m",
         "stiffness_pa": "Voigt stiffness xx yy zz yz xz xy, Pa, of a material with a grain",
     },
     "MassForm": {

@@ -38,6 +38,8 @@ class BakedMaterial:
         [Johnson 1985, eq. 4.24].
     restitution, roughness_m, hurst, octave_rms_m
         As of `Material`.
+    waviness_m, waviness_length_m
+        As of its `SurfaceForm`; None: not known.
     stiffness_pa : six rows of six
         As of `Material`, of one with a grain; None where it is the same in every direction.
     """
@@ -53,6 +55,8 @@ class BakedMaterial:
     roughness_m: float | None = None
     hurst: float | None = None
     octave_rms_m: tuple[float, ...] | None = None
+    waviness_m: float | None = None
+    waviness_length_m: float | None = None
     stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
 
     def __post_init__(self) -> None:
@@ -68,6 +72,8 @@ class BakedMaterial:
             "restitution": {"least": 0, "most": 1},
             "roughness_m": {"least": 0},
             "hurst": {"above": 0, "below": 1},
+            "waviness_m": {"least": 0},
+            "waviness_length_m": {"above": 0},
         }
         for name, bound in bounds.items():
             value = getattr(self, name)

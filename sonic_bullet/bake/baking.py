@@ -227,6 +227,8 @@ def bake_material(material: Material) -> BakedMaterial:
         roughness_m=material.roughness_m,
         hurst=material.hurst,
         octave_rms_m=None if material.octave_rms_m is None else tuple(material.octave_rms_m.tolist()),
+        waviness_m=None if material.form is None else material.form.waviness_m,
+        waviness_length_m=None if material.form is None else material.form.waviness_length_m,
         stiffness_pa=_grain(material),
     )
 

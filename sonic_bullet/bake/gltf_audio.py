@@ -123,6 +123,8 @@ def _surface_entry(material: BakedMaterial) -> dict[str, Any]:
         hurst=material.hurst,
         restitution=material.restitution,
         octave_rms_m=material.octave_rms_m,
+        waviness_m=material.waviness_m,
+        waviness_length_m=material.waviness_length_m,
         stiffness_pa=material.stiffness_pa,
     )
     return finish_entry(own) | {"extras": {EXTRAS: own}}

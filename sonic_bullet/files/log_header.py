@@ -13,6 +13,7 @@ import numpy as np
 
 from sonic_bullet.files.container import REMEDY, take
 from sonic_bullet.files.models import LoggedModel, as_json_text
+from sonic_bullet.files.rows.surface_forms import LoggedForm, pack_form, track_arrays
 from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import (
     Ambisonics,
@@ -62,6 +63,7 @@ class _Material(msgspec.Struct, omit_defaults=True):
     residual: _Residual | None = None
     includes_radiation: bool = False
     octave_rms_m: tuple[float, ...] | None = None
+    form: LoggedForm | None = None
 
 
 class _Body(msgspec.Struct):
@@ -152,6 +154,7 @@ def material_key(material: Material) -> bytes:
         if material.residual is not None
         else b""
     )
+    more += b"".join(track.tobytes() for track in track_arrays(0, material).values())
     return json_bytes(pack_material(material)) + material.stiffness_pa.tobytes() + more
 
 
@@ -171,6 +174,7 @@ def pack_material(x: Material) -> _Material:
         else _Residual(float(x.residual.clip_energy), as_json_text(x.residual.source)),
         includes_radiation=bool(x.includes_radiation),
         octave_rms_m=None if x.octave_rms_m is None else tuple(float(rms) for rms in x.octave_rms_m),
+        form=pack_form(x.form),
     )
 
 

@@ -17,6 +17,7 @@ their own:
       body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
       material_stiffness_pa (n, 6, 6) f8    materials and models are stored once each, however many bodies share them
       residual<i>_<field> f8                 of material i, where it has one: the arrays of `Residual`
+      track<i> (n,) f8                       of material i, where it has one: heights of its `SurfaceForm`
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4,
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes depend on their level
@@ -74,6 +75,7 @@ from sonic_bullet.files.log_header import (
 from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalled_models, unpack_models
 from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
+from sonic_bullet.files.rows.surface_forms import track_arrays, unpack_form
 from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import LogError
@@ -125,6 +127,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
+        arrays |= track_arrays(i, material)
     write_container(path, header, arrays, PACKED)
 
 
@@ -156,7 +159,11 @@ def _unpack_log(
     materials = [
         Material(
             stiffness_pa=stiffness[i],
-            **{**msgspec.structs.asdict(x), "residual": unpack_residual(x.residual, arrays, i, path)},
+            **{
+                **msgspec.structs.asdict(x),
+                "residual": unpack_residual(x.residual, arrays, i, path),
+                "form": unpack_form(x.form, arrays, i, path),
+            },
         )
         for i, x in enumerate(header.materials)
     ]

@@ -29,6 +29,7 @@ from sonic_bullet.records.coerce import (
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
 from sonic_bullet.records.roughness import OCTAVES
+from sonic_bullet.records.touching.surface_form import SurfaceForm
 
 __all__ = [
     "Array",
@@ -74,16 +75,14 @@ class Material:
         Voigt tensor, positive definite.
     alpha_per_s, beta_s
         Rayleigh damping d = (alpha + beta·lambda)/2 [Ren, Yeh, Lin 2013, eq. 6], None where unknown.
-    roughness_m
-        rms height of the surface profile.
-    hurst
-        Hurst exponent of the profile (spectrum ∝ k^-(1+2·hurst)).
+    roughness_m, hurst
+        rms height of the surface profile, and its Hurst exponent (spectrum ∝ k^-(1+2·hurst)).
     octave_rms_m : Array, shape (octaves,)
         rms heights by wavelength in place of both (`records.roughness`).
     restitution
-        Of an impact against a rigid wall, for pulses only.
-    residual
-        Non-modal part of the sound; None: none.
+        Of an impact at 1 m/s against a rigid wall.
+    residual, form
+        Non-modal part of the sound; waviness and measured track of the surface. None: none.
     effects
         Further effects (sonic_bullet.effects), in the order in which they act.
     includes_radiation
@@ -104,6 +103,7 @@ class Material:
     effects: tuple[Any, ...] = ()
     includes_radiation: bool = False
     octave_rms_m: Array | None = None
+    form: SurfaceForm | None = None
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -153,8 +153,9 @@ class Material:
             require(bool((heights >= 0).all()), f"{where}: octave_rms_m is below 0", "give rms heights in m")
             store(self, octave_rms_m=heights)
         as_text(self.source, f"{where}: source", "give a text")
-        if self.residual is not None:
-            as_kind(self.residual, Residual, f"{where}: residual", "give a Residual, or none")
+        for name, kind in (("residual", Residual), ("form", SurfaceForm)):
+            if getattr(self, name) is not None:
+                as_kind(getattr(self, name), kind, f"{where}: {name}", f"give a {kind.__name__}, or none")
 
     @classmethod
     def isotropic(cls, name: str, *, youngs_pa: float, poisson: float, density_kg_m3: float, **rest: Any) -> Material:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 OCTAVES = 14
 LONGEST_M = 0.1
 WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
+TRACK_HEIGHTS_MOST = 1 << 22
 _EDGE_PER_M = np.sqrt(2.0) ** np.array([-1.0, 1.0]) / WAVE_M[:, None]
 
 
@@ -49,6 +50,24 @@ def track_octaves(height_m: Array, spacing_m: float) -> Array:
     power = np.abs(np.fft.rfft(height_m - np.mean(height_m)) / n) ** 2
     power[1 : (n + 1) // 2] *= 2
     return octave_sums(np.fft.rfftfreq(n, spacing_m), power)
+
+
+def track_slopes(height_m: Array, spacing_m: float) -> tuple[Array, float]:
+    """Split a track's slope dh/dx into the octaves: (OCTAVES, n), and the distance of two of them in m.
+
+    The track is taken for one turn of a closed one. What is finer than the octaves, or coarser, is left out; so n is
+    four a wave of the finest, at most the track's own number.
+    """
+    count, length_m = len(height_m), len(height_m) * spacing_m
+    wanted = min(count, int(np.ceil(4 * length_m * _EDGE_PER_M[-1, 1])))
+    spectrum, frequency = np.fft.rfft(height_m) / count, np.fft.rfftfreq(count, spacing_m)
+    spectrum = spectrum * 2j * np.pi * frequency
+    keep = wanted // 2 + 1
+    slopes = np.zeros((OCTAVES, wanted))
+    for j, (low, high) in enumerate(_EDGE_PER_M):
+        own = np.where((frequency >= low) & (frequency < high), spectrum, 0)[:keep]
+        slopes[j] = np.fft.irfft(own, wanted) * wanted
+    return slopes, length_m / wanted
 
 
 def octave_sums(frequency_per_m: Array, variance_m2: Array) -> Array:

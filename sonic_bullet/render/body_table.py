@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.records.roughness import track_slopes
+from sonic_bullet.records.touching.surface_form import SurfaceForm
 from sonic_bullet.render.resonator import Resonator
 from sonic_bullet.render.surface.rigid_motion import rigid_shape
 from sonic_bullet.render.tables import BODY, FACE, NODE, TURN
@@ -91,6 +93,7 @@ class BodyTable:
         self._shapes, self._frequencies = _Growing(np.float32), _Growing(float)
         self._places: dict[tuple[ModalModel, bytes, int], _Place] = {}
         self._turn_rows, self._turns = _Growing(TURN), dict[int, Array]()
+        self._tracks, self._track_places = _Growing(float), dict[SurfaceForm, tuple[int, int, float]]()
 
     @property
     def bodies(self) -> Array:
@@ -128,6 +131,11 @@ class BodyTable:
         return spectrum_table()
 
     @property
+    def tracks(self) -> Array:
+        """Slopes of measured tracks by octave, flat."""
+        return self._tracks.filled
+
+    @property
     def columns(self) -> int:
         """Most columns that a body has, 1 at least."""
         return int(self.bodies["columns"].max(initial=1))
@@ -145,6 +153,7 @@ class BodyTable:
         row["hurst"] = 0.7 if material is None else material.hurst
         given = None if material is None else material.octave_rms_m
         row["octave_rms_m"] = -1.0 if given is None else given
+        self._enter_form(row, None if material is None else material.form)
         row["size_m"], row["volume_m3"] = resonator.size_m, body.volume_m3
         row["curvature_per_m"] = body.curvature_per_m
         row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
@@ -160,12 +169,27 @@ class BodyTable:
         row["turn_at"] = -1
         return self._bodies.append(row)
 
+    def _enter_form(self, row: Any, form: SurfaceForm | None) -> None:
+        """Enter a surface's waves and track into its BODY row."""
+        if form is None:
+            return
+        row["waviness_m"], row["waviness_length_m"] = form.waviness_m, form.waviness_length_m
+        row["crest_per_m"] = form.crest_per_m
+        if form.track_m is not None:
+            place = self._track_places.get(form)
+            if place is None:
+                slopes, spacing_m = track_slopes(form.track_m, form.track_spacing_m)
+                place = self._tracks.append(slopes.ravel()), slopes.shape[1], spacing_m
+                self._track_places[form] = place
+            row["track_at"], row["track_count"], row["track_spacing_m"] = place
+
     def copy(self) -> BodyTable:
         """Return a copy with its own bodies and their turns; what belongs to models is shared."""
         other = BodyTable()
         other._take(self.bodies, self)
         other._faces, other._nodes, other._shapes = self._faces, self._nodes, self._shapes
         other._frequencies, other._places, other._turns = self._frequencies, dict(self._places), dict(self._turns)
+        other._tracks, other._track_places = self._tracks, dict(self._track_places)
         return other
 
     def _take(self, bodies: Array, other: BodyTable) -> None:
@@ -199,6 +223,7 @@ class BodyTable:
         """
         other = BodyTable()
         other._take(self.bodies[keep], self)
+        other._tracks, other._track_places = self._tracks, self._track_places
         other._turns = {new: self._turns[old] for new, old in enumerate(keep.tolist()) if old in self._turns}
         keys = {(one.body.model, follows.tobytes(), one.rigid_columns) for one, follows in kept}
         places = {key: place for key, place in self._places.items() if key in keys}

@@ -20,7 +20,13 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Body
 from sonic_bullet.render.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch, turn_push
 from sonic_bullet.render.strike_pulses import STEEPEST
-from sonic_bullet.synth.profile import given_octaves, height_octaves
+from sonic_bullet.synth.octave_heights import (
+    add_waves,
+    close_round,
+    given_octaves,
+    height_octaves,
+    slope_squared,
+)
 from sonic_bullet.synth.strikes import SPAN
 from sonic_bullet.synth.surface_kernel import (
     DAMPING_RATIO,
@@ -76,7 +82,7 @@ def advance_friction(number, x, sr, window, table, pairs, voices, scratch):
         if voice.moves:
             voices[moving] = voice
             moving += 1
-    sound_voices(pairs.pair, voices, moving, x, sr, force)
+    sound_voices(pairs.pair, voices, moving, x, sr, table.tracks, force)
     for v in range(moving):
         voice = voices[v]
         slot, begin, end = voice.slot, voice.begin, voice.end
@@ -198,10 +204,6 @@ def _begin(pair, table, rows, begin, end, quaternion):
     for side in range(2):
         body = bodies[high if side else low]
         pair.swept_m[side], pair.seed[side] = 0.0, body.surface_seed
-        if body.octave_rms_m[0] < 0.0:
-            height_octaves(body.roughness_m, body.hurst, pair.height_m[side])
-        else:
-            given_octaves(body.octave_rms_m, pair.height_m[side])
         mobility += 1.0 / body.mass_kg if body.mass_kg > 0.0 else 0.0
     pair.mass_kg, curvature, square, strongest = 1.0 / mobility, 0.0, 0.0, begin
     for r in range(begin, end):
@@ -230,4 +232,37 @@ def _begin(pair, table, rows, begin, end, quaternion):
         bent = rows[strongest].curvature_per_m
         curvature = bent[0] + bent[1]
     area = flat_area_m2(bodies, low, high, np.sqrt(square), curvature, FRICTION_FLAT)
+    if area > 0.0:  # faces touch on the crests of their waves [Johnson 1985, sec. 13.2]
+        curvature += bodies[low].crest_per_m + bodies[high].crest_per_m
     pair.radius_m = contact_radius_m(curvature, area)
+    _begin_surfaces(pair, bodies, 0.0 if area > 0.0 else pair.radius_m)
+
+
+@njit(nogil=True, error_model="numpy")
+def _begin_surfaces(pair, bodies, round_m):
+    """Set what either side's profile is of. round_m: R* of a ball, 0 for faces, which rest on many crests.
+
+    Only a spectrum that is stated is limited by the ball's roundness, and only two of them tell how much of the patch
+    touches: the slope of a preset's goes on below its finest wave, and with it the spots.
+    """
+    slope, pair.ball_m = 0.0, round_m
+    for side in range(2):
+        body, height_m = bodies[pair.body[side]], pair.height_m[side]
+        stated = body.octave_rms_m[0] >= 0.0
+        if stated:
+            given_octaves(body.octave_rms_m, height_m)
+        else:
+            height_octaves(body.roughness_m, body.hurst, height_m)
+        add_waves(body.waviness_m, body.waviness_length_m, height_m)
+        slope = slope + slope_squared(height_m) if stated and slope >= 0.0 else -1.0
+        if body.track_count > 0 or not stated:
+            pair.ball_m = 0.0
+        pair.track_at[side], pair.track_count[side] = body.track_at, body.track_count
+        pair.track_spacing_m[side] = body.track_spacing_m
+        if body.track_count > 0:
+            for j in range(len(height_m)):
+                height_m[j] = 1.0
+        pair.around[side] = pair.stretch[side] = 0.0
+        if body.curvature_per_m > 0.0 and body.track_count == 0:
+            pair.around[side], pair.stretch[side] = close_round(2.0 * np.pi / body.curvature_per_m, height_m)
+    pair.slope = np.sqrt(2.0 * slope) if slope > 0.0 else 0.0  # of a gradient, of a trace's slope

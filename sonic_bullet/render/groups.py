@@ -78,6 +78,7 @@ class BodyTables(NamedTuple):
     turns: Array
     frequency_hz: Array
     spectrum: Array
+    tracks: Array
 
 
 class PairTables(NamedTuple):

@@ -15,10 +15,12 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
+from sonic_bullet.records.roughness import WAVE_M
 from sonic_bullet.render.contact_place import add_push, effective_mass, flat_area_m2, touch, turn_push
 from sonic_bullet.render.contact_rows import opening
 from sonic_bullet.render.struck.strike_causes import accept, date_strikes
-from sonic_bullet.synth.pulse import compliance, pulse_length
+from sonic_bullet.support.springs import PERSSON
+from sonic_bullet.synth.pulse import compliance, pulse_length, rough_share
 from sonic_bullet.synth.strikes import NOW, SPAN
 
 STEEPEST = 10.0
@@ -259,6 +261,24 @@ def _gather(strike, rows, back_s, dt_s):
 
 
 @njit(nogil=True, error_model="numpy")
+def _roughened(bodies, low, high, mass_kg, modulus_pa, curvature_per_m, speed_m_s):
+    """Return how many times as long a ball's pulse is by the waves that its patch covers, where they are stated.
+
+    Of a preset's surface they would make it longer by 2 % at most, and are left out.
+    """
+    low_m, high_m = bodies[low].octave_rms_m, bodies[high].octave_rms_m
+    if not curvature_per_m > 0.0 or (low_m[0] < 0.0 and high_m[0] < 0.0):
+        return 1.0
+    k = 4.0 / 3.0 * modulus_pa / np.sqrt(curvature_per_m)
+    depth = (1.25 * mass_kg * speed_m_s * speed_m_s / k) ** 0.4
+    across, square = 2.0 * np.sqrt(depth / curvature_per_m), 0.0
+    for j in range(len(low_m)):
+        if WAVE_M[j] < across:
+            square += max(low_m[j], 0.0) ** 2 + max(high_m[j], 0.0) ** 2
+    return rough_share(mass_kg, modulus_pa, curvature_per_m, speed_m_s, PERSSON * np.sqrt(square))
+
+
+@njit(nogil=True, error_model="numpy")
 def _make(strike, quaternion, rows, table, pulse, push):
     """Make a strike's pulse, but for its start, and its Uᵀj in push (2, columns); False where it is not audible."""
     low, high, bodies = strike.body[0], strike.body[1], table.bodies
@@ -289,6 +309,8 @@ def _make(strike, quaternion, rows, table, pulse, push):
     speed = strike.approach_m_s if strike.approach_m_s > 0 else accepted / (1.5 * mass)
     modulus = 1 / (1 / bodies[low].modulus_pa + 1 / bodies[high].modulus_pa)
     length, flat = pulse_length(mass, modulus, bent, area, max(speed, 1e-6))
+    if not flat:
+        length *= _roughened(bodies, low, high, mass, modulus, bent, max(speed, 1e-6))
     given = 0.0
     for side in range(2):
         body = bodies[strike.body[side]]

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.geometry.nearest_point import FACE, NODE
 from sonic_bullet.records.contacts import CONTACT
-from sonic_bullet.synth.profile import OCTAVES
+from sonic_bullet.records.roughness import OCTAVES
 from sonic_bullet.synth.strikes import SPAN
 
 __all__ = ["BODY", "CONTACT", "FACE", "HISTORY", "NODE", "PAIR", "PULSE", "ROW"]
@@ -34,6 +34,12 @@ BODY = np.dtype(
         ("roughness_m", "f8"),
         ("hurst", "f8"),
         ("octave_rms_m", "f8", (OCTAVES,)),  # the first below 0: roughness and hurst tell
+        ("waviness_m", "f8"),  # 0: none known
+        ("waviness_length_m", "f8"),
+        ("crest_per_m", "f8"),  # curvature of its waves' crests
+        ("track_at", "i8"),  # of a measured track's slopes by octave in the flat ones, and how many an octave has
+        ("track_count", "i8"),  # 0: none
+        ("track_spacing_m", "f8"),
         ("size_m", "f8"),  # cube root of the volume
         ("volume_m3", "f8"),
         ("curvature_per_m", "f8"),  # of a shape that has one everywhere; NaN: that of its faces
@@ -107,7 +113,14 @@ PAIR = np.dtype(
         ("damping_ratio", "f8"),
         ("dissipation_s_m", "f8"),
         ("seed", "i8", (2,)),
-        ("height_m", "f8", (2, OCTAVES)),
+        ("height_m", "f8", (2, OCTAVES)),  # gains of the slopes, where a side has a track
+        ("around", "f8", (2,)),  # coarsest lattice points round a round side, 0: endless (profile.close_round)
+        ("stretch", "f8", (2,)),  # of its lattice, over 1
+        ("track_at", "i8", (2,)),
+        ("track_count", "i8", (2,)),
+        ("track_spacing_m", "f8", (2,)),
+        ("ball_m", "f8"),  # R* of a ball on a stated spectrum, 0: it follows all waves
+        ("slope", "f8"),  # rms, of both surfaces; 0: not known, the contact is in spots
         ("depth", "f8"),  # from here: state of its voice
         ("lift", "f8"),
         ("substeps", "i8"),

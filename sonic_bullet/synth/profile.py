@@ -18,11 +18,17 @@ Gains g_j (an octave's wavelength is λ_j):
                         0.96.)
     anti-aliasing   1 below 0.2 sr at v/λ, falling to 0 at 0.4 sr
     slow waves      1 above 16 Hz, falling to 0 at 8 Hz: they only lift the body, inaudibly
+Where the fraction c of the patch is in contact, the patch averages that part as a smooth one:
+    (1 - c)(1 + a/λ)^(-1/2) + c (1 + π/4 (2πa/λ)³)^(-1/2),   c = erf(√π p/(E* h'))    h': rms slope, p: mean pressure
+        [Remington 1987, J. Acoust. Soc. Am. 81, 1805; Pastewka & Robbins 2016, Appl. Phys. Lett. 108, 221601]
+
+A round body's profile closes on itself: the lattice is stretched so that a whole number of points goes round, and the
+last is followed by the first.
 
 The contact oscillator needs dh/dt alone: Σ g A n'(x/Δ)·v/Δ. So a changing gain never moves a surface at rest, and v = 0
 is exactly 0.
 
-Data flow: height_octaves once a pair, gained_heights once a step and side, sweep_profile: dh/dt of every sample. The
+Data flow: octave_heights once a pair, gained_heights once a step and side, sweep_profile: dh/dt of every sample. The
 lattices nest, so the octaves are summed from coarse to fine on the lattice points that the samples pass (a cubic
 B-spline on Δ is one on Δ/2 with the coefficients [1 4 6 4 1]/8; `_refine`) and read once a sample (`_read`: the
 derivative is the quadratic B-spline of the differences). A coefficient depends on its place alone, so where a block
@@ -37,50 +43,39 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records.roughness import LONGEST_M, OCTAVES, WAVE_M
+from sonic_bullet.synth.octave_heights import LATTICE, reach_of_ball
 from sonic_bullet.synth.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
 
-__all__ = ["LATTICE", "OCTAVES", "SLOWEST_HZ", "gained_heights", "given_octaves", "height_octaves", "sweep_profile"]
-
-LATTICE = 0.30
-"""An octave on a lattice Δ carries most of the self-affine spectrum at λ = Δ/0.30: there x^2.5 sinc(x)^8 peaks."""
 SLOWEST_HZ = 8.0
 
-_UNIT_RMS = np.sqrt(3.0 * 315 / 151)
-"""Makes n_j unit variance: lattice values uniform on ±1 have 1/3, the mean square of the B-spline is 151/315."""
-
 
 @njit(nogil=True, error_model="numpy")
-def height_octaves(roughness_m, hurst, out):
-    """Write A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms height in m and Hurst exponent."""
-    total = 0.0
-    for j in range(OCTAVES):
-        out[j] = WAVE_M[j] ** hurst
-        total += out[j] * out[j]
-    scale = np.sqrt(total)
-    for j in range(OCTAVES):
-        out[j] = roughness_m * (out[j] / scale) * _UNIT_RMS
+def gained_heights(height_m, speed_m_s, patch, sr, out):
+    """Write g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative.
 
-
-@njit(nogil=True, error_model="numpy")
-def given_octaves(octave_rms_m, out):
-    """A_j into out (OCTAVES,) in m, scaled for lattice values on ±1, from rms heights (OCTAVES,) in m."""
-    for j in range(OCTAVES):
-        out[j] = octave_rms_m[j] * _UNIT_RMS
-
-
-@njit(nogil=True, error_model="numpy")
-def gained_heights(height_m, speed_m_s, patch_radius_m, sr, out):
-    """Write g_j A_j into out (OCTAVES,) at a sweep speed in m/s, not negative, with a contact radius in m."""
+    patch: its radius in m; the fraction c of it that is in contact, 0 where only spots are; R* of a ball that follows
+    no more of the waves than it can, 0 where that is not asked.
+    """
+    patch_radius_m, touching, ball_m = patch
     for j in range(OCTAVES):
         f = speed_m_s / WAVE_M[j]
         fine, slow = (0.4 - f / sr) / 0.2, f / SLOWEST_HZ - 1.0
         fine, slow = 0.0 if fine < 0.0 else fine, 0.0 if slow < 0.0 else slow
         fine, slow = 1.0 if fine > 1.0 else fine, 1.0 if slow > 1.0 else slow
-        out[j] = height_m[j] * (fine * slow / np.sqrt(1.0 + patch_radius_m / WAVE_M[j]))
+        height = height_m[j]
+        if ball_m > 0.0:
+            most = reach_of_ball(WAVE_M[j], patch_radius_m, ball_m)
+            height = most if height > most else height
+        out[j] = height * (fine * slow / np.sqrt(1.0 + patch_radius_m / WAVE_M[j]))
+        if touching > 0.0:
+            turn = 2.0 * np.pi * patch_radius_m / WAVE_M[j]
+            smooth = height * (fine * slow / np.sqrt(1.0 + 0.25 * np.pi * (turn * turn * turn)))
+            out[j] += touching * (smooth - out[j])
 
 
 class _Lattice(NamedTuple):
@@ -96,28 +91,39 @@ class _Lattice(NamedTuple):
 
 
 @intrinsic
-def _refine(typingctx, work, coarse, fine, change, pairs, first, heights):
+def _refine(typingctx, work, coarse, fine, change, pairs, place, heights):
     """Compute 2·pairs coefficients from work[fine] on: those of work[coarse] … on half the lattice, plus noise.
 
-    They take work[coarse] … work[coarse + pairs + 1], plus heights[0] times this octave's noise from ``first`` on; and
-    the same ``change`` further on, plus heights[1] times it. Noise: values on ±1 by a 32-bit integer mix [Wellons 2018,
-    "lowbias32"]. Up to 14 values more are written.
+    They take work[coarse] … work[coarse + pairs + 1], plus heights[0] times this octave's noise from point
+    place[1] on, points being counted round place[2] of them (0: endless) and place[0] naming the surface and octave;
+    and the same ``change`` further on, plus heights[1] times it. place[3]: 1/place[2], or 0. Noise: values on ±1 by a
+    32-bit integer mix [Wellons 2018, "lowbias32"]. Up to 14 values more are written.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        work, coarse, fine, change, pairs, first, height, growth = e.args
+        work, coarse, fine, change, pairs, key, low, points, inverse, height, growth = e.args
         whole = ir.VectorType(I32, LANES)
-        start = builder.trunc(first, I32)
+        start, low = builder.trunc(key, I32), builder.trunc(low, I32)
+        floor = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC]), "llvm.floor.v8f64")
 
         def number(value: int) -> Value:
             return ir.Constant(whole, [value] * LANES)
 
         def noise(at: Value, offset: int) -> Value:
             none = ir.Constant(whole, ir.Undefined)
-            one = builder.insert_element(none, builder.add(start, builder.trunc(at, I32)), ir.Constant(I32, 0))
-            h = builder.shuffle_vector(one, none, ir.Constant(whole, [0] * LANES))
+
+            def spread(value: Value) -> Value:
+                one = builder.insert_element(none, value, ir.Constant(I32, 0))
+                return builder.shuffle_vector(one, none, ir.Constant(whole, [0] * LANES))
+
+            h = spread(builder.add(low, builder.trunc(at, I32)))
             h = builder.add(h, ir.Constant(whole, list(range(offset, offset + LANES))))
+            point = builder.sitofp(h, VEC)
+            turns = builder.fmul(builder.fadd(point, constant(0.5)), e.spread(inverse))
+            turns = builder.call(floor, [turns])
+            h = builder.fptosi(builder.fsub(point, builder.fmul(turns, e.spread(points))), whole)
+            h = builder.add(h, spread(start))
             h = builder.mul(builder.xor(h, builder.lshr(h, number(16))), number(0x7FEB352D))
             h = builder.mul(builder.xor(h, builder.lshr(h, number(15))), number(0x846CA68B))
             h = builder.xor(h, builder.lshr(h, number(16)))
@@ -141,7 +147,7 @@ def _refine(typingctx, work, coarse, fine, change, pairs, first, heights):
         e.loop(pairs, LANES, [], body)
         return context.get_dummy_value()
 
-    return types.void(work, coarse, fine, change, pairs, first, heights), codegen
+    return types.void(work, coarse, fine, change, pairs, place, heights), codegen
 
 
 @intrinsic
@@ -203,7 +209,7 @@ def _read(typingctx, work, samples, lattice, pace, rate):
 
 
 @njit(nogil=True, error_model="numpy")
-def sweep_profile(swept, speed, x, key, heights, per_sample_s, work, rate):
+def sweep_profile(swept, speed, x, surface, heights, per_sample_s, work, rate):
     """Add dh/dt of one side of one pair to n samples of ``rate``, an `At`, in m/s.
 
     Returns the distance swept after the n samples, and the scratch, longer where it was too short.
@@ -214,10 +220,11 @@ def sweep_profile(swept, speed, x, key, heights, per_sample_s, work, rate):
     speed : two, at the step's ends
     x : (n,) fraction of the step
     heights : two (OCTAVES,), g·A at the step's ends
-    key : of this surface
+    surface : its key, and as of `close_round` points of the coarsest lattice round it, 0 where it is endless, and the
+        stretch
     rate : as long as if n were the next multiple of 8
     """
-    (speed0, speed1), (height0, height1) = speed, heights
+    (speed0, speed1), (height0, height1), (key, around, stretch) = speed, heights, surface
     n, gain = len(x), speed1 - speed0
     whole = (n + LANES - 1) & -LANES
     if len(work) < 2 * whole:
@@ -235,7 +242,7 @@ def sweep_profile(swept, speed, x, key, heights, per_sample_s, work, rate):
         return swept, work
     while height0[coarsest] == 0.0 and height1[coarsest] == 0.0:
         coarsest += 1
-    inverse = 2.0**finest / (LONGEST_M * LATTICE)
+    inverse = 2.0**finest / (LONGEST_M * LATTICE) * (1.0 + stretch)
     first, last = (int(work[0] * inverse) - 1) & -2, (int(swept * inverse) + 2) | 1
     size = last - first + 1 + 4 * LANES  # with room for values written beyond the end
     if len(work) < 2 * whole + 4 * size:
@@ -253,7 +260,9 @@ def sweep_profile(swept, speed, x, key, heights, per_sample_s, work, rate):
         low, high = _lattice(first, last, finest - j)
         coarse, pairs = now + (low >> 1) - begin - 1, (high - low + 1) >> 1
         height = height0[j], height1[j] - height0[j]
-        _refine(work, coarse, new, change, pairs, place + 0x3C6EF372 * j + low, height)
+        points = around * 2.0**j
+        round_it = place + 0x3C6EF372 * j, low, points, 1.0 / points if points > 0.0 else 0.0
+        _refine(work, coarse, new, change, pairs, round_it, height)
         now, new, begin = new, now, low
     # never below 0: a place less its origin then has no more digits than the place, and is exact
     origin = begin + 1 if begin >= 0 else 0

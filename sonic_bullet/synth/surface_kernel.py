@@ -30,6 +30,7 @@ one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follo
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.synth.profile import OCTAVES, gained_heights, sweep_profile
+from sonic_bullet.records.roughness import OCTAVES
+from sonic_bullet.synth.profile import gained_heights, sweep_profile
+from sonic_bullet.synth.track import sweep_track
 from sonic_bullet.synth.vector import F64, I32, LANES, VEC, At, Emit, Value, constant
 
 MOST_SUBSTEPS = 8.0
@@ -69,12 +72,13 @@ VOICE = np.dtype(
 
 # rows that `_law` writes for `_oscillate`, a lane each; two rows: at the step's start, and growth until its end
 _DEPTH, _LIFT, _REST, _DAMPING, _RATE_UNIT, _FORCE_UNIT, _SUBSTEPS, _STANDS, _PATCH = 0, 1, 2, 4, 6, 7, 8, 9, 10
-_ROWS = 12
+_TOUCHING = 12
+_ROWS = 14
 
 
 @njit(nogil=True, error_model="numpy")
 def dissipation_s_m(restitution):
-    """Compute c in s/m by the restitution of an impact at 1 m/s: c = 3/2 α, e = 1 - αv [Hunt & Crossley 1975, eq. 20].
+    """Compute c in s/m by the restitution of an impact at 1 m/s: c = 3/2 α, e = 1 - αv [Hunt & Crossley 1975].
 
     At the mm/s at which rough surfaces meet it leaves e near 1, whatever the impact's is.
     """
@@ -115,7 +119,11 @@ def _law(pair, voice, sr, constants, at):
         loss = pair.dissipation_s_m if pair.dissipation_s_m > loss else loss
         constants[at + _REST + end] = depth / limit
         constants[at + _DAMPING + end] = loss * limit / h
-        constants[at + _PATCH + end] = (0.75 * load * radius / modulus) ** (1.0 / 3.0)
+        patch = (0.75 * load * radius / modulus) ** (1.0 / 3.0)
+        constants[at + _PATCH + end] = patch
+        pressure = load / (np.pi * patch * patch) if patch > 0.0 else 0.0
+        touching = math.erf(np.sqrt(np.pi) * pressure / (modulus * pair.slope)) if pair.slope > 0.0 else 0.0
+        constants[at + _TOUCHING + end] = touching
     constants[at + _REST + 1] -= constants[at + _REST]
     constants[at + _DAMPING + 1] -= constants[at + _DAMPING]
     constants[at + _RATE_UNIT], constants[at + _FORCE_UNIT], constants[at + _SUBSTEPS] = h / limit, at_limit, substeps
@@ -142,11 +150,11 @@ def _line_up(voices, count, constants):
 
 
 @njit(nogil=True, error_model="numpy")
-def sound_voices(pairs, voices, count, x, sr, force):
+def sound_voices(pairs, voices, count, x, sr, tracks, force):
     """Compute the force f - N in newton of the voices 0 … count - 1 into force (voices, n), and advance their pairs.
 
     x (n,): fractions in [0, 1) of one physics step at the n samples. Call again with the rest of the step's x for its
-    other samples. sr: float, in Hz.
+    other samples. sr: float, in Hz. tracks: slopes of measured tracks, flat.
     """
     n = len(x)
     if count == 0 or n == 0:
@@ -168,12 +176,13 @@ def sound_voices(pairs, voices, count, x, sr, force):
             for side in range(2):
                 begin, end = voice.sweep_m_s[0, side], voice.sweep_m_s[1, side]
                 if filled and (begin != 0.0 or end != 0.0):
-                    gained_heights(pair.height_m[side], begin, constants[at + _PATCH], sr, height0)
-                    gained_heights(pair.height_m[side], end, constants[at + _PATCH + 1], sr, height1)
-                    pair.swept_m[side], work = sweep_profile(
-                        pair.swept_m[side], (begin, end), x, pair.seed[side], (height0, height1), 1.0 / sr, work,
-                        At(rate, lane * whole),
-                    )  # fmt: skip
+                    for last in range(2):
+                        patch = constants[at + _PATCH + last], constants[at + _TOUCHING + last], pair.ball_m
+                        speed, height = (end, height1) if last else (begin, height0)
+                        gained_heights(pair.height_m[side], speed, patch, sr, height)
+                    work = _sweep(
+                        pair, side, (begin, end), x, (height0, height1), 1.0 / sr, work, (tracks, rate, lane * whole)
+                    )
             if pair.substeps == 0:  # a new contact starts with the profile's velocity
                 constants[at + _LIFT] = rate[lane * whole] * constants[at + _RATE_UNIT]
             for row in range(_ROWS):
@@ -186,6 +195,24 @@ def sound_voices(pairs, voices, count, x, sr, force):
             pair.substeps = int(constants[v * _ROWS + _SUBSTEPS])
             for i in range(n):
                 force[v, i] = rate[lane * whole + i]
+
+
+@njit(nogil=True, error_model="numpy")
+def _sweep(pair, side, speed, x, heights, per_sample_s, work, arrays):
+    """Add dh/dt of a side to a lane's samples, by its track or its octaves; return the scratch.
+
+    arrays: slopes of tracks, rates, and where in them the lane's begin.
+    """
+    tracks, rate, out = arrays
+    if pair.track_count[side] > 0:
+        track = tracks, pair.track_at[side], pair.track_count[side], pair.track_spacing_m[side]
+        pair.swept_m[side] = sweep_track(pair.swept_m[side], speed, x, track, heights, per_sample_s, (rate, out))
+        return work
+    surface = pair.seed[side], pair.around[side], pair.stretch[side]
+    pair.swept_m[side], work = sweep_profile(
+        pair.swept_m[side], speed, x, surface, heights, per_sample_s, work, At(rate, out)
+    )
+    return work
 
 
 @intrinsic

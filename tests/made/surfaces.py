@@ -7,7 +7,8 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.render.tables import PAIR
-from sonic_bullet.synth.profile import gained_heights, height_octaves
+from sonic_bullet.synth.octave_heights import height_octaves
+from sonic_bullet.synth.profile import gained_heights
 from sonic_bullet.synth.surface_kernel import FASTEST_M_S, VOICE, sound_voices
 
 
@@ -18,10 +19,10 @@ def octave_heights(roughness_m: float, hurst: float) -> Array:
     return out
 
 
-def octave_gains(speed_m_s: float, patch_radius_m: float, sr: float) -> Array:
+def octave_gains(speed_m_s: float, patch_radius_m: float, sr: float, touching: float = 0.0) -> Array:
     """g_j (octaves,); see `profile.gained_heights`."""
     out = np.zeros(PAIR["height_m"].shape[1])
-    gained_heights.py_func(np.ones_like(out), speed_m_s, patch_radius_m, sr, out)
+    gained_heights.py_func(np.ones_like(out), speed_m_s, (patch_radius_m, touching, 0.0), sr, out)
     return out
 
 
@@ -38,11 +39,11 @@ def surface_pairs(
 
 
 @njit(nogil=True)
-def _sound(pairs, voices, x, sr, force):  # type: ignore[no-untyped-def]
-    sound_voices(pairs, voices, len(voices), x, sr, force)
+def _sound(pairs, voices, x, sr, tracks, force):  # type: ignore[no-untyped-def]
+    sound_voices(pairs, voices, len(voices), x, sr, tracks, force)
 
 
-def advance(pairs: Array, load_n: Array, sweep_m_s: Array, x: Array, sr: int) -> Array:
+def advance(pairs: Array, load_n: Array, sweep_m_s: Array, x: Array, sr: int, tracks: Array | None = None) -> Array:
     """Force f - N (p, n) in newton at the shares ``x`` (n,) of one step; the pairs (p,) move on.
 
     load_n (2, p), sweep_m_s (2, p, 2): at the step's ends.
@@ -50,5 +51,6 @@ def advance(pairs: Array, load_n: Array, sweep_m_s: Array, x: Array, sr: int) ->
     voices, force = np.zeros(len(pairs), VOICE), np.zeros((len(pairs), len(x)))
     voices["slot"], voices["load_n"] = np.arange(len(pairs)), np.maximum(np.transpose(load_n), 0)
     voices["sweep_m_s"] = np.minimum(np.transpose(sweep_m_s, (1, 0, 2)), FASTEST_M_S)
-    _sound(pairs, voices, np.ascontiguousarray(x, float), float(sr), force)
+    slopes = np.zeros(0) if tracks is None else np.ascontiguousarray(tracks, float).ravel()
+    _sound(pairs, voices, np.ascontiguousarray(x, float), float(sr), slopes, force)
     return force

@@ -65,7 +65,14 @@ class Table:
         )  # fmt: skip
         window.step["dt_s"], window.step["row"] = DT_S, (0, len(rows))
         table = BodyTables(
-            self.bodies, self.faces, self.nodes, self.shapes, np.zeros(0, TURN), np.zeros(0), np.zeros((2, 0))
+            self.bodies,
+            self.faces,
+            self.nodes,
+            self.shapes,
+            np.zeros(0, TURN),
+            np.zeros(0),
+            np.zeros((2, 0)),
+            np.zeros(0),
         )
         pairs = PairTables(
             self.pairs, np.zeros(1, np.int64), np.array([1, 0]), np.zeros(0, np.int64), self.gain, np.zeros(2, HELD)

@@ -25,6 +25,7 @@ from sonic_bullet.records.errors import (
     SonicBulletError,
 )
 from sonic_bullet.records.touching.link_motions import LINK_MOTION
+from sonic_bullet.records.touching.surface_form import SurfaceForm
 from tests.made import heads
 from tests.made.models import STEEL
 from tests.made.worlds import box, plate_model
@@ -79,6 +80,7 @@ MATERIAL = {
     "effects": (),
     "includes_radiation": False,
     "octave_rms_m": np.full(14, 1e-7),
+    "form": SurfaceForm(),
 }
 MODEL = dict(
     freq_hz=[100.0],
@@ -487,6 +489,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "residual": RECORD,
         "effects": ["x", 5, None, object(), {}],
         "octave_rms_m": ["x", 5, object(), [1e-6], [math.nan] * 14, [-1.0] * 14],
+        "form": RECORD,
         "includes_radiation": FLAG,
     },
     "Material.isotropic": {

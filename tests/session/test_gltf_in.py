@@ -148,6 +148,10 @@ BAD: dict[str, tuple[Change, str]] = {
         _set("extensions", "KHR_physics_rigid_bodies", "physicsMaterials", 0, "frictionCombine", "blend"), "rule",
     ),
     "roughness": (_set("extensions", "KHR_audio_rigid_bodies", "acousticSurfaces", 0, "roughness", 0.0), "roughness"),
+    "waviness": (_set("extensions", "KHR_audio_rigid_bodies", "acousticSurfaces", 0, "waviness", -1e-6), "waviness_m"),
+    "waves of 0 m": (
+        _set("extensions", "KHR_audio_rigid_bodies", "acousticSurfaces", 0, "wavinessLength", 0), "waviness_length_m",
+    ),
     "poisson": (_set("extensions", "KHR_audio_rigid_bodies", "acousticMaterials", 0, "poissonRatio", 0.5), "Poisson"),
     "cycle": (_set("nodes", 1, "children", [1]), "hang on themselves"),
 }  # fmt: skip

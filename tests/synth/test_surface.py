@@ -254,7 +254,8 @@ def test_mean_of_the_force_is_the_load() -> None:
 
 @njit(nogil=True)
 def _swept(speed, x, key, height, per_sample_s, rate):  # type: ignore[no-untyped-def]
-    sweep_profile(0.0, (speed, speed), x, key, (height, height), per_sample_s, np.empty(0), At(rate, 0))
+    endless = key, 0.0, 0.0
+    sweep_profile(0.0, (speed, speed), x, endless, (height, height), per_sample_s, np.empty(0), At(rate, 0))
 
 
 def test_profile_is_self_affine_with_the_stated_rms() -> None:

@@ -25,7 +25,7 @@ from sonic_bullet.records import Array, Material, ModalModel, Residual
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.rigid_scene import PhysicsMaterial
-from sonic_bullet.session.gltf_in.finishes import relief_octaves, surface_octaves
+from sonic_bullet.session.gltf_in.finishes import relief_octaves, surface_form, surface_octaves
 from sonic_bullet.session.gltf_in.node_frames import Nodes
 from sonic_bullet.session.gltf_in.own_words import (
     FREE,
@@ -88,8 +88,6 @@ def material_of(
     own = own_surface(surface)
     octaves, hurst = surface_octaves(tree, surface, called, [] if own is not None else notes)
     octaves = _with_relief(nodes, surface, index, octaves, called, notes)
-    if surface.get("waviness") and (words := "waviness is not played: it makes no sound of its own here") not in notes:
-        notes.append(words)
     damping = [bulk.get(key) for key in ("alpha", "beta")]
     known = all(x is not None for x in damping)
     both = dict.fromkeys(str(x["name"]) for x in (bulk, surface) if x.get("name"))
@@ -104,6 +102,7 @@ def material_of(
         hurst=hurst,
         restitution=physics.restitution,
         octave_rms_m=octaves,
+        form=surface_form(tree, surface, called),
         source=f"{AUDIO} of a glTF",
     )
     return (made if own is None else _as_ours(made, own)), bulk
@@ -119,6 +118,7 @@ def _as_ours(material: Material, own: OwnSurface) -> Material:
         hurst=own.hurst,
         restitution=own.restitution,
         octave_rms_m=None if octaves is None else np.array(octaves),
+        form=own.form,
     )
 
 

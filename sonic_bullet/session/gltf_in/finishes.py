@@ -1,11 +1,12 @@
 """The draft's surfaces -> octaves of our rough surfaces [KHR_audio_rigid_bodies, draft of 2026, Acoustic Surfaces].
 
     roughness σ, correlationLength ℓ, spectralSlope p, shortWavelength λs -> records.roughness.finish_octaves
-    profile, sampleSpacing -> track_octaves: its spectrum, not its very heights
+    profile, sampleSpacing -> its very heights, round and round; track_octaves of them where only heights count
+    waviness, wavinessLength -> SurfaceForm
     normalTexture -> slopes along both texture axes -> heights by wavelength, added in power; scaled with the node
 
-waviness decides in the draft how much of two faces bears; here that is a constant share of the smaller body, so it is
-read and named, and changes nothing.
+waviness decides how much of two faces bears: in the draft by the slope W/L, here by the curvature of the waves' crests,
+on which faces rest. Its heights are swept as all others are.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from sonic_bullet.files.gltf.gltf_tree import GltfTree
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.roughness import OCTAVES, WAVE_M, finish_octaves, octave_sums, track_octaves
+from sonic_bullet.records.touching.surface_form import SurfaceForm
 
-ROUGHNESS_M, CORRELATION_M, SLOPE = 2e-6, 5e-5, -2.4
+ROUGHNESS_M, CORRELATION_M, SLOPE, WAVINESS_M, WAVINESS_LENGTH_M = 2e-6, 5e-5, -2.4, 2e-6, 2e-3
 """The draft's defaults: its machined finish."""
 
 
@@ -44,7 +46,6 @@ def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: l
             raise tree.error(f"{name}: profile has one height", "give two at least")
         if "sampleSpacing" not in said:
             raise tree.error(f"{name}: profile without a sampleSpacing", "give metres between its heights")
-        notes.append(f"{name}: its profile is played by its spectrum, not height by height")
         return track_octaves(height, length("sampleSpacing", 1.0)), hurst
     short = length("shortWavelength", correlation * short_share)
     if short < WAVE_M[-1] / 2**0.5:
@@ -52,6 +53,16 @@ def surface_octaves(tree: GltfTree, said: Mapping[str, Any], name: str, notes: l
         if words not in notes:
             notes.append(words)
     return finish_octaves(rms, correlation, slope, min(short, correlation)), hurst
+
+
+def surface_form(tree: GltfTree, said: Mapping[str, Any], name: str) -> SurfaceForm:
+    """Waviness of an acoustic surface, and its measured track where it has one; raises RecordError."""
+    waves = {"waviness_m": said.get("waviness", WAVINESS_M)}
+    waves["waviness_length_m"] = said.get("wavinessLength", WAVINESS_LENGTH_M)
+    if "profile" not in said:
+        return SurfaceForm(**waves)
+    height = named_values(tree, said, "profile", name, "SCALAR")[:, 0].astype(float)
+    return SurfaceForm(**waves, track_m=height - height.mean(), track_spacing_m=said["sampleSpacing"])
 
 
 def relief_octaves(

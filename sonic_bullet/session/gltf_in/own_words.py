@@ -20,6 +20,7 @@ from sonic_bullet.records import Array, Material, Residual
 from sonic_bullet.records.bodies import isotropic_stiffness_pa
 from sonic_bullet.records.mounting import Mounting, as_mounting, loss_factor
 from sonic_bullet.records.roughness import LONGEST_M, WAVE_M
+from sonic_bullet.records.touching.surface_form import SurfaceForm
 from sonic_bullet.residual.code import ResidualForm, residual_of
 from sonic_bullet.session.gltf_in.finishes import CORRELATION_M
 
@@ -35,7 +36,15 @@ class OwnSurface(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     hurst: float
     restitution: float
     octave_rms_m: tuple[float, ...] | None = None
+    waviness_m: float | None = None
+    waviness_length_m: float | None = None
     stiffness_pa: tuple[Row, Row, Row, Row, Row, Row] | None = None
+
+    @property
+    def form(self) -> SurfaceForm | None:
+        """Waviness; None: none is known."""
+        waves = self.waviness_m, self.waviness_length_m
+        return None if waves[0] is None or waves[1] is None else SurfaceForm(waves[0], waves[1])
 
 
 class OwnModes(msgspec.Struct, frozen=True, kw_only=True):
@@ -66,6 +75,8 @@ def finish_entry(own: OwnSurface) -> dict[str, float]:
     else:
         sigma = float(np.sqrt((np.array(own.octave_rms_m)[WAVE_M <= CORRELATION_M] ** 2).sum()))
     found = {"correlationLength": CORRELATION_M, "spectralSlope": -(1 + 2 * own.hurst)}
+    if own.waviness_m is not None and own.waviness_length_m is not None:
+        found |= {"waviness": own.waviness_m, "wavinessLength": own.waviness_length_m}
     return ({"roughness": sigma} if sigma > 0 else {}) | found
 
 
