@@ -70,7 +70,7 @@ def bodies() -> Iterator[tuple[str, Shape, Material]]:
 
 def told(note: str) -> float | None:
     """The error that a note tells, 0 for one too small to tell; None where it tells none."""
-    found = re.search(r"error at \d+ Hz (about|under) ([\d.e-]+) %", note)
+    found = re.search(r"error up to \d+ Hz (about|under) ([\d.e-]+) %", note)
     return None if found is None else float(found[2]) / 100 * (found[1] == "about")
 
 

@@ -4,8 +4,10 @@ Polynomials are of degree 3 (lagrange.py); of degree 2 where the user gives elem
 first size comes from the shortest wave asked for. Elements are too stiff: f falls as they get smaller, and two sizes
 give an estimate of what to subtract [Richardson 1911]:
 
-    f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is subtracted from f(h) with a middle p.  The least and the highest
-    p give corrections on both sides of it: half their difference is the error reported.
+    f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is subtracted from f(h) with a middle p, 1 % at most.
+
+The true p is not known. The error may be what the least p makes of it, or none: where the coarser size misses a part of
+the body, both differ by far more than the finer one errs. The distance to the farther of these two is reported.
 """
 
 from __future__ import annotations
@@ -29,10 +31,8 @@ if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
 
 FINER_EDGE = 0.7  # from one edge to the next: half the elements of a wall
-ALIKE_EDGES, LARGER = 1.2, 3
-"""Ratio of a coarser body's edge to a finer one's below which the two are too similar to compare; how often a coarser
-body is tried: creases keep elements small.
-"""
+ALIKE_EDGES = 1.2  # ratio of a coarser body's edge to a finer one's below which the two are too similar to compare
+LARGER = 3  # how often a coarser body is tried: creases keep elements small
 MOST_UNKNOWNS = {True: 70_000, False: 30_000}
 """Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
 CUBIC_UNKNOWNS = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
@@ -123,31 +123,38 @@ class Elements:
         raw = self._solved(tensors, wanted, say)
         nodes, free, _ = raw.place
         less = self._less(tensors[0], raw.found[0][0], say)
-        off = np.nan_to_num(less[1]) if self._same_body else np.zeros(less.shape[1])
+        most_off = 0.01  # where two sizes differ by more, errors do not follow a power yet
+        off = np.clip(np.nan_to_num(less[1]), -most_off, most_off) if self._same_body else np.zeros(less.shape[1])
+        left = np.maximum(np.abs(less[0]) - np.abs(off), np.abs(off))
         found = tuple((value * np.exp(-2 * _as_long(off, len(value))), vector) for value, vector in raw.found)
-        return [raw._replace(found=found, place=(nodes, free, (less[0] - less[2]) / 2 if self._same_body else less[1]))]
+        return [raw._replace(found=found, place=(nodes, free, left))]
 
     def _less(self, tensor: Array, fine: Array, say: Callable[[str], None]) -> Array:
-        """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (3, m) by `orders`.
+        """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (2, m) by `orders`.
 
-        NaN where there is no coarser body to compare with.
+        Where no coarser body can be made, the same elements with polynomials of one degree less give the largest, and 0
+        is the middle. NaN where the user gave the size.
         """
-        # Orders of convergence of frequencies in h, by degree: least, middle and most. Smooth lumps have 4 [Strang &
-        # Fix 1973, ch. 6.3]. Lower orders are measured where walls are an element thick, and along creases, where
-        # stress is singular.
-        orders = {2: (2.0, 3.0, 4.0), 3: (2.0, 2.5, 3.5)}
-        coarser, ratio = self._coarser()
-        if coarser is None or not len(fine):
-            return np.full((3, len(fine)), np.nan)
+        # Orders of convergence of frequencies in h, by degree: least and middle. Smooth lumps have 4 [Strang & Fix
+        # 1973, ch. 6.3]. Lower orders are measured where walls are an element thick, and along creases, where stress
+        # is singular.
+        orders = {2: (2.0, 3.0), 3: (2.0, 2.5)}
+        if self.at_size is None or not len(fine):
+            return np.full((2, len(fine)), np.nan)
+        sized, ratio = self._coarser()
+        coarser = sized or self._with_degree(self.degree - 1)
         name = np.asarray(tensor).tobytes()
-        if len(coarser.known.get(name, ())) < len(fine):
-            coarser._solved([tensor], Wanted(np.inf, len(fine)), say)
+        try:
+            if len(coarser.known.get(name, ())) < len(fine):
+                coarser._solved([tensor], Wanted(np.inf, len(fine)), say)
+        except ModalError:  # walls too thin for its rigid motions to be told from its modes
+            return np.full((2, len(fine)), np.nan)
         coarse = coarser.known[name][: len(fine)]
         lost = np.log(_as_long(coarse / fine[: len(coarse)], len(fine))) / 2
         # modes closer to one another than their correction may have changed places: they get its mean
         apart = np.flatnonzero(np.diff(np.log(fine)) / 2 > np.abs(lost[:-1])) + 1
         lost = np.concatenate([np.full(len(few), few.mean()) for few in np.split(lost, apart) if len(few)])
-        return np.array([lost / (ratio**order - 1) for order in orders[self.degree]])
+        return np.array([lost / (ratio**order - 1) for order in orders[self.degree]] if sized else [lost, 0 * lost])
 
     def _solved(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> Sector:
         """Solve for the modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
@@ -188,19 +195,14 @@ class Elements:
         return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Estimate the relative error of the frequency of mode top[1]: the mean over it and the two modes below.
+        """Return the largest relative error estimated of the frequencies up to mode top[1].
 
-        NaN where the user gave the size, or no coarser body can be made.
+        NaN where the user gave the size, or no coarser body can be solved.
         """
-        together = 3  # highest modes whose errors are averaged: one alone may change places with its neighbour
-        left = sectors[0].place[2]
-        return float(np.abs(left[max(0, top[1] + 1 - together) : top[1] + 1]).mean())
+        return float(sectors[0].place[2][: top[1] + 1].max())
 
     def within(self, most: float) -> Elements:
-        """Return the body with larger elements where there are too many unknowns.
-
-        Too many are by far more than ``MOST_UNKNOWNS``, or more than ``most``, which is what its work allows.
-        """
+        """Return the body with larger elements where unknowns are far over ``MOST_UNKNOWNS``, or over ``most``."""
         coarser_tries = 2
         made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
         for _ in range(coarser_tries):
@@ -260,9 +262,7 @@ class Elements:
             made = self._of_size(self.edge_m * max(FINER_EDGE, least), self._filler("any")).within(most)
             if made._unknowns <= min(OVER * MOST_UNKNOWNS[self.thin], most) and made._smaller_than(self) >= ALIKE_EDGES:
                 return replace(made, coarser=self, spare=spare)
-        if self.degree == 2:
-            return None
-        return replace(self, degree=2, coarser=None, known={}, modes=modes, spare=spare).finer()
+        return None
 
     def _smaller_than(self, other: Elements) -> float:
         """Return how many times smaller its elements are than the other's."""
@@ -271,12 +271,10 @@ class Elements:
     def _coarser(self) -> tuple[Elements | None, float]:
         """Return the body with larger elements, and how much larger they are.
 
-        None where the user gave their size, or no coarser body can be made.
+        None where no coarser body can be made.
         """
         times = 1 / FINER_EDGE
         for _ in range(LARGER):
-            if self.coarser is None and self.at_size is None:
-                break
             made = self.coarser or self._refilled(self.edge_m * times)
             if made is None or made._lattice != self._lattice:  # cached by a fill with filler "any"
                 break

@@ -1,4 +1,4 @@
-"""Fields on a body's tetrahedra: Lagrange polynomials of degree 2 or 3, and what elements need of them.
+"""Fields on a body's tetrahedra: Lagrange polynomials of degree 1 to 3, and what elements need of them.
 
     N_i = Σ_m c_im ξ^a η^b ζ^c, a + b + c <= p, N_i(ξ_j) = δ_ij        [Zienkiewicz & Taylor 2000, ch. 8.10]
 
@@ -28,7 +28,7 @@ class Field:
     Attributes
     ----------
     node_m : (n, 3)
-    tet : (t, 10 or 20) indices into node_m, the solid's elements in its order
+    tet : (t, 4, 10 or 20) indices into node_m, the solid's elements in its order
     """
 
     degree: int
@@ -37,11 +37,13 @@ class Field:
 
 
 def field(solid: Solid, degree: int) -> Field:
-    """Build the nodes of a field of degree 2 or 3 on a solid; those of a curved edge or face lie on it."""
+    """Build the nodes of a field of degree 1, 2 or 3 on a solid; those of a curved edge or face lie on it."""
     if degree == 2:
         return Field(2, solid.node_m, solid.tet)
     used, corner = np.unique(solid.tet[:, :4], return_inverse=True)
     n, corner = len(used), corner.reshape(-1, 4)
+    if degree == 1:
+        return Field(1, solid.node_m[used], corner)
     ends = corner[:, TET_EDGE]
     edge, at = np.unique(np.sort(ends, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
     first = n + 2 * at.reshape(-1, 6)

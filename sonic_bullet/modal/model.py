@@ -249,7 +249,7 @@ def _solve(
     shown = found.method.shown(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     if np.isfinite(found.error):
-        note += f"; error at {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
+        note += f"; error up to {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
         if found.error > asked.accuracy:
             note += (
                 f", more than the {100 * asked.accuracy:g} % asked for: finer elements need more unknowns than allowed"

@@ -8,8 +8,9 @@ import trimesh
 
 from sonic_bullet.modal import fem
 from sonic_bullet.modal.meshing import structured
+from sonic_bullet.modal.meshing.mean_surface import on_the_mean
 from sonic_bullet.modal.meshing.on_surface import creases, fitted, nearest_on_lines, unfolded
-from sonic_bullet.modal.meshing.solid import Solid, quadratic
+from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, quadratic
 
 
 def straight(solid: Solid) -> Solid:
@@ -31,7 +32,7 @@ def test_a_rim_is_followed_along_its_crease() -> None:
         straight(structured.cylinder(0.02, 0.03, 2, 2)), np.array(round_one.vertices), np.array(round_one.faces)
     )
     assert fem.volume_m3(made) == pytest.approx(round_one.volume, rel=0.003)
-    assert np.abs(made.node_m[:, 2]).max() == pytest.approx(0.015, abs=1e-12)
+    assert np.abs(made.node_m[:, 2]).max() == pytest.approx(0.015, abs=1e-9)
 
 
 def test_a_box_is_left_as_it_is() -> None:
@@ -39,6 +40,30 @@ def test_a_box_is_left_as_it_is() -> None:
     solid = structured.box(np.array([0.1, 0.05, 0.02]), (3, 2, 1))
     made = fitted(solid, np.array(box.vertices), np.array(box.faces))
     assert made.affine and np.abs(made.node_m - solid.node_m).max() == 0
+
+
+@pytest.mark.parametrize("rings", [1, 2])
+def test_flat_sides_hold_the_area_and_the_moment_of_the_circle_they_stand_for(rings: int) -> None:
+    """A polygon in the circle has A = n/2 sin(2π/n) R² and J = A R² (2 + cos(2π/n))/6 [Young & Budynas, table A.1]."""
+    radius, length, sides = 0.004, 0.05, 6 * rings
+    flat = straight(structured.cylinder(radius, length, rings, 12))
+    circle = trimesh.creation.cylinder(radius, length, sections=720)
+    area, moment = section(flat, length)
+    assert area == pytest.approx(sides / 2 * np.sin(2 * np.pi / sides) * radius**2, rel=1e-9)
+    assert moment == pytest.approx(area * radius**2 * (2 + np.cos(2 * np.pi / sides)) / 6, rel=1e-9)
+    made = on_the_mean(flat, np.array(circle.vertices), np.array(circle.faces))
+    area, moment = section(made, length)
+    assert area == pytest.approx(np.pi * radius**2, rel=0.01)
+    assert moment == pytest.approx(np.pi / 2 * radius**4, rel=0.02)
+
+
+def section(solid: Solid, length: float) -> tuple[float, float]:
+    """Mean area and polar moment of a straight solid along z."""
+    volume = np.abs(corner_volume_m3(solid.node_m, solid.tet))
+    corner = solid.node_m[solid.tet[:, :4], :2]
+    # ∫ x² over a tetrahedron: V/20 (Σ xᵢ² + (Σ xᵢ)²)
+    square = ((corner**2).sum(axis=(1, 2)) + (corner.sum(axis=1) ** 2).sum(axis=1)) / 20
+    return float(volume.sum() / length), float((volume * square).sum() / length)
 
 
 def test_an_element_that_folds_is_straight_again() -> None:

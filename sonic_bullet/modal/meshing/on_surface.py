@@ -3,6 +3,7 @@
 edge on a smooth part       -> nearest point that looks the same way
 edge along a crease         -> nearest point of the surface's own creases
 an element that this folds  -> its edges are straight again
+what still lies off it      -> shifted onto it on the mean (mean_surface.py)
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.geometry import CREASE_RAD
-from sonic_bullet.modal.meshing.solid import TET_EDGE, TET_FACE, Solid, corner_volume_m3
+from sonic_bullet.modal.meshing.mean_surface import on_the_mean
+from sonic_bullet.modal.meshing.solid import TET_EDGE, Solid, corner_volume_m3, outer_faces
 from sonic_bullet.records import Array
 
 BODY_CENTRED = np.array([[a, b, c] for a in (0, 0.5, 1) for b in (0, 0.5, 1) for c in (0, 0.5, 1) if a + b + c <= 1])
@@ -35,14 +37,12 @@ def fitted(solid: Solid, vertex_m: Array, face: Array) -> Solid:
     near = (moved < farthest * length) & (moved > 1e-9 * length)
     node = solid.node_m.copy()
     node[middle[near]] = target[near]
-    return unfolded(Solid(node, solid.tet, not near.any(), solid.note))
+    return on_the_mean(unfolded(Solid(node, solid.tet, not near.any(), solid.note)), vertex_m, face)
 
 
 def _surface_edges(solid: Solid) -> tuple[Array, Array, Array, Array]:
     """Return a solid's surface edges (e, 2), their middle nodes (e,), mean outward normals (e, 3), and the creases."""
-    faces = solid.tet[:, TET_FACE].reshape(-1, 6)
-    _, first, count = np.unique(np.sort(faces[:, :3], axis=1), axis=0, return_index=True, return_counts=True)
-    outer = faces[np.sort(first[count == 1])]
+    outer = outer_faces(solid)
     normal = geometry.outward_normals(solid.node_m, outer[:, :3])
     middle, at, count = np.unique(outer[:, 3:].ravel(), return_inverse=True, return_counts=True)
     owner = np.repeat(np.arange(len(outer)), 3)

@@ -100,8 +100,8 @@ def largest_component(corner_m: Array, tet: Array) -> tuple[Array, int]:
     return tet[label == np.argmax(volume)], int(pieces)
 
 
-def surface(solid: Solid) -> SolidSurface:
-    """Extract the boundary of a solid: every face that belongs to one tetrahedron only, cut into four triangles."""
+def outer_faces(solid: Solid) -> Array:
+    """Return the faces (k, 6) that belong to one tetrahedron only: three corners, then the middles of 01, 12, 20."""
     faces = solid.tet[:, TET_FACE].reshape(-1, 6)
     key = np.sort(faces[:, :3], axis=1)
     order = np.lexsort(key.T)
@@ -110,7 +110,12 @@ def surface(solid: Solid) -> SolidSurface:
     single = np.ones(len(faces), bool)
     single[1:] &= ~same
     single[:-1] &= ~same
-    outer = faces[np.sort(order[single])]
+    return np.asarray(faces[np.sort(order[single])])
+
+
+def surface(solid: Solid) -> SolidSurface:
+    """Extract the boundary of a solid: every face that belongs to one tetrahedron only, cut into four triangles."""
+    outer = outer_faces(solid)
     triangle = outer[:, QUARTERS].reshape(-1, 3)
     node, face = np.unique(triangle, return_inverse=True)
     return SolidSurface(node, face.reshape(-1, 3).astype(np.int32))
