@@ -269,7 +269,9 @@ def _solve(
 
 def _percent(error: float) -> str:
     least_error = 1e-4  # relative, of a frequency: smaller errors are not distinguished
-    return f"about {100 * error:.2g} %" if error >= least_error else f"under {100 * least_error:g} %"
+    return (
+        f"about {100 * error:.{2 if error < 1 else 3}g} %" if error >= least_error else f"under {100 * least_error:g} %"
+    )
 
 
 def _arrays(unit: _Unit) -> dict[str, Array]:

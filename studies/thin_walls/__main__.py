@@ -112,7 +112,7 @@ def main() -> int:
     return 0 if held == len(rows) else 1
 
 
-HEAD = "| body | worst error | told, modes within it | pairs apart | time | memory | truth's coarse to fine |"
+HEAD = "| body | worst error | stated error, modes within it | pairs apart | time | memory | truth's coarse to fine |"
 
 
 def good(figures: dict[str, Any]) -> bool:

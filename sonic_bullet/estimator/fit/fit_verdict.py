@@ -107,7 +107,7 @@ def _mesh_warning(family: Family) -> list[str]:
         return []
     if np.isnan(family.error):
         return ["the mesh's error is not known: no coarser mesh could be made"]
-    return [f"the mesh may move gamma by about {2 * family.error:.1%}: its highest frequencies are half that uncertain"]
+    return [f"the mesh may move gamma by up to {2 * family.error:.1%}: its frequencies are up to half that uncertain"]
 
 
 def _decays_seen(evidence: tuple[RecordedObject, ...]) -> int:
