@@ -200,6 +200,7 @@ def described_render(
         "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in log.events],
         "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in log.changes],
         "supports": log.supports,
+        "image": log.image,
         "lifted": None if lifted is None else {name: list(of) for name, of in lifted.items()},
         "engine": dict(log.engine),
         "versions": dict(log.versions),

@@ -45,7 +45,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
 
     Parameters
     ----------
-    microphones, seed, air
+    microphones, seed, air, image
         As of `attach`.
     materials
         What sounds, found anew after every reset. A material: every link with a collision shape; those that cannot be
@@ -83,6 +83,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         step_s: float | None = None,
         seed: int = 0,
         air: Air | None = None,
+        image: bool = False,
         recording: ChainSpread | None = None,
         average: bool = False,
         joints: Mapping[Any, Mapping[Any, tuple[float, float]]] | None = None,
@@ -94,7 +95,14 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             "client": client,
             "step_s": step_s,
         }
-        given |= {"seed": seed, "air": air, "recording": recording, "average": average, "joints": joints}
+        given |= {
+            "seed": seed,
+            "air": air,
+            "image": image,
+            "recording": recording,
+            "average": average,
+            "joints": joints,
+        }
         RecordConstructorArgs.__init__(self, _disable_deepcopy=True, **given)
         gymnasium.Wrapper.__init__(self, env)
         self._options: dict[str, Any] = {
@@ -102,6 +110,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             "microphone": as_sensors(microphones, "microphones"),
             "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
             "air": None if air is None else as_kind(air, Air, "air", "give an Air, or leave it out"),
+            "image": as_flag(image, "image"),
         }
         if not self._options["microphone"]:
             raise AudioError("there is no microphone, so there is no sound to observe", "give microphones=(x, y, z)")

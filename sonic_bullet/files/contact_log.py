@@ -45,6 +45,8 @@ class ContactLog:
         Whether it is rendered with the residuals of materials.
     supports
         Whether it is rendered with the supports of resting bodies.
+    image
+        Whether it is rendered with the images of bodies in large flat faces.
     """
 
     bodies: tuple[Body, ...]
@@ -60,6 +62,7 @@ class ContactLog:
     changes: tuple[Change, ...] = ()
     residual: bool = True
     supports: bool = True
+    image: bool = False
 
     def __post_init__(self) -> None:
         """Check the fields and their order."""
@@ -79,6 +82,7 @@ class ContactLog:
             "changes": as_kinds(self.changes, Change, "log: changes", "give a tuple of Change", error=LogError),
             "residual": as_flag(self.residual, "log: residual"),
             "supports": as_flag(self.supports, "log: supports"),
+            "image": as_flag(self.image, "log: image"),
             "sr": as_whole(self.sr, "log: sr", "give a sample rate in Hz", least=1, error=LogError),
         }
         for name, value in checked.items():

@@ -145,6 +145,7 @@ class LogHeader(msgspec.Struct):
     changes: list[_Change] = []
     residual: bool = True
     supports: bool = False
+    image: bool = False
 
 
 def material_key(material: Material) -> bytes:

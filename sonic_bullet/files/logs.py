@@ -12,6 +12,7 @@ their own:
       contact_<field> (k, …)
           the fields of `Contacts`: a, b i4; point_a_m, point_b_m, normal, impulse_n_s, slip_m_s,
                                             sweep_m_s, approach_m_s, gap_m f8
+      body_flat_face_count (b,) i8, body_flat_face_m (r, 3, 3) f8   only where some body has such faces
       step_motion_count (s,) i8, motion_<field> (r, …)   only where a sensor is on a jointed body
           how its links move, the fields of `records.touching.link_motions.LINK_MOTION`
       body_inertia_kg_m2 (b, 3, 3) f8, body_curvature_per_m (b,) f8 (NaN: by the model's surface)
@@ -36,8 +37,8 @@ their own:
                      "body": index of the moved body, or null: all}
       changes (in the header)
           in order: {"step": the step before which it happened, "body": index, or null: the engine, "values": {…}}
-      of each body: dynamics, options, mounting, silent; of all: engine, versions, residual, supports (see `Body`,
-          `ContactLog`)
+      of each body: dynamics, options, mounting, silent; of all: engine, versions, residual, supports, image (see
+          `Body`, `ContactLog`)
 
 Steps are written and read by blocks (`step_entries`): a log may be larger than the memory.
 
@@ -74,6 +75,7 @@ from sonic_bullet.files.log_header import (
 )  # fmt: skip
 from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalled_models, unpack_models
 from sonic_bullet.files.reading import reading
+from sonic_bullet.files.rows.flat_face_entries import face_arrays, taken_faces
 from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
 from sonic_bullet.files.rows.surface_forms import track_arrays, unpack_form
 from sonic_bullet.records import Air, Array, Material, ModalModel
@@ -114,6 +116,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
         changes=[pack_change(change) for change in log.changes],
         residual=bool(log.residual),
         supports=bool(log.supports),
+        image=bool(log.image),
     )
     arrays: dict[str, Array | Column] = {
         **step_entries(log._steps),
@@ -123,7 +126,7 @@ def write_log(path: str | os.PathLike[str], log: ContactLog, models: object = "i
             float
         ),
     }
-    arrays |= model_arrays | sensor_arrays(log.sensors)
+    arrays |= model_arrays | sensor_arrays(log.sensors) | face_arrays(log.bodies)
     for i, material in enumerate(materials):
         if material.residual is not None:
             arrays |= {f"residual{i}_{name}": getattr(material.residual, name) for name in RESIDUAL_ARRAYS}
@@ -153,6 +156,7 @@ def _unpack_log(
     header: LogHeader, arrays: Mapping[str, Array], kept: Mapping[int, ModalModel], path: object
 ) -> ContactLog:
     b, n = len(header.bodies), len(header.materials)
+    faces = taken_faces(arrays, b, path)
     inertia = take(arrays, "body_inertia_kg_m2", float, (b, 3, 3), path)
     curvature = take(arrays, "body_curvature_per_m", float, (b,), path)
     stiffness = take(arrays, "material_stiffness_pa", float, (n, 6, 6), path)
@@ -175,6 +179,7 @@ def _unpack_log(
             model=pick(models, x.model, path),
             inertia_kg_m2=inertia[i],
             curvature_per_m=float(curvature[i]),
+            flat_faces_m=faces[i],
         )
         for i, x in enumerate(header.bodies)
     ]
@@ -191,4 +196,5 @@ def _unpack_log(
         changes=tuple(unpack_change(change) for change in header.changes),
         residual=header.residual,
         supports=header.supports,
+        image=header.image,
     )

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.listener.frames import Roster, rows_of
 from sonic_bullet.listener.start import start_table
 from sonic_bullet.records import Array, Body, Material, ModalModel, Shape
@@ -117,7 +118,10 @@ def sounding_body(
     volume = volume_m3 if volume_m3 is not None else (model.volume_m3 if model else 0.0)
     held = usual_mounting(record.mass_kg) if mounting is None else mounting
     record = replace(record, material=material, model=model, volume_m3=volume, options=options, mounting=held)
-    return replace(record, curvature_per_m=only_curvature(shapes)) if shapes else record
+    if not shapes:
+        return record
+    faces = flat_faces(shapes) if record.mass_kg == 0 else record.flat_faces_m
+    return replace(record, curvature_per_m=only_curvature(shapes), flat_faces_m=faces)
 
 
 def only_curvature(shapes: Sequence[Shape]) -> float:

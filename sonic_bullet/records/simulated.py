@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
+import numpy as np
+
 from sonic_bullet.records.arrays import Array, frozen_array, store
 from sonic_bullet.records.bodies import Material, ModalModel
 from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_text, as_whole, shown
@@ -91,6 +93,9 @@ class Body:
         No sensor receives it; it vibrates and touches as before.
     gain_db
         Gain of its sound at all sensors.
+    flat_faces_m : Array, shape (k, 3, 3)
+        Of a body that does not move, its large flat faces, which mirror sound, in its frame: middle and two half sides,
+        whose product is outward.
     """
 
     body_id: int
@@ -110,6 +115,7 @@ class Body:
     mounting: Mounting = "free"
     silent: bool = False
     gain_db: float = 0.0
+    flat_faces_m: Array = field(default_factory=lambda: np.zeros((0, 3, 3)))
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -127,6 +133,7 @@ class Body:
             as_kind(self.options, ModalOptions, f"{where}: options", "give ModalOptions, or none")
         store(self, mounting=as_mounting(self.mounting, f"{where}: mounting"))
         as_flag(self.silent, f"{where}: silent")
+        store(self, flat_faces_m=frozen_array(self.flat_faces_m, float, (None, 3, 3), f"{where}: flat_faces_m"))
         store(self, gain_db=as_number(self.gain_db, f"{where}: gain_db", "give a level in dB", least=-200, most=200))
 
     @property

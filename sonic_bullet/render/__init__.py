@@ -109,7 +109,7 @@ def render_blocks(
         return _blocks(log, _synthesizer(log, residual), progress, say)
     plan = room_of(room, log)
     log = replace(log, sensors=plan.sensors)
-    return add_room(plan, _blocks(log, _synthesizer(log, residual, plan.mixing), progress, say))
+    return add_room(plan, _blocks(log, _synthesizer(log, residual, plan), progress, say))
 
 
 def _checked(log: ContactLog, sr: object, residual: object, progress: Any, say: Any) -> tuple[ContactLog, bool]:
@@ -151,7 +151,7 @@ def render_kept(
     log, residual = _checked(log, sr, residual, progress, say)
     if plan is not None:
         log = replace(log, sensors=plan.sensors)
-    synth = _synthesizer(log, residual, None if plan is None else plan.mixing)
+    synth = _synthesizer(log, residual, plan)
     spool = SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing))
     try:
         for block in _blocks(log, synth, progress, say):
@@ -183,10 +183,10 @@ def _blocks(
     yield synth.rest()
 
 
-def _synthesizer(log: ContactLog, residual: bool, mixing: Array | None = None) -> Synthesizer:
+def _synthesizer(log: ContactLog, residual: bool, room: RoomPlan | None = None) -> Synthesizer:
     return Synthesizer(
         sr=log.sr, sensors=log.sensors, seed=log.seed, air=log.air, residual=residual, supports=log.supports,
-        mixing=mixing, keep=False,
+        image=log.image, room=room, keep=False,
     )  # fmt: skip
 
 

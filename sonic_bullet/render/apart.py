@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
+from sonic_bullet.render.images.body_images import completed
 from sonic_bullet.render.presence import admit, release
 from sonic_bullet.render.ringing_on import ring_on
 from sonic_bullet.render.synthesis_state import Setup, Witness, start
@@ -21,6 +22,7 @@ from sonic_bullet.render.synthesizer import LOOK_EVERY, advance, clock_after, dr
 
 if TYPE_CHECKING:
     from sonic_bullet.records.contacts import Step
+    from sonic_bullet.render.room.room_plan import RoomPlan
 
 
 def render_apart(
@@ -29,7 +31,7 @@ def render_apart(
     sr: int | None = None,
     frames: int | None = None,
     witness: Witness | None = None,
-    mixing: Array | None = None,
+    room: RoomPlan | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[Array, Array]]:
@@ -44,8 +46,8 @@ def render_apart(
         Number of samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end.
     witness
         Observer that is called with every step.
-    mixing
-        As of `Setup`.
+    room
+        What it is in.
     progress, say
         As of `render_log`, and so are errors.
     """
@@ -55,8 +57,9 @@ def render_apart(
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     make_radiation_known(log, say)
     setup = Setup(
-        log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports, mixing=mixing
+        log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports, room=room
     )
+    setup = completed(setup, image=log.image)
     state = start(setup)
     state.witness = witness
     quenches, done, looked, last = quenched_steps(log), 0, 0, None

@@ -23,6 +23,7 @@ from sonic_bullet.machine.grouping import grouping
 from sonic_bullet.render.contact_rows import enter_loads, orient
 from sonic_bullet.render.friction import advance_friction
 from sonic_bullet.render.groups import Groups
+from sonic_bullet.render.images.image_gains import image_gains
 from sonic_bullet.render.standing.held_contacts import choose_bodies, count_lifted, hold_contacts
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
 from sonic_bullet.synth.bank import bank_kernel
@@ -210,10 +211,9 @@ def finish(i, number, x, given, frames, window, scratch, path):  # pragma: no co
     step, here, there = given.steps[i], number % SPAN, (number + 1) % SPAN
     at, aim_m, out, reads = step.sample - frames.start, given.aim_m, frames.out, frames.reads
     emission = Emission(scratch.source, scratch.pushed, np.int64(0), frames.sets)
-    course = Course(
-        window.position_m[here], window.position_m[there], window.teleported[there], x,
-        aim_m[i : i + 2] if len(aim_m) > 0 else aim_m,
-    )  # fmt: skip
+    aim_m = aim_m[i : i + 2] if len(aim_m) > 0 else aim_m
+    gain = image_gains((here, there), window, aim_m, path.microphone_m)
+    course = Course(window.position_m[here], window.position_m[there], window.teleported[there], x, aim_m, gain)
     arrivals = Arrivals(frames.pressure, at, frames.apart)
     status = hear(step.sample, number, step.count, emission, course, path, np.zeros(WORK), arrivals)
     if status != DONE:

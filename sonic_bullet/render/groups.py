@@ -59,13 +59,15 @@ class Frames(NamedTuple):
 
 
 class WindowTables(NamedTuple):
-    """The last SPAN steps: fields of `synthesis_state.Window`."""
+    """The last SPAN steps: fields of `synthesis_state.Window`; and faces that mirror: of `body_images.BodyImages`."""
 
     step: Array
     position_m: Array
     quaternion_xyzw: Array
     teleported: Array
     row: Array
+    images: Array
+    has_image: Array
 
 
 class BodyTables(NamedTuple):

@@ -14,11 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.records import Array, Body, Microphone
+from sonic_bullet.records import Array, Body
 from sonic_bullet.records.contacts import Step, first_bodies
 from sonic_bullet.records.errors import LogError
+from sonic_bullet.render.images.body_images import admit_faces, own_microphones
 from sonic_bullet.render.space.inside import check_outside
-from sonic_bullet.render.synthesis_state import Setup, State, StepScratch, with_bodies
+from sonic_bullet.render.synthesis_state import Setup, State, with_bodies
+from sonic_bullet.render.tables import StepScratch
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.strikes import SPAN
 
@@ -42,11 +44,14 @@ def admit(setup: Setup, state: State, step: Step, bodies: Records) -> None:
         )
     if len(coming):
         records, place, turned = [bodies[i] for i in coming.tolist()], step.position_m[new], step.quaternion_xyzw[new]
-        check_outside([one for one in setup.sensors if isinstance(one, Microphone)], records, place, turned)
+        check_outside(own_microphones(setup), records, place, turned)
         with_bodies(setup, state, records, place, turned)
         if state.space is not None:
             state.space.with_bodies(place, turned)
         state.newest = int(coming[-1])
+    admit_faces(
+        setup, state, step, [bodies[i] for i in coming.tolist()], (step.position_m[new], step.quaternion_xyzw[new])
+    )
     _name(state, np.concatenate([state.body, coming]))
     state.present = state.body if len(step.body) == len(state.body) else step.body
 
@@ -125,7 +130,7 @@ def subset(state: State, keep: Array) -> None:
     state.stand = state.stand[keep]
     state.travelling = path.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
-    for part in (state.space, state.surface, state.directions):
+    for part in (state.space, state.surface, state.directions, state.images):
         if part is not None:
             part.subset(keep)
     state.pairs.subset(number)

@@ -32,7 +32,8 @@ from sonic_bullet.synth.bank import ModeSet, audible
 from sonic_bullet.synth.pulse import pulse_spectrum
 
 if TYPE_CHECKING:
-    from sonic_bullet.render.synthesis_state import Setup, State, StepScratch
+    from sonic_bullet.render.synthesis_state import Setup, State
+    from sonic_bullet.render.tables import StepScratch
 
 Rubs = Mapping[tuple[int, int, int], Rubbed]
 """By lower body, higher body and side: the force so far."""

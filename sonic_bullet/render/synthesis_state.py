@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -19,13 +19,14 @@ from sonic_bullet.render import resonator
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.friction import surface_seed
 from sonic_bullet.render.groups import Groups
+from sonic_bullet.render.images.body_images import BodyImages, start_images
 from sonic_bullet.render.residual_voice import ResidualVoice, Rubs, build_residual_voice, with_lines
 from sonic_bullet.render.resonator import Resonator, build_resonator, read_sets, weight_set_count
 from sonic_bullet.render.space.directions import Directions
 from sonic_bullet.render.space.space_state import SpaceState, is_spatial
 from sonic_bullet.render.standing.held_contacts import HELD, SAVED_S, STAND
 from sonic_bullet.render.surface.surface_state import SurfaceState, start_surface
-from sonic_bullet.render.tables import PAIR, PULSE, ROW, WINDOW
+from sonic_bullet.render.tables import PAIR, ROW, WINDOW, StepScratch
 from sonic_bullet.residual.player import Grain
 from sonic_bullet.synth import bank, path
 from sonic_bullet.synth.bank import Bank, BankState
@@ -33,14 +34,18 @@ from sonic_bullet.synth.clock import Clock
 from sonic_bullet.synth.path import Path, PathState
 from sonic_bullet.synth.strikes import SPAN
 
+if TYPE_CHECKING:
+    from sonic_bullet.render.room.room_plan import RoomPlan
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
     """Constants of listening.
 
-    sr in Hz; sensors; residual: whether those of materials sound; supports: whether resting contacts
-    act on modes; apart: whether frames are (b·channels, n), body by body, instead of their sum; mixing (channels,
-    channels of the sensors): what of them is summed to what is returned, None: each is.
+    sr in Hz; sensors; residual: whether those of materials sound; supports: whether resting contacts act on modes;
+    apart: whether frames are (b·channels, n), body by body, not their sum; room: what it is in; mixing (channels,
+    channels of the sensors): what of them is summed to what is returned; imaged: of how many microphones the last
+    sensors are images.
     """
 
     sr: int
@@ -51,7 +56,9 @@ class Setup:
     residual: bool = True
     apart: bool = False
     supports: bool = True
+    room: RoomPlan | None = None
     mixing: Array | None = None
+    imaged: int = 0
 
     @property
     def microphone_m(self) -> Array:
@@ -160,47 +167,6 @@ class TouchingPairs:
 
 
 @dataclass(slots=True, eq=False)
-class StepScratch:
-    """Scratch of one step.
-
-    count (2,): its pulses and drives. pulse (p,) PULSE with push (p, 2, columns); drives d: force (d·n,), gain0, gain1
-    (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), pushed (b, 3, n), sounds
-    (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
-    """
-
-    count: Array = field(default_factory=lambda: np.zeros(2, np.int64))
-    pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
-    push: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
-    force: Array = field(default_factory=lambda: np.zeros(0))
-    gain0: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
-    gain1: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
-    direction0: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    direction1: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    body: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    slot: Array = field(default_factory=lambda: np.zeros(0, np.int64))
-    source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
-    passed: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
-    pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
-    sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    samples: int = -1  # capacity in samples
-
-    def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
-        """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
-        samples = self.samples = max(self.samples, samples)  # steps of no whole number of samples differ by one
-        if len(self.slot) < drives or self.push.shape[2] != columns:
-            drives = max(drives, 2 * len(self.slot))
-            self.pulse, self.push = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
-            self.gain0, self.gain1 = np.zeros((2, drives, 2, columns))
-            self.direction0, self.direction1 = np.zeros((2, drives, 3))
-            self.body, self.slot = np.zeros((drives, 2), np.int64), np.zeros(drives, np.int64)
-        if len(self.force) < len(self.slot) * samples:
-            self.force = np.zeros(len(self.slot) * samples)
-        if self.source.shape[:2] != shape or self.source.shape[2] < samples:
-            self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
-            self.sounds, self.passed = np.zeros((shape[1], 2), np.int64), np.zeros((*shape, samples))
-
-
-@dataclass(slots=True, eq=False)
 class State:
     """All that the next frame depends on.
 
@@ -211,7 +177,8 @@ class State:
     rings, then one at a time. stand (b,) STAND: support state; credit_s (1,): time left for new poles, (0,) where
     nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces;
     directions: of microphones with directivity; sets (c,): the weight set of each microphone. lifted: of bodies that
-    left, by name, the steps that they rang on contacts, and those with contact separation.
+    left, by name, the steps that they rang on contacts, and those with contact separation. images: of bodies in faces
+    (images/).
     """
 
     window: Window
@@ -243,6 +210,7 @@ class State:
     surface: SurfaceState | None = None
     directions: Directions | None = None
     sets: Array = field(default_factory=lambda: np.zeros(0, np.int64))
+    images: BodyImages = field(default_factory=BodyImages)
     _tables: tuple[Any, ...] | None = None
 
     @property
@@ -258,8 +226,9 @@ class State:
         """Return the driver's tables: all groups of `Groups` that are the state's, flat."""
         if self._tables is None:
             holders = {
-                "window": (self.window,), "table": (self.table,), "pairs": (self.pairs,), "supports": (self,),
-                "bank": (self.ringing, self.bank), "scratch": (self.scratch,), "path": (self.path, self.travelling),
+                "window": (self.window, self.images), "table": (self.table,), "pairs": (self.pairs,),
+                "supports": (self,), "bank": (self.ringing, self.bank), "scratch": (self.scratch,),
+                "path": (self.path, self.travelling),
             }  # fmt: skip
             kinds = kinds_of(Groups).items()
             self._tables = tuple(x for name, kind in kinds if name in holders for x in gather(kind, *holders[name]))
@@ -278,7 +247,7 @@ class State:
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
             self.reads, self.has_residual, self.witness, self.stand.copy(), self.credit_s.copy(), dict(self.lifted),
             self.space and self.space.copy(), self.surface and self.surface.copy(),
-            self.directions and self.directions.copy(), self.sets,
+            self.directions and self.directions.copy(), self.sets, self.images.copy(),
         )  # fmt: skip
 
 
@@ -305,9 +274,9 @@ def start(setup: Setup) -> State:
     )
     state.space = SpaceState(setup.sensors, setup.sr, setup.air) if is_spatial(setup.sensors) else None
     state.surface = start_surface(setup.sensors, setup.sr, setup.seed, apart=setup.apart)
-    state.sets = resonator.microphone_sets(setup.sensors)
-    hears = resonator.directional(setup.sensors)
-    state.directions = Directions(hears) if hears else None
+    state.sets, state.images = resonator.microphone_sets(setup.sensors), start_images(setup)
+    if hears := resonator.directional(setup.sensors):
+        state.directions = Directions(hears)
     return state
 
 

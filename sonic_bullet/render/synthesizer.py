@@ -22,9 +22,11 @@ from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.render import driver
 from sonic_bullet.render.first_run import make_driver
 from sonic_bullet.render.groups import DriverCall, Frames, StepTables
+from sonic_bullet.render.images.body_images import completed
 from sonic_bullet.render.presence import Records, admit, in_tables, lifted, release
 from sonic_bullet.render.residual_voice import add_residuals
 from sonic_bullet.render.ringing_on import with_tail
+from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.space.directions import take_aim, until_turned
 from sonic_bullet.render.space.space_state import hears_apart
 from sonic_bullet.render.standing.supports import settle
@@ -193,18 +195,11 @@ class Synthesizer:
     """
 
     def __init__(
-        self,
-        *,
-        sr: int,
-        sensors: tuple[Sensor, ...],
-        seed: int,
-        air: Air,
-        residual: bool = True,
-        supports: bool = True,
-        mixing: Array | None = None,
-        keep: bool = True,
-    ) -> None:
-        self._setup = Setup(sr, sensors, seed, air, residual=residual, supports=supports, mixing=mixing)
+        self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True,
+        supports: bool = True, image: bool = False, room: RoomPlan | None = None, keep: bool = True,
+    ) -> None:  # fmt: skip
+        setup = Setup(sr, sensors, seed, air, residual=residual, supports=supports, room=room)
+        self._setup = completed(setup, image=image)
         self._keep = keep
         self.reset()
 

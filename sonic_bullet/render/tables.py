@@ -11,14 +11,17 @@ bulk when they are filled. Sides are 0 = the pair's lower body and 1 = the highe
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from sonic_bullet.geometry.nearest_point import FACE, NODE
+from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import CONTACT
 from sonic_bullet.records.roughness import OCTAVES
 from sonic_bullet.synth.strikes import SPAN
 
-__all__ = ["BODY", "CONTACT", "FACE", "HISTORY", "NODE", "PAIR", "PULSE", "ROW"]
+__all__ = ["BODY", "CONTACT", "FACE", "HISTORY", "NODE", "PAIR", "PULSE", "ROW", "StepScratch"]
 
 HISTORY = 2 * SPAN - 1
 """Steps of load that are stored for a pair; column SPAN - 1 is the step being rendered."""
@@ -145,3 +148,44 @@ PULSE = np.dtype(
     align=True,
 )
 """One strike. Its Uᵀj on both bodies' columns stands beside it in an array (pulses, 2, columns)."""
+
+
+@dataclass(slots=True, eq=False)
+class StepScratch:
+    """Scratch of one step.
+
+    count (2,): its pulses and drives. pulse (p,) PULSE with push (p, 2, columns); drives d: force (d·n,), gain0, gain1
+    (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), pushed (b, 3, n), sounds
+    (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
+    """
+
+    count: Array = field(default_factory=lambda: np.zeros(2, np.int64))
+    pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
+    push: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    force: Array = field(default_factory=lambda: np.zeros(0))
+    gain0: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    gain1: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    direction0: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    direction1: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    body: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    slot: Array = field(default_factory=lambda: np.zeros(0, np.int64))
+    source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
+    passed: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
+    pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
+    sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    samples: int = -1  # capacity in samples
+
+    def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
+        """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
+        samples = self.samples = max(self.samples, samples)  # steps of no whole number of samples differ by one
+        if len(self.slot) < drives or self.push.shape[2] != columns:
+            drives = max(drives, 2 * len(self.slot))
+            self.pulse, self.push = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
+            self.gain0, self.gain1 = np.zeros((2, drives, 2, columns))
+            self.direction0, self.direction1 = np.zeros((2, drives, 3))
+            self.body, self.slot = np.zeros((drives, 2), np.int64), np.zeros(drives, np.int64)
+        if len(self.force) < len(self.slot) * samples:
+            self.force = np.zeros(len(self.slot) * samples)
+        if self.source.shape[:2] != shape or self.source.shape[2] < samples:
+            self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
+            self.sounds, self.passed = np.zeros((shape[1], 2), np.int64), np.zeros((*shape, samples))

@@ -24,6 +24,7 @@ def attach(
     seed: int = 0,
     air: Air | None = None,
     supports: bool = True,
+    image: bool = False,
     keep_log: bool = True,
     keep_sound: bool = True,
 ) -> Listener:
@@ -47,6 +48,9 @@ def attach(
     supports
         Whether resting contacts damp a body and transmit vibration; without, it vibrates as a free body, and costs
         less.
+    image
+        Whether large flat faces of bodies that do not move (planes, boards, walls) mirror the sound before them, up to
+        +6 dB near them; three of each microphone at a time.
     keep_log, keep_sound
         Whether `contacts`, and `sound` and `write`, will be used. Data of a long run are in a nameless temporary file
         (in TMPDIR, else in /tmp), removed with the listener.
@@ -64,7 +68,7 @@ def attach(
     director = direction()
     if director is not None:
         how = director.attached(how)
-    made = Listener(client, sr=sr, **how, supports=supports, keep_log=keep_log, keep_sound=keep_sound)
+    made = Listener(client, sr=sr, **how, supports=supports, image=image, keep_log=keep_log, keep_sound=keep_sound)
     if director is not None:
         director.listens(made)
     return made

@@ -57,6 +57,7 @@ class Listener:
         seed: int,
         air: Air,
         supports: bool = True,
+        image: bool = False,
         keep_log: bool = True,
         keep_sound: bool = True,
     ) -> None:
@@ -68,8 +69,8 @@ class Listener:
         self.world.silence(current_choice().silent)
         self.world.logged = keep_log = as_flag(keep_log, "keep_log")
         self.keeps_sound = keep = as_flag(keep_sound, "keep_sound")
-        how: dict[str, Any] = {"sr": self.sr, "sensors": self.sensors, "seed": self.seed, "air": self.air}
-        how["supports"] = self.supports = as_flag(supports, "supports")
+        self.supports, self.image = as_flag(supports, "supports"), as_flag(image, "image")
+        how = {name: getattr(self, name) for name in ("sr", "sensors", "seed", "air", "supports", "image")}
         self._synth = Synthesizer(**how, keep=keep)
         self._playback: Playback | None = None
         self._attached = True
@@ -279,7 +280,7 @@ class Listener:
         return ContactLog(
             tuple(world.bodies), self._kept.steps(), self.sensors, self.sr, self.seed, self.air, world.untouched,
             tuple(self._kept.events), simulator.engine, {**versions, **simulator.versions}, simulator.changes,
-            supports=self.supports,
+            supports=self.supports, image=self.image,
         )  # fmt: skip
 
     @property

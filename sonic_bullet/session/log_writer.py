@@ -29,7 +29,7 @@ class LogWriter:
     ----------
     sr
         Sample rate in Hz that the log asks for.
-    microphone, seed, air, supports
+    microphone, seed, air, supports, image
         As of `attach`.
 
     Raises
@@ -46,10 +46,12 @@ class LogWriter:
         seed: int = 0,
         air: Air | None = None,
         supports: bool = True,
+        image: bool = False,
     ) -> None:
         self._sensors = as_sensors(microphone)
         self._world = ArrayWorld()
-        how: dict[str, Any] = {"sr": sr, "seed": seed, "air": Air() if air is None else air, "supports": supports}
+        how: dict[str, Any] = {"sr": sr, "seed": seed, "air": Air() if air is None else air}
+        how |= {"supports": supports, "image": image}
         self._listener = Listener(self._world, sensors=(), keep_sound=False, **how)
 
     def add(

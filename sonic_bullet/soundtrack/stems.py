@@ -60,12 +60,10 @@ def render_stems(
     if not log.sensors:
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
     who = [index for index, body in enumerate(log.bodies) if body.model is not None]
-    mixing, sounding = None, log
-    if plan is not None:
-        mixing, sounding = plan.mixing, replace(log, sensors=plan.sensors)
-    spools = {index: SoundSpool(channels_of(log.sensors) if mixing is None else len(mixing)) for index in who}
+    sounding = log if plan is None else replace(log, sensors=plan.sensors)
+    spools = {index: SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing)) for index in who}
     for body, frame in render_apart(
-        sounding, sr=sr, frames=frames, witness=witness, mixing=mixing, progress=progress, say=say
+        sounding, sr=sr, frames=frames, witness=witness, room=plan, progress=progress, say=say
     ):
         there = dict(zip(body.tolist(), frame, strict=True))
         nothing = np.zeros(frame.shape[1:])

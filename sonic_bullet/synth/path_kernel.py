@@ -42,6 +42,8 @@ WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
 """Doubles of scratch that `hear` uses."""
 AT_REST = np.zeros((0, 0, 0, 3))
 """``aim_m`` where no microphone moves."""
+ALL_ALIKE = np.zeros((0, 0, 0))
+"""``gain`` where all sound reaches each microphone as it is."""
 
 
 class _Work(NamedTuple):
@@ -201,6 +203,24 @@ def _emit(b, w, first, n, emission, x, fade, work):  # pragma: no cover - compil
 
 
 @njit(nogil=True, error_model="numpy")
+def _weaken(emitted, gains, x, first, n):  # pragma: no cover - compiled
+    """Multiply what is emitted by factors that go from one to the other over the step."""
+    if gains[0] != 1.0 or gains[1] != 1.0:
+        for i in range(n):
+            emitted[i] *= gains[0] + (gains[1] - gains[0]) * x[first + i]
+        flush(emitted, 0, n)
+
+
+@njit(nogil=True, error_model="numpy")
+def _gains(gain, b, c, fade):  # pragma: no cover - compiled
+    """Return the factors at a step's ends of what body b emits to microphone c; fading, it is at one place."""
+    if len(gain) == 0:
+        return 1.0, 1.0
+    begin = gain[1, b, c] if fade == 1 else gain[0, b, c]
+    return begin, gain[0, b, c] if fade == -1 else gain[1, b, c]
+
+
+@njit(nogil=True, error_model="numpy")
 def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR0912  # pragma: no cover - compiled
     """Compute the pressure (Pa) at samples at … at + n - 1 of the step into an `Arrivals`.
 
@@ -243,8 +263,8 @@ def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR09
             present, moved = p == body.main, body.left == step
             fade = (1 if present else (-1 if p == body.leaving else 2)) if moved else (0 if present else 2)
             for c in range(channels):
-                line = path.lines[p * channels + c]
-                if line.awake == 0 and (fade == 2 or body.sounds == 0):
+                line, gains = path.lines[p * channels + c], _gains(course.gain, b, c, fade)
+                if line.awake == 0 and (fade == 2 or body.sounds == 0 or (gains[0] == 0.0 and gains[1] == 0.0)):
                     continue
                 for axis in range(3):
                     stop = end_m[b, axis] if present else place.rest_m[axis]
@@ -260,6 +280,7 @@ def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR09
                     count = count if count < BLOCK else BLOCK
                     count = count if count < n - lo else n - lo
                     steep = _emit(b, emission.sets[c], first + lo, count, emission, course.x, fade, work)
+                    _weaken(work.emitted, gains, course.x, first + lo, count)
                     if _listen(line, at + lo, count, steep, ring, path.taps, work):
                         row = (b * channels if apart else 0) + c
                         add(work.observed, out, row * out.shape[1] + arrivals.at + lo, count)

@@ -94,6 +94,7 @@ class Course(NamedTuple):
     x : (·) position of each sample between the step's ends, 0 … 1, from column `Emission.first` on
     aim_m : (2, b, c, 3) place of each microphone when it receives what a body emits at the step's ends; (0, …): as
         microphone_m
+    gain : (2, b, c) factor of what a body emits to a microphone at the step's ends; (0, …): 1
     """
 
     begin_m: Array
@@ -101,6 +102,7 @@ class Course(NamedTuple):
     teleported: Array
     x: Array
     aim_m: Array
+    gain: Array
 
 
 class Arrivals(NamedTuple):
@@ -118,6 +120,27 @@ def _awake(lines, place, channels):  # pragma: no cover - compiled
     while line < stop and lines[line].awake == 0:
         line += 1
     return line < stop
+
+
+@njit(nogil=True, error_model="numpy")
+def _squares(course, microphone_m, b, c):  # pragma: no cover - compiled
+    """Compute the square of the distance of body b from microphone c at the step's ends."""
+    begin_m, end_m, aim_m = course.begin_m, course.end_m, course.aim_m
+    here, there = 0.0, 0.0
+    for axis in range(3):
+        u, v = begin_m[b, axis] - microphone_m[c, axis], end_m[b, axis] - microphone_m[c, axis]
+        if len(aim_m) > 0:
+            u, v = begin_m[b, axis] - aim_m[0, b, c, axis], end_m[b, axis] - aim_m[1, b, c, axis]
+        here += u * u
+        there += v * v
+    return here, there
+
+
+@njit(nogil=True, error_model="numpy")
+def _hears(lines, body, c, channels):  # pragma: no cover - compiled
+    """Test whether sound of a body's present or last place is under way to microphone c."""
+    left = body.leaving >= 0 and lines[body.leaving * channels + c].awake != 0
+    return left or lines[body.main * channels + c].awake != 0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -156,9 +179,8 @@ def survey(step, n, emission, course, path):  # pragma: no cover - compiled
 
     The distance of what emits is greatest at an end of the step. Silence needs no fade: a silent body keeps its place.
     """
-    begin_m, end_m, aim_m, microphone_m = course.begin_m, course.end_m, course.aim_m, path.microphone_m
+    gain, channels, long = course.gain, len(path.microphone_m), emission.source.shape[2]
     sources, places, lines, first = path.sources, path.places, path.lines, emission.first
-    channels, long = len(microphone_m), emission.source.shape[2]
     free, wrong = np.int64(0), DONE  # a plain 0 has its own type, and each callee would be compiled for it too
     for b in range(len(sources)):
         body = sources[b]
@@ -168,13 +190,9 @@ def survey(step, n, emission, course, path):  # pragma: no cover - compiled
         body.sounds, body.fresh, body.away_m = 1 if most > 0 else 0, -1, 0.0
         start, stop = 0.0, 0.0
         for c in range(channels):
-            here, there = 0.0, 0.0
-            for axis in range(3):
-                u, v = begin_m[b, axis] - microphone_m[c, axis], end_m[b, axis] - microphone_m[c, axis]
-                if len(aim_m) > 0:
-                    u, v = begin_m[b, axis] - aim_m[0, b, c, axis], end_m[b, axis] - aim_m[1, b, c, axis]
-                here += u * u
-                there += v * v
+            if len(gain) > 0 and gain[0, b, c] == 0.0 and gain[1, b, c] == 0.0 and not _hears(lines, body, c, channels):
+                continue
+            here, there = _squares(course, path.microphone_m, b, c)
             start, stop = start if here <= start else here, stop if there <= stop else there
         main, old = body.main, -1
         observed = body.sounds == 1 or _awake(lines, main, channels)

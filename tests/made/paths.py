@@ -7,7 +7,7 @@ import numpy as np
 from sonic_bullet.machine.grouping import gather
 from sonic_bullet.records import Array
 from sonic_bullet.synth.path import Path, PathState, grow
-from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear
+from sonic_bullet.synth.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
 from sonic_bullet.synth.path_places import DONE, Arrivals, Course, Emission, PathTables
 
 
@@ -37,7 +37,7 @@ def propagate(
     out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
     moved = np.ascontiguousarray(teleported, bool)
     while True:
-        course = Course(position0_m, position1_m, moved, progress, AT_REST)
+        course = Course(position0_m, position1_m, moved, progress, AT_REST, ALL_ALIKE)
         tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
         status = hear(
             state.at,

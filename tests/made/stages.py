@@ -12,6 +12,7 @@ from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.render.body_table import BodyTable
 from sonic_bullet.render.contact_rows import enter_loads, orient
 from sonic_bullet.render.groups import BodyTables, PairTables, WindowTables
+from sonic_bullet.render.images.image_gains import IMAGE
 from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.render.standing.held_contacts import HELD
 from sonic_bullet.render.strike_pulses import STRIKE, find_pulses
@@ -44,7 +45,7 @@ class Stages:
         self.bodies, b = gather(BodyTables, self.table), len(bodies)
         self.window = WindowTables(
             np.zeros(SPAN, WINDOW), np.zeros((SPAN, b, 3)), np.zeros((SPAN, b, 4)), np.zeros((SPAN, b), bool),
-            np.zeros(SPAN * rows, ROW),
+            np.zeros(SPAN * rows, ROW), np.zeros(0, IMAGE), np.zeros(0, np.int64),
         )  # fmt: skip
         self.pairs = PairTables(
             np.zeros(pairs, PAIR), np.zeros(pairs, np.int64), np.array([0, pairs]), np.arange(pairs),

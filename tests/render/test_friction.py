@@ -8,6 +8,7 @@ import pytest
 from sonic_bullet.records import Array
 from sonic_bullet.render.friction import FOLLOW_S, advance_friction
 from sonic_bullet.render.groups import BodyTables, PairTables, WindowTables
+from sonic_bullet.render.images.image_gains import IMAGE
 from sonic_bullet.render.standing.held_contacts import HELD
 from sonic_bullet.render.tables import BODY, FACE, NODE, PAIR, PULSE, ROW, TURN, WINDOW
 from sonic_bullet.synth.bank.layout import ScratchTables
@@ -61,7 +62,7 @@ class Table:
         }
         window = WindowTables(
             np.zeros(SPAN, WINDOW), np.zeros((SPAN, 2, 3)), np.tile([0, 0, 0, 1.0], (SPAN, 2, 1)),
-            np.zeros((SPAN, 2), bool), rows,
+            np.zeros((SPAN, 2), bool), rows, np.zeros(0, IMAGE), np.zeros(0, np.int64),
         )  # fmt: skip
         window.step["dt_s"], window.step["row"] = DT_S, (0, len(rows))
         table = BodyTables(

@@ -12,7 +12,8 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.grouping import gather, grouping, kinds_of
 from sonic_bullet.records import Air, Microphone
 from sonic_bullet.render.groups import DriverCall, Frames, Groups, StepTables
-from sonic_bullet.render.synthesis_state import Setup, State, StepScratch, TouchingPairs, Window, start
+from sonic_bullet.render.synthesis_state import Setup, State, TouchingPairs, Window, start
+from sonic_bullet.render.tables import StepScratch
 from sonic_bullet.synth.bank import BankState
 from sonic_bullet.synth.path import PathState
 
@@ -76,7 +77,7 @@ def test_values_of_the_state_stand_in_the_order_of_the_groups_fields() -> None:
     assert tuple(kinds) == Groups._fields and list(kinds.values())[:3] == [DriverCall, StepTables, Frames]
     values = iter(state.tables())
     holders = {
-        "window": [state.window], "table": [state.table], "pairs": [state.pairs], "supports": [state],
+        "window": [state.window, state.images], "table": [state.table], "pairs": [state.pairs], "supports": [state],
         "bank": [state.ringing, state.bank], "scratch": [state.scratch], "path": [state.path, state.travelling],
     }  # fmt: skip
     checked = 0
@@ -86,7 +87,7 @@ def test_values_of_the_state_stand_in_the_order_of_the_groups_fields() -> None:
             value = next(values)
             assert is_same(value, held[0]), (name, field)
             checked += 1
-    assert next(values, None) is None and checked == 64
+    assert next(values, None) is None and checked == 66
 
 
 def test_no_table_is_left_out() -> None:

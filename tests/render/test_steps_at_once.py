@@ -15,7 +15,7 @@ from sonic_bullet.records import Array, Body, Microphone, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render import Synthesizer, render_log
-from sonic_bullet.render.synthesis_state import StepScratch
+from sonic_bullet.render.tables import StepScratch
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_body, row, wall_body
 from tests.made.residuals import modes, residual
 

@@ -111,6 +111,7 @@ LOG = {
     "changes": (),
     "residual": True,
     "supports": True,
+    "image": True,
 }
 
 
@@ -196,6 +197,7 @@ def scene_file(_: Any, folder: Path) -> Made:
         "silent": (),
         "residual": True,
         "supports": True,
+        "image": True,
         "progress": None,
         "say": None,
         "at_start": None,
@@ -263,7 +265,7 @@ def of_log(name: str) -> Callable[[Any, Path], Made]:
     return make
 
 
-KEEPS = {"supports": True, "keep_log": True, "keep_sound": True}
+KEEPS = {"supports": True, "image": True, "keep_log": True, "keep_sound": True}
 DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Air": lambda *_: (sb.Air, {"density_kg_m3": 1, "sound_speed_m_s": 343}),
     "ContactLog": lambda *_: (sb.ContactLog, LOG),
@@ -284,7 +286,7 @@ DOORS: dict[str, Callable[[Any, Path], Made]] = {
     "Listener.write": writing,
     "LogWriter": lambda *_: (
         sb.LogWriter,
-        {"sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None, "supports": True},
+        {"sr": 48_000, "microphone": (0, 0, 1), "seed": 0, "air": None, "supports": True, "image": True},
     ),
     "LogWriter.add": log_adding,
     "LogWriter.step": log_step,
@@ -395,6 +397,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "changes": ["x", 5, None, object(), [3]],
         "residual": FLAG,
         "supports": FLAG,
+        "image": FLAG,
     },
     "ContactLog.impulse_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
     "ContactLog.rows_on": {"body": WHOLE, "link": [*OPTIONAL, 1.5]},
@@ -453,6 +456,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "seed": [*WHOLE, -1],
         "air": RECORD,
         "supports": FLAG,
+        "image": FLAG,
     },
     "LogWriter.add": {
         "name": [5, None, b"cup", ["cup"], "", "a\nb"],
@@ -600,6 +604,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "silent": [5, "floor", object(), None],
         "residual": FLAG,
         "supports": FLAG,
+        "image": FLAG,
         "progress": CALL,
         "say": CALL,
         "at_start": CALL,

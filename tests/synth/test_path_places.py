@@ -12,7 +12,7 @@ from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.synth.fractional_delay import AHEAD, KAISER_BETA, TAPS
 from sonic_bullet.synth.path import Path, PathState, append_bodies, empty_path, grow
-from sonic_bullet.synth.path_kernel import AT_REST, WORK, hear
+from sonic_bullet.synth.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
 from sonic_bullet.synth.path_places import (
     DONE,
     MEMORY_SHORT,
@@ -51,7 +51,7 @@ def called(
     n = source.shape[1]
     out = np.zeros((2, n))
     push = np.zeros((1, 3, n)) if pushed is None else pushed
-    course = Course(begin_m, end_m, np.array([moved]), np.arange(n) / n, AT_REST)
+    course = Course(begin_m, end_m, np.array([moved]), np.arange(n) / n, AT_REST, ALL_ALIKE)
     tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
     status = hear(
         state.at,
@@ -193,7 +193,7 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
     path, state = path_of(bodies)
     out, work, along = np.full((2, steps * n + 3), np.nan), np.full(WORK, np.nan), np.tile(x, steps)
     for k in range(steps):
-        course = Course(place[k], place[k + 1], still, along, AT_REST)
+        course = Course(place[k], place[k + 1], still, along, AT_REST, ALL_ALIKE)
         tables, arrivals = gather(PathTables, path, state), Arrivals(out, k * n + 3, 0)
         status = hear(
             k * n,

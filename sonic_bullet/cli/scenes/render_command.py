@@ -52,6 +52,12 @@ from sonic_bullet.records.file_endings import AUDIO_FORMATS
 @click.option(
     "--supports/--no-supports", default=None, help="Bodies that stand on others ring less. [default: as above]"
 )
+@click.option(
+    "--image/--no-image",
+    default=None,
+    help="Planes, and flat faces from 0.25 m on of bodies that do not move, mirror what sounds before them: up to "
+    "6 dB. Walls of a --room or --response count once. [default: --no-image; of a log, as it was rendered]",
+)
 @soundtrack_options
 @session_options
 @take_options

@@ -56,6 +56,7 @@ def run_render(
     silent: tuple[str, ...],
     residual: bool | None,
     supports: bool | None,
+    image: bool | None,
     **others: Any,
 ) -> None:
     """Run `render`. others: options of `LevelWish`, `SoundtrackWish` and `SessionWish`.
@@ -92,7 +93,7 @@ def run_render(
                 wish = Wish(
                     seconds, rate, microphones, seed, materials, residual, supports, progress, tell,
                     at_end=standing_collector(standing) if session.film_fps is not None else None,
-                    tail_db=level.tail_db, room=room,
+                    tail_db=level.tail_db, room=room, image=image,
                 )  # fmt: skip
                 result: RenderResult | Replay
                 if not takes:

@@ -88,6 +88,7 @@ class Wish:
     tail_db: float | None = None
     room: ShoeboxRoom | RoomResponse | None = None
     feels_all: bool = False
+    image: bool | None = None
 
 
 def is_log(scene: str) -> bool:
@@ -133,6 +134,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         "microphones": places,
         "residual": wish.residual is not False,
         "supports": wish.supports is not False,
+        "image": wish.image is True,
         "tail_db": wish.tail_db,
         **wish.materials.options,
     }
@@ -174,6 +176,8 @@ def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
         log = replace(log, residual=wish.residual)
     if wish.supports is not None:
         log = replace(log, supports=wish.supports)
+    if wish.image is not None:
+        log = replace(log, image=wish.image)
     if (seconds := wish.seconds) is not None:
         if seconds > log.duration_s + 1e-9:
             raise AudioError(

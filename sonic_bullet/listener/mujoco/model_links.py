@@ -14,6 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.listener.frames import Roster, decode, encode
 from sonic_bullet.listener.known_bodies import only_curvature
 from sonic_bullet.listener.mujoco.geom_shapes import shape_of_geom
@@ -188,12 +189,13 @@ class ModelLinks:
         dynamics = {"mass": mass, "sliding": friction[0], "torsional": friction[1], "rolling": friction[2]}
         dynamics |= {"solref_0": solref[0], "solref_1": solref[1]}
         try:
-            curvature = only_curvature(self.shapes(body, link))
+            shapes: tuple[Shape, ...] = self.shapes(body, link)
         except MeshError:
-            curvature = float("nan")
+            shapes = ()
         return Body(
             number, of_world if number == 0 else -1, 0, self.name(number, of_world), mass, np.diag(inertia),
-            curvature_per_m=curvature, dynamics={name: float(x) for name, x in dynamics.items()},
+            curvature_per_m=only_curvature(shapes), dynamics={name: float(x) for name, x in dynamics.items()},
+            flat_faces_m=flat_faces(shapes if mass == 0 else ()),
         )  # fmt: skip
 
     def shapes(self, body: int, link: int) -> tuple[Shape, ...]:

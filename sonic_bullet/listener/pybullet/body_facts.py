@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
+from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.listener.frames import NO_NUMBER, Roster, decode, encode, link_words
 from sonic_bullet.listener.known_bodies import sounding_body
 from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces, described_pieces
@@ -40,6 +41,8 @@ DYNAMICS = {
 }
 """Indices into getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set."""
 
+FLAT_KINDS = (pybullet.GEOM_BOX, pybullet.GEOM_PLANE)
+"""Shapes whose large faces are looked at where a body is not added: no file need be read for them."""
 PLACEHOLDER = "link0"
 """Name that createMultiBody gives to the base of a body without a name."""
 
@@ -133,9 +136,12 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
     getDynamicsInfo's inertia is diagonal in the body frame: both are the inertial frame (measured: R·diag·Rᵀ·ω stays
     constant in free spin, whatever localInertialOrn).
     """
+    from sonic_bullet.listener.pybullet.collision_shapes import primitive
+
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     mass = checked_mass_kg(info, body, link)
     pieces = collision_pieces(client_id, body, link)
+    flat = [primitive(one, "") for one in pieces if mass == 0 and one.kind in FLAT_KINDS]
     curvature = (
         1 / pieces[0].size[0]
         if len(pieces) == 1 and pieces[0].kind == pybullet.GEOM_SPHERE and pieces[0].size[0] > 0
@@ -150,6 +156,7 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
         np.diag(info[2]),
         curvature_per_m=curvature,
         dynamics=dynamics_of(info),
+        flat_faces_m=flat_faces(flat),
     )
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.geometry import solid_of
+from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.listener.animated import matrices, rotation
 from sonic_bullet.listener.frames import Motion, Roster, encode
 from sonic_bullet.listener.known_bodies import only_curvature
@@ -103,7 +104,8 @@ class ArrayWorld(MotionWorld):
             tensor = _as_tensor(inertia_kg_m2, f"{who}: inertia_kg_m2")
         own = tuple(replace(shape, position_m=shape.position_m - centre) for shape in shapes)
         number = len(self.defined)
-        record = Body(number, -1, 0, who, mass, tensor, curvature_per_m=only_curvature(own))
+        faces = flat_faces(own if mass == 0 else ())
+        record = Body(number, -1, 0, who, mass, tensor, curvature_per_m=only_curvature(own), flat_faces_m=faces)
         self.defined.append(DefinedBody(record, own, centre))
         self._enrol()
         return number

@@ -59,19 +59,26 @@ def find_images(room: ShoeboxRoom, corner_m: Array, centre_m: Array, radius_m: f
     return Images(sign, offset + corner_m - sign * corner_m, found.orders[near][order])
 
 
-def mirrored(microphone: Microphone, sign: Array, offset_m: Array) -> tuple[Microphone, Array]:
-    """Make the image of a microphone, and the signs (channels,) that its channels have."""
+def mirrored(microphone: Microphone, reflection: Array, offset_m: Array) -> tuple[Microphone, Array]:
+    """Make the image x -> reflection (3, 3) · x + offset_m of a microphone, and the signs (channels,) of its channels.
+
+    One that moves with a body has its own place still: its image is that of where it is then.
+    """
 
     def place(position_m: Array) -> Array:
-        return np.asarray(sign * position_m + offset_m)
+        return np.asarray(position_m @ reflection.T + offset_m)
 
     path, turned = microphone.path, microphone.quaternion_xyzw
-    odd = bool(np.prod(sign) < 0)
+    odd = bool(np.linalg.det(reflection) < 0)
     if path is not None:
-        also = None if path.quaternion_xyzw is None else _turn(path.quaternion_xyzw, sign, odd)
+        also = None if path.quaternion_xyzw is None else turned_image(path.quaternion_xyzw, reflection)
         path = replace(path, position_m=place(path.position_m), quaternion_xyzw=also)
     at: Any = None if path is not None else place(microphone.position_m)
-    made = replace(microphone, directivity=False, path=path, position_m=at, quaternion_xyzw=_turn(turned, sign, odd))
+    if microphone.body_id is None:
+        turned = turned_image(turned, reflection)
+    else:
+        at = microphone.position_m
+    made = replace(microphone, directivity=False, path=path, position_m=at, quaternion_xyzw=turned)
     signs = np.ones(microphone.channels)
     if odd and isinstance(made, Binaural):
         made = replace(made, head=_exchanged(made.head))
@@ -87,11 +94,12 @@ def _exchanged(head: Head) -> Head:
     return replace(head, direction=head.direction @ LEFT_RIGHT)
 
 
-def _turn(quaternion_xyzw: Array, sign: Array, odd: bool) -> Array:
+def turned_image(quaternion_xyzw: Array, reflection: Array) -> Array:
     """Turn quaternions (…, 4) as an image is turned."""
     from scipy.spatial.transform import Rotation
 
-    matrix = np.diag(sign) @ Rotation.from_quat(quaternion_xyzw).as_matrix()
+    matrix = reflection @ Rotation.from_quat(quaternion_xyzw).as_matrix()
+    odd = bool(np.linalg.det(reflection) < 0)
     return np.asarray(Rotation.from_matrix(matrix @ LEFT_RIGHT if odd else matrix).as_quat())
 
 

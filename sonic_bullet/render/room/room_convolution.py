@@ -19,8 +19,9 @@ SHORTEST = 1 << 15
 
 def sum_rows(mixing: Array, channels: Array) -> Array:
     """Sum channels (b·c, n), body by body, to rows (b·r, n) by mixing (r, c); not by BLAS, whose threads cost more."""
-    by_body = channels.reshape(-1, mixing.shape[1], channels.shape[1])
-    return np.asarray(np.einsum("rc,bcn->brn", mixing, by_body).reshape(-1, channels.shape[1]))
+    bodies, samples = len(channels) // mixing.shape[1], channels.shape[1]
+    by_body = channels.reshape(bodies, mixing.shape[1], samples)
+    return np.asarray(np.einsum("rc,bcn->brn", mixing, by_body).reshape(bodies * len(mixing), samples))
 
 
 def add_room(plan: RoomPlan, blocks: Iterable[Array]) -> Iterator[Array]:

@@ -8,7 +8,7 @@ rows = mixing @ channels: own, with images whose walls are the same at all frequ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,12 +26,16 @@ ECHO_DB = 10.0
 """How far Eyring's law has fallen when the images end, at the latest: else those of absorbing walls, which fall more
 slowly [Kuttruff 2000, eq. 5.41], are all that T60 is read from."""
 
+TABLE_M2 = 4.0
+"""Of a room of unknown size, larger faces are its own: a table for ten."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomPlan:
     """sensors, mixing (rows, channels of them); channels: own; early (g, t), late (channels, far, t): filters.
 
-    begin_s: when the late field begins, t60_s: the longest; note: what a user should read.
+    begin_s: when the late field begins, t60_s: the longest; note: what a user should read. walls (k, 4): its planes, a
+    unit vector and its product with them; largest_m2: a face of a body that is larger is a wall of the room.
     """
 
     sensors: tuple[Sensor, ...]
@@ -42,6 +46,8 @@ class RoomPlan:
     begin_s: float
     t60_s: float
     note: str
+    walls: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    largest_m2: float = TABLE_M2
 
     @property
     def taps(self) -> int:
@@ -70,7 +76,7 @@ def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
         kept = (1 - room.absorption[0]) ** (order / 2) if flat else 1.0
         begin = 0 if flat else channels * (1 + int(np.searchsorted(orders, order)))
         for microphone, at in own:
-            image, signs = mirrored(microphone, sign, offset_m)
+            image, signs = mirrored(microphone, np.diag(sign), offset_m)
             sensors.append(image)
             part = np.zeros((rows, len(signs)))
             part[begin + at + np.arange(len(signs)), np.arange(len(signs))] = kept * signs
@@ -87,8 +93,15 @@ def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
     size, corner = (" x ".join(f"{x:g}" for x in one) for one in (room.size_m, np.round(place.corner_m, 3) + 0.0))
     note = f"room of {size} m from {corner.replace(' x ', ', ')}: T60 {t60} s by Eyring"
     return RoomPlan(
-        tuple(sensors), np.concatenate(parts, axis=1), channels, early, late, begin_s, float(t60_s.max()), note
-    )
+        tuple(sensors), np.concatenate(parts, axis=1), channels, early, late, begin_s, float(t60_s.max()), note,
+        _walls(room, place), float(np.sort(room.size_m)[:2].prod()) / 2,
+    )  # fmt: skip
+
+
+def _walls(room: ShoeboxRoom, place: RoomPlace) -> Array:
+    """List the planes (6, 4) of the walls."""
+    low = np.column_stack([np.eye(3), place.corner_m])
+    return np.concatenate([low, np.column_stack([np.eye(3), place.corner_m + room.size_m])])
 
 
 def _early_radius_m(

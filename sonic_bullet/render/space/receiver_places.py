@@ -10,13 +10,14 @@ not known: its microphone flies on with the velocity of the step that begins.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.render.room.image_microphones import turned_image
 
 ROUNDS = 8
 """Of the fixed point: 1e-8 of the first guess's error at a tenth of the speed of sound."""
@@ -69,6 +70,15 @@ def place_receivers(
             place[:, c], turned[:, c] = one.position_m, one.quaternion_xyzw
     span = np.maximum(np.diff(time_s), 1e-12)[:, None, None]
     return ReceiverPlaces(place[:-1], np.diff(place, axis=0) / span, turned[:-1])
+
+
+def with_reflections(places: ReceiverPlaces, reflections: Mapping[int, tuple[int, Array, Array]]) -> ReceiverPlaces:
+    """Put microphones where they are images of others: of each its number, that of the other, matrix, shift."""
+    for c, (own, matrix, shift_m) in reflections.items():
+        places.position_m[:, c] = places.position_m[:, own] @ matrix.T + shift_m
+        places.velocity_m_s[:, c] = places.velocity_m_s[:, own] @ matrix.T
+        places.quaternion_xyzw[:, c] = turned_image(places.quaternion_xyzw[:, own], matrix)
+    return places
 
 
 def aim_at(

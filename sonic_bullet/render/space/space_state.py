@@ -19,7 +19,7 @@ from sonic_bullet.render.space.ambisonic_encoding import encode
 from sonic_bullet.render.space.ear_filters import EarFilters, ear_filters, filter_ears
 from sonic_bullet.render.space.hearing_directions import hearing_directions
 from sonic_bullet.render.space.pose_history import PoseHistory
-from sonic_bullet.render.space.receiver_places import aim_at, follows, place_receivers
+from sonic_bullet.render.space.receiver_places import aim_at, follows, place_receivers, with_reflections
 
 if TYPE_CHECKING:
     from sonic_bullet.render.resonator import Resonator
@@ -42,7 +42,8 @@ class SpaceState:
     waiting_m, waiting_xyzw (w, b, ·): poses of steps taken in and not rendered; history: of those before; past: of
     each head (b, t - 1), what bodies sent last;
     away (k + 1, b, c, 3): to bodies from microphones at the ends of the steps rendered in this call; place_m (c, 3):
-    microphones at the last one's end.
+    microphones at the last one's end; reflections: of each microphone that is the image of one on a body, the number of
+    that, matrix and shift.
     """
 
     sensors: tuple[Sensor, ...]
@@ -54,6 +55,7 @@ class SpaceState:
     past: dict[int, Array] = field(default_factory=dict)
     away: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 3)))
     place_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    reflections: dict[int, tuple[int, Array, Array]] = field(default_factory=dict)
 
     @property
     def microphones(self) -> tuple[Microphone, ...]:
@@ -118,6 +120,7 @@ class SpaceState:
         if steps:
             time_s = np.concatenate([rendered["begin_s"], rendered["after_s"][-1:], [next_s]])
             places = place_receivers(microphones, leads, time_s, position[: steps + 2], turned[: steps + 2])
+            places = with_reflections(places, self.reflections)
             time_s, inner = time_s[:-1], position[: steps + 1]
             aim[len(table) - steps :] = aim_at(microphones, places, time_s, inner, self.air.sound_speed_m_s)
             known_s, known_m = self.history.known()

@@ -1,0 +1,105 @@
+"""Large flat faces of a body, which mirror sound: rectangles, or rectangles of the same area and middle.
+
+A face is one where its shorter side holds a wave of 1.4 kHz; sound of longer waves passes round its edges, and the
+image that stands for the face [Pierce 1989, sec. 5-1] is up to 6 dB too loud for these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals
+from sonic_bullet.records import Array, Shape
+
+SHORTEST_SIDE_M = 0.25
+UNBOUNDED_M = 1e6
+"""Half a side of a plane."""
+FILLED = 0.7
+"""Fraction of its bounding rectangle that a face fills at least: a disc has π/4."""
+SAME_PLANE = 1e-3
+"""Radians, and parts of the body's size, within which triangles lie in one plane."""
+
+
+def flat_faces(shapes: Sequence[Shape]) -> Array:
+    """Find the faces (k, 3, 3) of shapes in their body's frame: middle, then two half sides whose product is outward.
+
+    Capsules and spheres have none.
+    """
+    from scipy.spatial.transform import Rotation
+
+    found = [np.zeros((0, 3, 3))]
+    for shape in shapes:
+        turn = Rotation.from_quat(shape.quaternion_xyzw).as_matrix()
+        own = _own_faces(shape)
+        if len(own):
+            placed = own @ turn.T
+            placed[:, 0] += shape.position_m
+            found.append(placed)
+    faces = np.concatenate(found)
+    return np.asarray(faces[2 * np.linalg.norm(faces[:, 1:], axis=2).min(axis=1) >= SHORTEST_SIDE_M])
+
+
+def _own_faces(shape: Shape) -> Array:
+    """Find the faces (k, 3, 3) of a shape in its own frame."""
+    x, y, z = np.eye(3)
+    if shape.kind == "plane":
+        return np.array([[np.zeros(3), UNBOUNDED_M * x, UNBOUNDED_M * y]])
+    if shape.kind == "box":
+        a, b, c = shape.size_m / 2
+        ends = [[c * z, a * x, b * y], [a * x, b * y, c * z], [b * y, c * z, a * x]]
+        return np.array([one for face in ends for one in (face, [-face[0], face[2], face[1]])])
+    if shape.kind == "cylinder":
+        radius, length = shape.size_m[:2]
+        side = radius * np.sqrt(np.pi) / 2
+        return np.array([[length / 2 * z, side * x, side * y], [-length / 2 * z, side * y, side * x]])
+    return _mesh_faces(shape.vertex_m, shape.face) if shape.kind == "mesh" else np.zeros((0, 3, 3))
+
+
+def _mesh_faces(vertex_m: Array, face: Array) -> Array:
+    """Join triangles of one plane to rectangles (k, 3, 3)."""
+    area, normal = face_areas_m2(vertex_m, face), outward_normals(vertex_m, face)
+    large = max(float(np.ptp(vertex_m, axis=0).max()), 1e-12)
+    offset = np.einsum("fi,fi->f", normal, vertex_m[face[:, 0]]) / large
+    found, free = [], area > 0
+    for first in np.argsort(-area, kind="stable").tolist():
+        if not free[first]:
+            continue
+        mine = free & (normal @ normal[first] > 1 - SAME_PLANE**2 / 2) & (abs(offset - offset[first]) < SAME_PLANE)
+        free &= ~mine
+        if area[mine].sum() >= SHORTEST_SIDE_M**2:
+            made = _rectangle(vertex_m[np.unique(face[mine])], normal[first], float(area[mine].sum()))
+            found += [made] if made is not None else []
+    return np.array(found).reshape(-1, 3, 3)
+
+
+def _rectangle(point_m: Array, normal: Array, area_m2: float) -> Array | None:
+    """Fit the smallest rectangle round points (n, 3) of a plane, (3, 3); None where the face fills too little of it.
+
+    One side of it lies on a side of the hull [Freeman, Shapira, Comm. ACM 18(7), 1975].
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    axis = np.eye(3)[np.argmin(abs(normal))]
+    u = np.cross(normal, axis) / np.linalg.norm(np.cross(normal, axis))
+    v = np.cross(normal, u)
+    flat = point_m @ np.array([u, v]).T
+    try:
+        hull = flat[ConvexHull(flat).vertices]
+    except QhullError:
+        return None
+    side = np.roll(hull, -1, axis=0) - hull
+    angle = np.arctan2(side[:, 1], side[:, 0])
+    turn = np.moveaxis(np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]), 2, 0)
+    turned = hull @ turn.swapaxes(1, 2)
+    low, high = turned.min(axis=1), turned.max(axis=1)
+    best = int(np.argmin((high - low).prod(axis=1)))
+    filled = area_m2 / float((high - low)[best].prod())
+    if filled < FILLED:
+        return None
+    middle = turn[best].T @ ((low + high)[best] / 2)
+    half = (high - low)[best] / 2 * np.sqrt(min(filled, 1.0))
+    axes = turn[best] @ np.array([u, v])
+    centre = middle @ np.array([u, v]) + normal * float(normal @ point_m[0])
+    return np.array([centre, half[0] * axes[0], half[1] * axes[1]])
