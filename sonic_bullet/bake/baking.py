@@ -101,7 +101,8 @@ def bake_mesh(
     shape = read_mesh(path, scale)
     vertex, face = read_own_vertices(Path(path))
     made = with_material(material)
-    model = analyse_body((shape,), made, to_hz=to_hz, thickness_m=thickness_m, accuracy=accuracy, progress=progress)
+    how: dict[str, Any] = {"to_hz": to_hz, "thickness_m": thickness_m, "accuracy": accuracy, "progress": progress}
+    model = analyse_body((shape,), made, tail=False, **how)
     solid = _solid_of(model, made.density_kg_m3)
     body = Body(
         0,

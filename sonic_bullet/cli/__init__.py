@@ -107,6 +107,11 @@ cli.add_command(dataset)
     metavar="A",
     help="Relative error allowed at the highest mode.",
 )
+@click.option(
+    "--tail",
+    is_flag=True,
+    help="Also list the resonators that stand in a scene for a plate's or shell's modes above those.",
+)
 @click.option("--thickness", "thickness_m", type=float, metavar="T", help="Wall thickness in m of an open surface.")
 @click.option(
     "--scale",

@@ -50,6 +50,7 @@ def run_modes(
     fixed: tuple[tuple[float, float, float, float], ...],
     thickness_m: float | None,
     accuracy: float,
+    tail: bool,
     scale: float,
     json_to: str | None,
     uff_to: str | None,
@@ -66,6 +67,7 @@ def run_modes(
         from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.modal import read_mesh
         from sonic_bullet.session.body_models import analyse_body
+        from sonic_bullet.session.tail.statistical_tail import with_tail
 
         with status(mesh) as progress:
             shape = read_mesh(mesh, scale)
@@ -78,12 +80,17 @@ def run_modes(
                 accuracy=accuracy,
                 progress=progress,
                 to_hz=to_hz or HEARING_LIMIT_HZ,
+                tail=False,
             )
+            whole = with_tail(model, with_material(made), to_hz or HEARING_LIMIT_HZ)
+        solved, model = model, whole if tail else model
         if to is not None:
             write_model(to, model)
         if uff_to is not None:
             write_uff(uff_to, _shapes(mesh, made, model))
         say(_summary(mesh, made, model))
+        if whole is not model:
+            say(f"with --tail, or tail=True in a scene{whole.note[len(solved.note) :].replace('; ', ', ', 1)}")
     if large := oversize(model.vertex_m, model.mass_kg):
         print(
             f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr

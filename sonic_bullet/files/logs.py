@@ -22,6 +22,7 @@ their own:
       model<i>_freq_hz, _decay_per_s (m,) f8, _shape (v, 3, m) f4, _vertex_m (v, 3) f8, _face (f, 3) i4,
           _curvature_per_m (f,) f8
       model<i>_bend_s2_m2, _choke_s_m (m,) f8  only where its modes depend on their level
+      model<i>_stands_for (m,) f8             only where modes above the last solved one are statistical
           all arrays of models: deflated, as planes (n, …) u1 of numbers of n bytes: all first bytes, all second ones, …
       model<i>_shape u2, model<i>_shape_exponent (m,) i2
           in place of _shape f4, where shapes are whole multiples of powers of two, as those solved here are:

@@ -44,8 +44,8 @@ MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
     "face": (np.int32, (None, 3)),
     "curvature_per_m": (float, (None,)),
 }
-BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m"}
-"""Array in the file -> field, of models whose modes depend on their level; others have none."""
+BENT_ARRAYS = {"bend_s2_m2": "bend_s2_m2", "choke_s_m": "damping_growth_s_m", "stands_for": "stands_for"}
+"""Array in the file -> field, of models whose modes depend on their level, or stand for several; others have none."""
 
 
 ModelHash = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]

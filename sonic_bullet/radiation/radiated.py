@@ -46,6 +46,12 @@ def radiation_and_note(
 
     keep_surface: also cache the air that its surface moves, some 4 MB: another material of the same shape needs it.
     """
+    weight, damping, note = _all_modes(model, air, cache, keep_surface)
+    return weight, damping if model.stands_for is None else damping / model.stands_for, note
+
+
+def _all_modes(model: ModalModel, air: Air, cache: store.Place, keep_surface: bool) -> tuple[Array, Array, str]:
+    """Compute the same for each mode as it stands."""
     m = model.mode_count
     if m == 0 or len(model.face) == 0:
         return radiation.radiation_and_note(model, air)

@@ -241,9 +241,8 @@ class Shape:
             vertex_m=frozen_array(self.vertex_m, float, (None, 3), "mesh: vertex_m"),
             face=frozen_array(self.face, np.int32, (None, 3), "mesh: face"),
         )
-        require(
-            bool((self.size_m >= 0).all()), f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero"
-        )
+        positive = bool((self.size_m >= 0).all())
+        require(positive, f"{self.kind}: size_m {self.size_m} is negative", "give sizes above zero")
         if self.kind == "mesh":
             require(len(self.face) > 0, "mesh without triangles", "give a triangle mesh")
             require(
@@ -282,6 +281,8 @@ class ModalModel:
         body.
     includes_radiation
         Of decay_per_s (see `Material`).
+    stands_for : Array, shape (m,)
+        How many modes each stands for, whose energy its shape has; None: each for itself.
     """
 
     freq_hz: Array
@@ -298,6 +299,7 @@ class ModalModel:
     damping_growth_s_m: Array | None = None
     damping_growth_power: float = 1.0
     includes_radiation: bool = False
+    stands_for: Array | None = None
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -332,9 +334,8 @@ class ModalModel:
             f"decays that rise with power {self.damping_growth_power} of the level",
             "give 1 or 2",
         )
-        as_text(self.note, "note", "give a text")
-        as_flag(self.includes_radiation, "includes_radiation")
-        for name in ("bend_s2_m2", "damping_growth_s_m"):
+        as_text(self.note, "note", "give a text"), as_flag(self.includes_radiation, "includes_radiation")
+        for name in ("bend_s2_m2", "damping_growth_s_m", "stands_for"):
             if getattr(self, name) is not None:
                 store(self, **{name: frozen_array(getattr(self, name), float, (m,), name)})
 

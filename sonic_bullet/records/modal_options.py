@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sonic_bullet.records.arrays import store
-from sonic_bullet.records.coerce import as_number, as_rows, as_whole
+from sonic_bullet.records.coerce import as_flag, as_number, as_rows, as_whole
 from sonic_bullet.records.errors import MeshError, ModalError
 
 
@@ -24,6 +24,8 @@ class ModalOptions:
         Wall of open surfaces.
     accuracy
         Relative, of the highest frequency.
+    tail
+        Whether a plate or shell has resonators above its last mode, up to to_hz.
 
     Raises
     ------
@@ -38,6 +40,7 @@ class ModalOptions:
     fixed: Sequence[Sequence[float]] = ()
     thickness_m: float | None = None
     accuracy: float = 0.01
+    tail: bool = False
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -54,6 +57,7 @@ class ModalOptions:
                 self.to_hz, "to_hz", "give a frequency above zero, in Hz", above=0, most=highest_hz, error=ModalError
             ),
             fixed=fixed,
+            tail=as_flag(self.tail, "tail"),
             accuracy=as_number(
                 self.accuracy,
                 "accuracy",

@@ -1,7 +1,7 @@
 """Compute a body's modes from a material and shapes, with all effects of the material.
 
 Material -> with_material (effects on stiffness)
-    -> analyse_body: modes of the elasticity -> effects on modes -> effects on their decay
+    -> analyse_body: modes of the elasticity -> effects on modes -> effects on their decay -> those above the last one
 """
 
 from __future__ import annotations
@@ -13,15 +13,19 @@ from typing import Any
 from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_modes
 from sonic_bullet.records import Material, ModalModel, Shape
 from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.units import HEARING_LIMIT_HZ
+from sonic_bullet.session.tail.statistical_tail import with_tail
 
 
-def analyse_body(shapes: Sequence[Shape], material: Material, **options: Any) -> ModalModel:
+def analyse_body(shapes: Sequence[Shape], material: Material, *, tail: bool = False, **options: Any) -> ModalModel:
     """Compute the modes of shapes, and their decay.
 
     Parameters
     ----------
     material
         As `with_material` returns it.
+    tail
+        Whether plates and shells go on above their last mode.
     options
         Of `modal.analyse`.
 
@@ -34,4 +38,5 @@ def analyse_body(shapes: Sequence[Shape], material: Material, **options: Any) ->
 
     solved = modal.analyse(tuple(shapes), material, exact_shapes=needs_exact_shapes(material), **options)
     made = with_modes(solved, material)
-    return made if made is solved else replace(made, shape=rounded(made.shape))  # effects rotate shapes
+    made = made if made is solved else replace(made, shape=rounded(made.shape))  # effects rotate shapes
+    return with_tail(made, material, options.get("to_hz", HEARING_LIMIT_HZ)) if tail else made

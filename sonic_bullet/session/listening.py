@@ -130,20 +130,20 @@ class Listener:
         count: int | None = None,
         accuracy: float = 0.01,
         mounting: str | float | None = None,
+        tail: bool = False,
         progress: Callable[[str], None] | None = None,
     ) -> tuple[ModalModel, ...]:
         """Let a body sound; return the modal models of its links.
 
         link: -1 is the base; a link's number or name; "all" every link with a collision shape, all of them or, where
         one fails, none. material: a preset's name, a preset file or a `Material`. mesh: a file (in metres) or shapes in
-        the body frame, in place of the body's collision shapes. model: modes computed before.
-        roughness_m: rms height of its surface in place of the material's. name: in log and messages, in place
-        of the simulator's; "all" links append their own to it ("panda/panda_link7"). fixed: clamped spheres (x,
-        y, z, radius) in m, body frame. thickness_m: wall of an open surface. to_hz, count: how many modes. accuracy:
-        relative, of the highest frequency; the models' notes state what is reached. mounting: "free", "placed" (in a
-        building; of mass 0 the default), "on floor" (one side radiates) or the added loss factor.
-        progress: called with the link whose modes or radiation are computed; without one, stderr
-        shows what takes over 2 s.
+        the body frame, in place of the body's collision shapes. model: modes computed before. roughness_m: rms height
+        of its surface in place of the material's. name: in log and messages, not the simulator's; "all" links append
+        theirs ("panda/panda_link7"). fixed: clamped spheres (x, y, z, radius) in m, body frame. thickness_m: wall of an
+        open surface. to_hz, count: how many modes; tail: whether plates and shells go on above them, statistically.
+        accuracy: relative, of the highest frequency; their notes state what is reached. mounting: "free", "placed" (in
+        a building; of mass 0 the default), "on floor" (one side radiates) or the added loss factor. progress: called
+        with the link whose modes or radiation are computed; without one, stderr shows what takes over 2 s.
 
         Warns (`errors.SizeWarning`) of a link larger than what is struck to sound. Raises
         SceneError (unknown body or link, a name in use), MaterialError, MeshError, ModalError, RecordError.
@@ -151,7 +151,7 @@ class Listener:
         how: dict[str, Any] = {
             "material": material, "mesh": mesh, "model": model, "roughness_m": roughness_m, "name": name,
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
-            "mounting": mounting,
+            "mounting": mounting, "tail": tail,
         }  # fmt: skip
         return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
 

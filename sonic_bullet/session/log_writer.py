@@ -82,7 +82,8 @@ class LogWriter:
         centre_m : Array, shape (3,)
             Centre of mass in the frame of its poses; None: of a solid.
         options
-            More keywords of `Listener.add`: model, roughness_m, fixed, thickness_m, to_hz, count, accuracy, mounting.
+            More keywords of `Listener.add`: model, roughness_m, fixed, thickness_m, to_hz, count, accuracy,
+            mounting, tail.
 
         Raises
         ------

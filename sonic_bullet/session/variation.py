@@ -246,6 +246,7 @@ def _vary_model(model: ModalModel, old: Material, new: Material, ratio: float, d
         dropped=model.dropped + model.mode_count - len(order),
         bend_s2_m2=None if model.bend_s2_m2 is None else model.bend_s2_m2[order],
         damping_growth_s_m=None if model.damping_growth_s_m is None else model.damping_growth_s_m[order],
+        stands_for=None if model.stands_for is None else model.stands_for[order],
     )
 
 

@@ -96,6 +96,7 @@ MODEL = dict(
     damping_growth_s_m=None,
     damping_growth_power=1,
     includes_radiation=False,
+    stands_for=None,
 )
 LOG = {
     "bodies": (),
@@ -161,6 +162,7 @@ def adding(client: Any, _: Path) -> Made:
         "to_hz": 20_000,
         "count": None,
         "accuracy": 0.01,
+        "tail": True,
         "mounting": None,
         "progress": None,
     }
@@ -438,6 +440,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "to_hz": [*NUMBER, 0, -1, 1e308],
         "count": [*OPTIONAL, 0, -1, 2.5, 10**9],
         "accuracy": [*NUMBER, 0, -1, 0.6],
+        "tail": FLAG,
         "mounting": ["glued", b"free", object(), ["free"], -1, 1.5, math.nan, True],
         "progress": CALL,
     },
@@ -523,7 +526,10 @@ BAD: dict[str, dict[str, list[Any]]] = {
         **{name: [*NUMBER, -1] for name in ("volume_m3", "mass_kg")},
         "dropped": [*WHOLE, -1],
         "note": TEXT,
-        **{name: [value for value in ARRAY if value is not None] for name in ("bend_s2_m2", "damping_growth_s_m")},
+        **{
+            name: [value for value in ARRAY if value is not None]
+            for name in ("bend_s2_m2", "damping_growth_s_m", "stands_for")
+        },
         "damping_growth_power": NUMBER,
         "includes_radiation": FLAG,
     },

@@ -1,0 +1,1 @@
+"""Modes of a body above the last one that was solved."""

@@ -1,0 +1,206 @@
+"""Modes of plates and shells above the last one that was solved, filled statistically from their wall's thickness.
+
+    N(f) = A/4π <k²>,   k² = a + √(b² + ω²ρh/D),   a, b = ω²/2 (1/c_s² ± 1/c_p²)
+        [Cremer, Heckl, Petersson 2005, sec. 4.2; Mindlin 1951, J. Appl. Mech. 18, 31, the lower branch]
+    <φ²> = 1/M:   Re Y = π/2 · dN/dω · <φ²> = 1/(8√(Dρh))   [Cremer, Heckl, Petersson 2005, sec. 5.3, 5.7]
+
+D = Q h³/12, Q of a bending wave's direction in the wall's plane, its stress-free faces condensed; c_p² = Q/ρ, c_s² =
+5G/6ρ. Averages are over the wall and over directions. Shapes are waves of random direction and phase of that k
+[Berry 1977, J. Phys. A 10, 2083], along the wall's normal, seeded by the surface. So few resonators as tell
+the ear no more stand for all: `PER_THIRD` a third octave, each for several modes where these are denser. Their mean
+square continues that of the upper half of the solved ones. Bulky bodies have no tail: where a wall is not thin by its
+extent, no wave of it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.effects.damping_law import own_decay_per_s
+from sonic_bullet.effects.damping_law.thermoelastic import ThermoelasticLoss, walls
+from sonic_bullet.effects.recorded_lines import RecordedLines
+from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals
+from sonic_bullet.modal.fem import VOIGT
+from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.records.units import HEARING_LIMIT_HZ
+
+PER_THIRD = 20
+"""Of 1/3 octave: twice as many as the ear has filters' widths there, 4 to a tone's own."""
+THIN_WALL = 5.0
+"""√area over thickness from which on a body is a plate or a shell."""
+FEWEST_SOLVED = 6
+"""Solved modes whose mean square is continued."""
+SUMMED_WAVES = 32
+"""In a shape: the sum is normal within 1 % of its fourth moment."""
+WALL_SAMPLES = 96
+"""Places of the wall and directions at them that averages are over."""
+
+
+def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMIT_HZ) -> ModalModel:
+    """Return a model with resonators above its last mode, up to to_hz; itself where it has none to be continued.
+
+    The note says how many, and for how many modes they stand.
+    """
+    top_hz = min(to_hz, HEARING_LIMIT_HZ)
+    alive = model.mode_count >= FEWEST_SOLVED and len(model.face) > 0 and material.alpha_per_s is not None
+    if not alive or model.freq_hz[-1] >= 0.95 * top_hz or any(isinstance(e, RecordedLines) for e in material.effects):
+        return model
+    thickness, across = walls(model.vertex_m, model.face)
+    area = face_areas_m2(model.vertex_m, model.face)
+    known = across >= 0
+    if area[known].sum() < 0.5 * area.sum():
+        return model
+    middle_m = _weighted_median(thickness[known], area[known])
+    skin = known & (thickness < 2.5 * middle_m)
+    wall_m2 = model.volume_m3 / middle_m
+    if np.sqrt(wall_m2) < THIN_WALL * middle_m or area[skin].sum() < 0.5 * area.sum():
+        return model
+    seed = hashlib.sha256(np.round(model.vertex_m, 7).tobytes() + model.face.tobytes()).digest()
+    rng = np.random.default_rng(int.from_bytes(seed[:8], "little"))
+    waves = _Waves(model, material, thickness, area * skin)
+    freq, modes = _places(waves, float(model.freq_hz[-1]), top_hz, wall_m2, rng)
+    if not len(freq):
+        return model
+    axis = _wall_axes(model, area * skin / np.maximum(thickness, 1e-12) ** 4)
+    weight = _vertex_areas(model, area * skin)
+    square = _continued(model, axis, weight, waves, wall_m2)
+    shape = _shapes(model, axis, weight, waves, freq, rng) * np.sqrt(square * modes)
+    lam = (2 * np.pi * freq) ** 2
+    decay = own_decay_per_s(material, lam)
+    for loss in (effect for effect in material.effects if isinstance(effect, ThermoelasticLoss)):
+        plate = (1 + loss.poisson) / (1 - loss.poisson)  # of a plate over a beam [Norris & Photiadis 2005, eq. 28]
+        decay = decay + np.pi * freq * plate * loss.loss_of_beam(np.full(len(freq), middle_m), 2 * np.pi * freq)
+    audible = decay < np.pi * freq
+    freq, decay, shape, modes = freq[audible], decay[audible], shape[:, :, audible], modes[audible]
+    zeros = np.zeros(len(freq))
+    grown: dict[str, Any] = {
+        name: np.concatenate([getattr(model, name), zeros])
+        for name in ("bend_s2_m2", "damping_growth_s_m")
+        if getattr(model, name) is not None
+    }
+    note = (
+        f"; above them {len(freq)} resonators for {modes.sum():.0f} modes up to {top_hz:.0f} Hz, by the density of "
+        f"bending waves in walls of {1000 * middle_m:.3g} mm"
+    )
+    return replace(
+        model,
+        freq_hz=np.concatenate([model.freq_hz, np.sqrt(lam[audible] - decay**2) / (2 * np.pi)]),
+        decay_per_s=np.concatenate([model.decay_per_s, decay]),
+        shape=np.concatenate([model.shape, rounded(shape.astype(np.float32))], axis=2),
+        stands_for=np.concatenate([np.ones(model.mode_count), modes]),
+        note=model.note + note,
+        **grown,
+    )
+
+
+class _Waves:
+    """Bending waves at places of a wall and in directions along it, with equal parts of its area.
+
+    direction (s, 3); stiff (s,): ρh/D; slow, fast (s,): 1/c_s², 1/c_p².
+    """
+
+    def __init__(self, model: ModalModel, material: Material, thickness: Array, area: Array) -> None:
+        chosen = np.searchsorted(np.cumsum(area), (np.arange(WALL_SAMPLES) + 0.5) / WALL_SAMPLES * area.sum())
+        normal = outward_normals(model.vertex_m, model.face)[chosen]
+        first = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        angle = np.pi * (np.arange(WALL_SAMPLES) * 0.618033988749895 % 1)
+        second = np.cross(normal, first)
+        self.direction = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
+        tensor = material.stiffness_pa[VOIGT[:, :, None, None], VOIGT[None, None]]
+        frame = np.stack([self.direction, np.cross(normal, self.direction), normal], axis=1)
+        turned = np.einsum("sai,sbj,sck,sdl,ijkl->sabcd", frame, frame, frame, frame, tensor, optimize=True)
+        free = [(2, 2), (2, 0), (2, 1)]
+        inner = np.array([[turned[:, a, b, c, d] for c, d in free] for a, b in free]).transpose(2, 0, 1)
+        outer = np.array([turned[:, 0, 0, a, b] for a, b in free]).T
+        bent = turned[:, 0, 0, 0, 0] - np.einsum("si,si->s", outer, np.linalg.solve(inner, outer[:, :, None])[:, :, 0])
+        rho, h = material.density_kg_m3, thickness[chosen]
+        self.stiff = 12 * rho / (bent * h**2)
+        self.slow, self.fast = rho / (5 / 6 * turned[:, 2, 0, 2, 0]), rho / bent
+
+    def square(self, freq_hz: Array) -> Array:
+        """Compute k² (m, s) at frequencies (m,)."""
+        omega2 = (2 * np.pi * np.asarray(freq_hz)[:, None]) ** 2
+        return np.asarray(
+            omega2 / 2 * (self.slow + self.fast)
+            + np.sqrt(omega2**2 / 4 * (self.slow - self.fast) ** 2 + omega2 * self.stiff)
+        )
+
+    def count(self, freq_hz: Array, area_m2: float) -> Array:
+        """Compute N (m,) of a wall of that area."""
+        return np.asarray(area_m2 / (4 * np.pi) * self.square(freq_hz).mean(axis=1))
+
+
+def _places(
+    waves: _Waves, from_hz: float, to_hz: float, area_m2: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Return frequencies of resonators, ascending, and the modes that each stands for."""
+    grid = np.geomspace(from_hz, to_hz, 2000)
+    number = waves.count(grid, area_m2)
+    per_third = np.gradient(number, np.log2(grid)) / 3
+    each = np.maximum(per_third / PER_THIRD, 1.0)
+    index = np.concatenate([[0.0], np.cumsum(np.diff(number) / ((each[1:] + each[:-1]) / 2))])
+    count = int(index[-1])
+    at = np.arange(count) + 0.5 + rng.uniform(-0.4, 0.4, count)
+    freq = np.interp(at, index, grid)
+    return freq, np.interp(freq, grid, each)
+
+
+def _weighted_median(value: Array, weight: Array) -> float:
+    order = np.argsort(value, kind="stable")
+    total = np.cumsum(weight[order])
+    return float(value[order][np.searchsorted(total, total[-1] / 2)])
+
+
+def _wall_axes(model: ModalModel, weight: Array) -> Array:
+    """Find the wall's normal (v, 3) at vertices, of either sign; at those of no wall that of the nearest one."""
+    from scipy.spatial import cKDTree
+
+    normal = outward_normals(model.vertex_m, model.face)
+    tensor = np.zeros((len(model.vertex_m), 3, 3))
+    each = weight[:, None, None] * normal[:, :, None] * normal[:, None, :]
+    for corner in range(3):
+        np.add.at(tensor, model.face[:, corner], each)
+    size = np.trace(tensor, axis1=1, axis2=2)
+    known = np.flatnonzero(size > 1e-3 * np.median(size[size > 0]))
+    axis = np.linalg.eigh(tensor[known])[1][:, :, -1]
+    return np.asarray(axis[cKDTree(model.vertex_m[known]).query(model.vertex_m)[1]])
+
+
+def _vertex_areas(model: ModalModel, area: Array) -> Array:
+    """Share the areas (f,) of faces out to vertices (v,), 1 in all."""
+    found = np.zeros(len(model.vertex_m))
+    for corner in range(3):
+        np.add.at(found, model.face[:, corner], area)
+    return np.asarray(found / found.sum())
+
+
+def _continued(model: ModalModel, axis: Array, weight: Array, waves: _Waves, area_m2: float) -> float:
+    """Compute the mean square along the wall's normal of a mode above: as the upper half of those solved.
+
+    Over their number in the theory, for modes along the wall are among them and move it little; the median over the
+    wall, for free edges move more, and the interior of a large one has 1/M.
+    """
+    half = model.mode_count // 2
+    along = np.einsum("vi,vim->vm", axis, model.shape[:, :, half:].astype(float))
+    low, high = waves.count(model.freq_hz[[half - 1, -1]], area_m2)
+    return _weighted_median((along**2).sum(axis=1), weight) / max(float(high - low), 1e-9)
+
+
+def _shapes(
+    model: ModalModel, axis: Array, weight: Array, waves: _Waves, freq: Array, rng: np.random.Generator
+) -> Array:
+    """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it."""
+    shape = np.zeros((len(model.vertex_m), 3, len(freq)))
+    for m, square in enumerate(waves.square(freq)):
+        chosen = rng.choice(WALL_SAMPLES, SUMMED_WAVES, p=square / square.sum())
+        vector = np.sqrt(square[chosen])[:, None] * waves.direction[chosen]
+        phase = model.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, SUMMED_WAVES)
+        along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((SUMMED_WAVES, 3)), axis)
+        shape[:, :, m] = axis * (along / np.sqrt(weight @ along**2))[:, None]
+    return shape

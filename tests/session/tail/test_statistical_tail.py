@@ -1,0 +1,144 @@
+"""Modes above the last solved one: density and mobility of plates, energy at the seam, and what stays as it was."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonic_bullet.files import read_model, write_model
+from sonic_bullet.presets import load_material
+from sonic_bullet.radiation.radiated import radiation_of
+from sonic_bullet.records import Air, Array, Material, ModalModel, Shape
+from sonic_bullet.session.body_models import analyse_body
+from sonic_bullet.session.tail.statistical_tail import with_tail
+from sonic_bullet.synth.pulse import compliance, spectrum_table
+from tests.cli.test_commands import run
+
+METAL = Material.isotropic("metal", youngs_pa=70e9, poisson=0.33, density_kg_m3=2700, alpha_per_s=5.0, beta_s=1e-8)
+SIDES_M = (0.4, 0.3, 0.004)
+SHEET = Shape("box", np.array(SIDES_M))
+STIFF = 70e9 * SIDES_M[2] ** 3 / 12 / (1 - 0.33**2)
+SURFACE_KG_M2 = 2700 * SIDES_M[2]
+MOBILITY = 1 / (8 * np.sqrt(STIFF * SURFACE_KG_M2))
+
+
+@cache
+def solved(count: int) -> ModalModel:
+    return analyse_body((SHEET,), METAL, count=count, tail=False)
+
+
+@cache
+def filled(count: int) -> ModalModel:
+    return with_tail(solved(count), METAL)
+
+
+def inner_top(model: ModalModel) -> Array:
+    x = np.abs(model.vertex_m) / np.array(SIDES_M)
+    return np.flatnonzero((model.vertex_m[:, 2] > 0) & (x[:, 0] < 0.35) & (x[:, 1] < 0.35))
+
+
+def thirds(model: ModalModel, power: Array, centres_hz: Array) -> Array:
+    """Sums of (m,) in third octaves, in dB."""
+    edge = centres_hz[:, None] * 2.0 ** (np.array([-1, 1]) / 6)
+    return np.array(
+        [10 * np.log10(power[(model.freq_hz >= low) & (model.freq_hz < high)].sum() + 1e-99) for low, high in edge]
+    )
+
+
+def sound(model: ModalModel, centres_hz: Array) -> Array:
+    """Energy at 1 m of unit impulses in the interior, their mean, in third octaves."""
+    weight, radiated = radiation_of(model, Air())
+    struck = (model.shape[inner_top(model), 2].astype(float) ** 2).mean(axis=0)
+    return thirds(model, struck * np.abs(weight) ** 2 / (model.decay_per_s + radiated), centres_hz)
+
+
+def test_resonators_stand_for_as_many_modes_as_the_closed_form_has() -> None:
+    """N = A/2 √(ρh/D) f of a thin plate, within 3 % to where its shear begins to count; beyond there are more."""
+    model = filled(40)
+    assert model.stands_for is not None
+    seam = model.freq_hz[39]
+    for top in (6000.0, 9000.0):
+        above = (model.freq_hz > seam) & (model.freq_hz < top)
+        want = SIDES_M[0] * SIDES_M[1] / 2 * np.sqrt(SURFACE_KG_M2 / STIFF) * (top - seam)
+        assert model.stands_for[above].sum() == pytest.approx(want, rel=0.05)
+    assert (np.diff(model.freq_hz) >= 0).all() and model.freq_hz[-1] < 20_000 and (model.stands_for[:40] == 1).all()
+    assert "resonators for" in model.note and filled(40).note.startswith(solved(40).note)
+
+
+def test_mobility_is_that_of_the_infinite_plate() -> None:
+    """Re Y = π/2 Σφ² per rad/s, the mean over the interior, in third octaves above the seam: within 1 dB."""
+    model = filled(40)
+    centres = 4000 * 2.0 ** (np.arange(7) / 3)
+    struck = (model.shape[inner_top(model), 2].astype(float) ** 2).mean(axis=0)
+    span = 2 * np.pi * centres * (2 ** (1 / 6) - 2 ** (-1 / 6))
+    level = thirds(model, np.pi / 2 * struck, centres) - 10 * np.log10(span * MOBILITY)
+    assert np.abs(level).max() < 1.0
+
+
+@pytest.mark.slow
+def test_a_plate_sounds_alike_however_many_modes_are_solved() -> None:
+    """40, 80 and 160 solved and the rest filled: third octaves within 2 dB, of the mean over the interior's strikes."""
+    centres = 1000 * 2.0 ** (np.arange(13) / 3)
+    levels = [sound(filled(count), centres) for count in (40, 80, 160)]
+    for few in levels[:2]:
+        assert np.abs(few - levels[2]).max() < 2.0
+
+
+def test_what_was_solved_stays_and_a_file_keeps_the_rest(tmp_path: Path) -> None:
+    own, model = solved(40), filled(40)
+    assert np.array_equal(model.freq_hz[:40], own.freq_hz) and np.array_equal(model.shape[:, :, :40], own.shape)
+    again = with_tail(own, METAL)
+    assert np.array_equal(again.shape, model.shape) and np.array_equal(again.decay_per_s, model.decay_per_s)
+    write_model(tmp_path / "model.npz", model)
+    kept = read_model(tmp_path / "model.npz")
+    for name in ("freq_hz", "decay_per_s", "shape", "stands_for"):
+        assert np.array_equal(getattr(kept, name), getattr(model, name))
+
+
+def test_the_air_damps_each_of_the_modes_that_one_stands_for_as_itself() -> None:
+    model = filled(40)
+    alone, many = radiation_of(replace(model, stands_for=None), Air()), radiation_of(model, Air())
+    assert np.array_equal(alone[0], many[0]) and np.allclose(many[1] * model.stands_for, alone[1], rtol=1e-12)
+
+
+def test_a_ball_gives_the_plate_less_than_it_has() -> None:
+    """By the run time's own law of compliant bodies: a pulse of 2mv gives its modes ½ Σ(JφF̂)² c², c = 1/(1 + mΣ/J²).
+
+    5 mm of steel at 1 m/s: a free pulse would give 1.9 times ½mv² with the tail; it is 0.37 of it without.
+    """
+    mass, tau = 7850 * 4 / 3 * np.pi * 0.005**3, 35e-6
+    row = spectrum_table()[0]
+    given = []
+    for model in (solved(40), filled(40)):
+        shape = model.shape[inner_top(model), 2].astype(float)
+        total = np.array([compliance.py_func(2 * mass * one, model.freq_hz, 0, len(one), tau, row) for one in shape])
+        given.append(0.5 * total / (1 + total / (4 * mass)) ** 2 / (0.5 * mass))
+    assert given[0].max() <= 1 and given[1].max() <= 1
+    assert given[1].mean() > given[0].mean()
+
+
+def test_bulky_bodies_whole_bands_and_recorded_ones_have_none() -> None:
+    block = analyse_body((Shape("box", np.array([0.05, 0.04, 0.03])),), METAL, count=8, tail=False)
+    assert with_tail(block, METAL) is block
+    assert with_tail(solved(40), METAL, to_hz=solved(40).freq_hz[-1]) is solved(40)
+    spruce = analyse_body(
+        (Shape("box", np.array([0.6, 0.4, 0.02])),), load_material("made-spruce"), count=20, tail=True
+    )
+    assert spruce.mode_count > 60 and np.isfinite(spruce.decay_per_s).all()
+
+
+def test_modes_say_what_a_scene_adds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: object) -> None:
+    import trimesh
+
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box(SIDES_M).export("sheet.stl")
+    assert run("modes", "sheet.stl", "--count", "12", "--material", "aluminium", "--json", "few.json") == 0
+    assert run("modes", "sheet.stl", "--count", "12", "--material", "aluminium", "--tail", "--json", "all.json") == 0
+    few, whole = (json.loads(Path(name).read_text())["modes"] for name in ("few.json", "all.json"))
+    assert len(few) == 12 and len(whole) > 60 and whole[:12] == few
+    assert "with --tail, or tail=True in a scene, above them" in capfd.readouterr().out  # type: ignore[attr-defined]
