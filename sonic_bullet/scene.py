@@ -77,7 +77,7 @@ def render_scene(
     silent: Iterable[str] = (),
     residual: bool = True,
     supports: bool = True,
-    image: bool = False,
+    image: bool | None = None,
     progress: Progress | None = None,
     say: Say | None = None,
     at_start: Callable[[Listener], object] | None = None,
@@ -89,7 +89,8 @@ def render_scene(
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of all
     that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those that
     no sensor receives, though they touch and vibrate. residual: whether the non-modal sound of materials is added.
-    supports: whether resting contacts damp and transmit, image: whether large flat faces mirror, as in `attach`.
+    supports: whether resting contacts damp and transmit, image: whether large flat faces mirror, as in `attach`;
+    None: as the scene's own listener has it.
     progress gets the fraction done, say the current task. at_start, at_end: called with the listener before the first
     step, and after the last while its world exists. tail_db: level below the peak at which the decay after the last
     step ends, -60 say, at most 10 s; None, 0: no decay. Raises SonicBulletError; where the scene fails or is
@@ -102,7 +103,7 @@ def render_scene(
         "choice": as_choice(material, materials, silent),
         "residual": as_flag(residual, "residual"),
         "supports": as_flag(supports, "supports"),
-        "image": as_flag(image, "image"),
+        "image": None if image is None else as_flag(image, "image"),
         "at_start": as_call(at_start, "at_start"),
     }
     seconds = None if seconds is None else as_seconds(seconds, "seconds")
@@ -177,7 +178,7 @@ class _Stage:
     choice: MaterialChoice = field(default_factory=MaterialChoice)
     residual: bool = True
     supports: bool = True
-    image: bool = False
+    image: bool | None = None
     begin: Callable[[Listener], object] | None = None
     at_start: Callable[[Listener], object] | None = None
     receive: Receive | None = None
@@ -214,7 +215,7 @@ class _Stage:
         how: dict[str, Any] = dict.fromkeys(("keep_log", "keep_sound"), self.begin is None)
         if self.receive is not None:
             microphones, self.receive = self.receive(as_sensors(microphones, "microphones")), None
-        how |= {"supports": self.supports, "image": self.image}
+        how |= {"supports": self.supports, "image": bool(self.image)}
         return attach(client, sr=self.sr, seed=self.seed, microphone=microphones, **how)
 
     def ready(self) -> None:
@@ -243,7 +244,7 @@ class _Stage:
         listener = self.need_listener()
         notes = (*notes, *listener.left_out)
         log = replace(listener.contacts, residual=self.residual, supports=listener.supports and self.supports)
-        log = replace(log, image=listener.image and self.image)
+        log = replace(log, image=listener.image if self.image is None else self.image)
         if self.gain_db:
             louder = tuple(replace(body, gain_db=self.gain_db.get(body.body_id, 0.0)) for body in log.bodies)
             log = replace(log, bodies=louder)

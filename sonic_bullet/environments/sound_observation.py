@@ -59,7 +59,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
     average
         Whether "audio" is the mean of all channels, one channel, as of contact microphones on one input.
     joints
-        Of a body's name or id, springs of its joints, see `World.hold_joints`; ``recording`` may vary them.
+        By a body's id, springs of its joints, see `World.hold_joints`; ``recording`` may vary them.
     recording
         What a recording would add, drawn for each episode by ``seed`` and the seed of its reset, or its number without
         one: info["recording"] of `reset` has the numbers. None: nothing.

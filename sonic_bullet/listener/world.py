@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from sonic_bullet.records import Body, Material, ModalModel, Shape
-from sonic_bullet.records.coerce import as_items, as_number
+from sonic_bullet.records.coerce import as_items, as_kind, as_number
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -167,12 +167,13 @@ class World(ABC):
         """
         raise SceneError("this simulator's bodies bring their names", "leave name out")
 
-    def hold_joints(self, body: int | str, springs: Mapping[int | str, tuple[float, float]], factor: float = 1) -> None:
+    def hold_joints(self, body: int, springs: Mapping[int | str, tuple[float, float]], factor: float = 1) -> None:
         """Let springs hold joints of a body at audio rate, in place of earlier ones: gears and belts, not controllers.
 
         Parameters
         ----------
         body
+            The id that loading it returned.
         springs
             By the name or number of the link that a joint moves, "all" for each: stiffness in N·m/rad (of a sliding
             joint N/m) and loss factor.
@@ -187,6 +188,7 @@ class World(ABC):
             A number is not what it may be.
         """
         held: dict[int, tuple[float, float]] = {}
+        as_kind(springs, dict, "springs of joints", 'give {"all": (2e4, 0.05)}, or link by link')
         more = as_number(factor, "factor of a joint's stiffness", "give a number above 0", above=0)
         for link, pair in springs.items():
             found, links = self.links_called(body, link)

@@ -610,7 +610,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         "silent": [5, "floor", object(), None],
         "residual": FLAG,
         "supports": FLAG,
-        "image": FLAG,
+        "image": [value for value in FLAG if value is not None],
         "progress": CALL,
         "say": CALL,
         "at_start": CALL,

@@ -56,7 +56,7 @@ from sonic_bullet.records.file_endings import AUDIO_FORMATS
     "--image/--no-image",
     default=None,
     help="Planes, and flat faces from 0.25 m on of bodies that do not move, mirror what sounds before them: up to "
-    "6 dB. Walls of a --room or --response count once. [default: --no-image; of a log, as it was rendered]",
+    "6 dB. Walls of a --room or --response count once. [default: as the script's own listener has it, or the log]",
 )
 @soundtrack_options
 @session_options

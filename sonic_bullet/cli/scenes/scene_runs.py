@@ -134,7 +134,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         "microphones": places,
         "residual": wish.residual is not False,
         "supports": wish.supports is not False,
-        "image": wish.image is True,
+        "image": wish.image,
         "tail_db": wish.tail_db,
         **wish.materials.options,
     }

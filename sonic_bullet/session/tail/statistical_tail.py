@@ -75,8 +75,12 @@ def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMI
     for loss in (effect for effect in material.effects if isinstance(effect, ThermoelasticLoss)):
         plate = (1 + loss.poisson) / (1 - loss.poisson)  # of a plate over a beam [Norris & Photiadis 2005, eq. 28]
         decay = decay + np.pi * freq * plate * loss.loss_of_beam(np.full(len(freq), middle_m), 2 * np.pi * freq)
-    audible = decay < np.pi * freq
-    freq, decay, shape, modes = freq[audible], decay[audible], shape[:, :, audible], modes[audible]
+    damped = np.sqrt(np.maximum(lam - decay**2, 0)) / (2 * np.pi)
+    audible = np.flatnonzero((decay < np.pi * freq) & (damped > model.freq_hz[-1]))
+    audible = audible[np.argsort(damped[audible], kind="stable")]  # strong damping bends them back down
+    freq, decay, shape, modes = damped[audible], decay[audible], shape[:, :, audible], modes[audible]
+    if not len(freq):
+        return model
     zeros = np.zeros(len(freq))
     grown: dict[str, Any] = {
         name: np.concatenate([getattr(model, name), zeros])
@@ -89,7 +93,7 @@ def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMI
     )
     return replace(
         model,
-        freq_hz=np.concatenate([model.freq_hz, np.sqrt(lam[audible] - decay**2) / (2 * np.pi)]),
+        freq_hz=np.concatenate([model.freq_hz, freq]),
         decay_per_s=np.concatenate([model.decay_per_s, decay]),
         shape=np.concatenate([model.shape, rounded(shape.astype(np.float32))], axis=2),
         stands_for=np.concatenate([np.ones(model.mode_count), modes]),

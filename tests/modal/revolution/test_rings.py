@@ -119,11 +119,13 @@ def dented() -> trimesh.Trimesh:
         make.cylinder(0.05, 0.1, sections=6),
         make.annulus(0.03, 0.05, 0.02, sections=8),
         make.box((0.1, 0.1, 0.02)),
+        make.box((0.4, 0.3, 0.003)),
+        make.box((0.32, 0.24, 0.002)),
         dented(),
         with_spout(),
         with_handle(),
     ],
-    ids=["hexagon", "octagon", "box", "dented", "spout", "handle"],
+    ids=["hexagon", "octagon", "box", "sheet", "foil", "dented", "spout", "handle"],
 )
 def test_what_is_not_round_is_none(mesh: trimesh.Trimesh) -> None:
     assert rings.of_shape(as_shape(mesh)) is None

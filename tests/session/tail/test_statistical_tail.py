@@ -142,3 +142,12 @@ def test_modes_say_what_a_scene_adds(tmp_path: Path, monkeypatch: pytest.MonkeyP
     few, whole = (json.loads(Path(name).read_text())["modes"] for name in ("few.json", "all.json"))
     assert len(few) == 12 and len(whole) > 60 and whole[:12] == few
     assert "with --tail, or tail=True in a scene, above them" in capfd.readouterr().out  # type: ignore[attr-defined]
+
+
+def test_a_thick_slab_of_wood_keeps_its_modes_in_order() -> None:
+    """Its damping bends the highest frequencies back down."""
+    wood = load_material("wood")
+    model = analyse_body((Shape("box", np.array([0.4, 0.3, 0.04])),), wood, tail=False)
+    grown = with_tail(model, wood)
+    assert (np.diff(grown.freq_hz) >= 0).all()
+    assert grown.freq_hz[: model.mode_count] == pytest.approx(model.freq_hz, rel=0)
