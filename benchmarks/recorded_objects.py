@@ -95,6 +95,6 @@ OBJECTS = {
         "numbers measured on https://github.com/hellojxt/DiffSound, data/real_audio and data/mesh/bowl, as in the copy "
         "TechnetiumMan/DiffSound at d2a97cd", f"none stated; {NUMBERS_ALONE}", "porcelain",
         whole("mic*.flac", 0.5, 3.5), mesh="bowl.obj",
-        shape_note="the spread of E/ρ holds 0.5 % of each dimension; `fit` says that the mesh may move it by 1.6 %",
+        shape_note="the spread of E/ρ holds 0.5 % of each dimension; `fit` says that the mesh may move it by 2 %",
     ),
 }  # fmt: skip

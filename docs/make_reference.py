@@ -219,11 +219,11 @@ def commands_page() -> str:
         "",
         MADE,
         "",
-        "`sonic-bullet COMMAND --help` says the same. Exit codes: 0 done; 2 one line on stderr says what is wrong;",
+        "`sonic-bullet COMMAND --help` says the same. Exit codes: 0 done; 1 sounds differ, or a result is worse than",
     ]
     parts += [
-        "130 or 143 stopped, with what was rendered so far closed as a valid file. `--json` alone writes "
-        "JSON to stdout.",
+        "silence or missing; 2 one line on stderr says what is wrong; 130 or 143 stopped, with what was",
+        "rendered so far closed as a valid file. `--json` alone writes JSON to stdout.",
         "",
         "What is being done stands on stderr. A terminal shows one line of it. Elsewhere there is a line a stage, and",
         "every 4 s at least, such as `[12 s] render drop.py: modes of bowl: …`. `SONIC_BULLET_PROGRESS=0` silences it.",

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals
+from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, welded
 from sonic_bullet.records import Array, Shape
 
 SHORTEST_SIDE_M = 0.25
@@ -19,7 +19,7 @@ UNBOUNDED_M = 1e6
 FILLED = 0.7
 """Fraction of its bounding rectangle that a face fills at least: a disc has π/4."""
 SAME_PLANE = 1e-3
-"""Radians, and parts of the body's size, within which triangles lie in one plane."""
+"""Radians within which triangles face one way."""
 
 
 def flat_faces(shapes: Sequence[Shape]) -> Array:
@@ -58,16 +58,25 @@ def _own_faces(shape: Shape) -> Array:
 
 
 def _mesh_faces(vertex_m: Array, face: Array) -> Array:
-    """Join triangles of one plane to rectangles (k, 3, 3)."""
+    """Join neighbouring triangles of one plane to rectangles (k, 3, 3)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    vertex_m, face = welded(vertex_m, face)
     area, normal = face_areas_m2(vertex_m, face), outward_normals(vertex_m, face)
-    large = max(float(np.ptp(vertex_m, axis=0).max()), 1e-12)
-    offset = np.einsum("fi,fi->f", normal, vertex_m[face[:, 0]]) / large
-    found, free = [], area > 0
-    for first in np.argsort(-area, kind="stable").tolist():
-        if not free[first]:
-            continue
-        mine = free & (normal @ normal[first] > 1 - SAME_PLANE**2 / 2) & (abs(offset - offset[first]) < SAME_PLANE)
-        free &= ~mine
+    edge = np.sort(np.stack([face, np.roll(face, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    order = np.lexsort(edge.T)
+    same = np.flatnonzero((edge[order][1:] == edge[order][:-1]).all(axis=1))
+    one, other = order[same] // 3, order[same + 1] // 3
+    level = 1 - SAME_PLANE**2 / 2
+    flat = np.einsum("ei,ei->e", normal[one], normal[other]) > level
+    pairs = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(face), len(face)))
+    _, label = connected_components(pairs, directed=False)
+    found = []
+    for piece in np.flatnonzero(np.bincount(label, area) >= SHORTEST_SIDE_M**2):
+        mine = np.flatnonzero(label == piece)
+        first = mine[np.argmax(area[mine])]
+        mine = mine[normal[mine] @ normal[first] > level]  # triangles of a finely cut bend turn little by little
         if area[mine].sum() >= SHORTEST_SIDE_M**2:
             made = _rectangle(vertex_m[np.unique(face[mine])], normal[first], float(area[mine].sum()))
             found += [made] if made is not None else []

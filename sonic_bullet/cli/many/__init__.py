@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from sonic_bullet.cli.parameters import ManyOptions
 
 
 def run_one_or_many(command: str, sources: Sequence[str], many: ManyOptions, **options: Any) -> None:
-    """Run `fit` or `diagnose` on what it is given; raises SonicBulletError."""
-    if len(sources) > 1 or many.given:
+    """Run `fit` or `diagnose` on what it is given; raises SonicBulletError.
+
+    A case alone is done as many are where -o names a folder.
+    """
+    to = options["output"]
+    into_folder = to is not None and not Path(to).suffix and Path(sources[0]).is_dir()
+    if len(sources) > 1 or many.given or into_folder:
         from sonic_bullet.cli.many.many_cases import run_many
 
         run_many(command, sources, many, **options)

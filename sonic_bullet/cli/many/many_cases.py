@@ -152,10 +152,10 @@ def _rows(command: str, place: Path, cases: Iterable[CaseFolder]) -> list[dict[s
 
 
 def _fit_values(found: Mapping[str, Any]) -> dict[str, Any]:
-    gamma = found["covariance"][2][2]
+    square = found["covariance"][2][2]  # of ln γ
     return {
         "gamma_m2_s2": found["gamma_m2_s2"],
-        "gamma_sd": None if gamma is None else finite(gamma**0.5),
+        "gamma_sd": None if square is None else finite(found["gamma_m2_s2"] * square**0.5),
         "poisson_ratio": found["poisson_ratio"],
         "alpha_per_s": found["alpha_per_s"],
         "beta_s": found["beta_s"],

@@ -108,7 +108,7 @@ def admit_faces(setup: Setup, state: State, step: Step, coming: Sequence[Body], 
             if _is_wall(setup, normal, float(normal @ centre), 4 * float(np.linalg.norm(across))):
                 continue
             for c, microphone in enumerate(own_microphones(setup)):
-                before = microphone.moves or normal @ (microphone.position_m - centre) > 0
+                before = microphone.moves or normal @ (microphone.position_m - centre) >= 0
                 free = np.flatnonzero((images["own"] == c) & (images["active"] == 0))
                 if before and len(free):
                     row, half_m = images[free[0] : free[0] + 1], np.linalg.norm(sides, axis=1)

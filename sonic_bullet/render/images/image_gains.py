@@ -4,7 +4,9 @@
 
 x: the body's centre, M' the microphone's image, P where the line between them meets the face, θ: from its normal there.
 F of a face: 1 well within its edges, a half on them, 0 beyond, over the width of the first zone of diffraction at
-1 kHz, v = s cos θ √(2/λ · (1/|xP| + 1/|PM'|)), s: from the edge inwards      [Rindel, Appl. Acoust. 19, 1986, eq. 6-9]
+1 kHz, v = ±2√(δ/λ), + inwards of an edge; δ: how much longer the way over the edge is than the straight one
+                                                                    [Maekawa 1968, Appl. Acoust. 1, 157: N = 2δ/λ]
+    δ = √((ρ + ρ')² + a²) - |xM'|,   ρ, ρ': of x and M' from the edge's line, a: between them along it
 F_k: of another face of the microphone that lies between, as a table-top is above a floor. A body has no image in its
 own face, nor behind it; a face that moves has none.
 """
@@ -39,16 +41,28 @@ IMAGE = np.dtype(
 
 
 @njit(nogil=True, error_model="numpy")
-def _within(face, at, scale_per_m):  # pragma: no cover - compiled
-    """Compute F where a line meets a face's plane at ``at`` (3,); scale_per_m: √(2/λ·(1/a + 1/b))·cos θ."""
+def _within(face, one, other, at, length):  # pragma: no cover - compiled
+    """Compute F of a face for the line between two points (3,), length apart, that meets its plane at ``at`` (3,)."""
     found = 1.0
     for k in range(2):
-        along = 0.0
+        across, along = 0.0, 0.0  # the crossing's place between the edges; the points' distance along them
         for axis in range(3):
-            along += (at[axis] - face.centre_m[axis]) * face.axis[k, axis]
-        t = 0.5 + 0.5 * (face.half_m[k] - abs(along)) * scale_per_m
-        t = 0.0 if t < 0.0 else (1.0 if t > 1.0 else t)
-        found *= t * t * (3.0 - 2.0 * t)
+            across += (at[axis] - face.centre_m[axis]) * face.axis[k, axis]
+            along += (other[axis] - one[axis]) * face.axis[1 - k, axis]
+        for side in (-1.0, 1.0):
+            inwards = face.half_m[k] - side * across
+            over = 0.0
+            for point in (one, other):
+                out, height = -side * face.half_m[k], -face.offset_m
+                for axis in range(3):
+                    out += (point[axis] - face.centre_m[axis]) * face.axis[k, axis]
+                    height += point[axis] * face.normal[axis]
+                over += np.sqrt(out * out + height * height)
+            longer = np.sqrt(over * over + along * along) - length
+            v = 2.0 * np.sqrt((longer if longer > 0.0 else 0.0) / EDGE_WAVE_M)
+            t = 0.5 + 0.5 * (v if inwards > 0.0 else -v)
+            t = 0.0 if t < 0.0 else (1.0 if t > 1.0 else t)
+            found *= t * t * (3.0 - 2.0 * t)
     return found
 
 
@@ -62,11 +76,10 @@ def _passes(face, one, other, at):  # pragma: no cover - compiled
         length += (other[axis] - one[axis]) ** 2
     if near * far >= 0.0:
         return 1.0
-    length, part = np.sqrt(length), near / (near - far)
+    part = near / (near - far)
     for axis in range(3):
         at[axis] = one[axis] + part * (other[axis] - one[axis])
-    scale_per_m = np.sqrt(2.0 / (EDGE_WAVE_M * length) * (1.0 / part + 1.0 / (1.0 - part)))
-    return 1.0 - _within(face, at, scale_per_m * abs(near - far) / length)
+    return 1.0 - _within(face, one, other, at, np.sqrt(length))
 
 
 @njit(nogil=True, error_model="numpy")
@@ -79,14 +92,14 @@ def _gain(b, c, position_m, image_m, images, work):  # pragma: no cover - compil
         depth -= face.normal[axis] * image_m[axis]
         length += (position_m[axis] - image_m[axis]) ** 2
     length = np.sqrt(length)
-    if height <= 0.0 or depth <= 0.0 or not length < FARTHEST_M:
+    if height <= 0.0 or depth < 0.0 or not length < FARTHEST_M:
         return 0.0
     part = height / (height + depth)
     for axis in range(3):
         foot[axis] = position_m[axis] + part * (image_m[axis] - position_m[axis])
         place[axis] = image_m[axis] + 2.0 * depth * face.normal[axis]
     cosine = (height + depth) / length
-    found = _within(face, foot, cosine * np.sqrt(2.0 / (EDGE_WAVE_M * length) * (1.0 / part + 1.0 / (1.0 - part))))
+    found = _within(face, position_m, image_m, foot, length)
     found *= (cosine - face.admittance) / (cosine + face.admittance)
     for k in range(len(images)):
         other = images[k]

@@ -69,6 +69,14 @@ def test_near_a_floor_low_tones_are_6_db_louder() -> None:
     assert 20 * np.log10(abs(found)) == pytest.approx(6.02, abs=0.02)
 
 
+@pytest.mark.parametrize("height_m", [0.0, 0.001, 0.02])
+def test_near_a_board_it_is_so_where_its_edges_are_far(height_m: float) -> None:
+    """Along the board, too: what an edge sends back has gone 4 m farther, 23 waves of 2 kHz."""
+    board = np.array([[[0, 0, 0], [2.5, 0, 0], [0, 2.5, 0]]])
+    found = ratio_of(board, np.array([0, 0, 0.005]), np.array([0.5, 0, height_m]), 200.0)
+    assert 20 * np.log10(abs(found)) == pytest.approx(6.02, abs=0.02)
+
+
 def test_a_soft_floor_sends_less_back() -> None:
     """Plane waves along the normal: (1 - β)/(1 + β), β = ρ₀c₀/√(ρM); steel gives back all but 2e-5."""
     place, ear = np.array([0, 0, 0.3]), np.array([0.0, 0, 0.9])
