@@ -41,6 +41,16 @@ IMAGE = np.dtype(
 
 
 @njit(nogil=True, error_model="numpy")
+def _from_edge(face, k, side, point):  # pragma: no cover - compiled
+    """Compute ρ of a point (3,) from the line of an edge of a face."""
+    out, height = -side * face.half_m[k], -face.offset_m
+    for axis in range(3):
+        out += (point[axis] - face.centre_m[axis]) * face.axis[k, axis]
+        height += point[axis] * face.normal[axis]
+    return np.sqrt(out * out + height * height)
+
+
+@njit(nogil=True, error_model="numpy")
 def _within(face, one, other, at, length):  # pragma: no cover - compiled
     """Compute F of a face for the line between two points (3,), length apart, that meets its plane at ``at`` (3,)."""
     found = 1.0
@@ -51,13 +61,7 @@ def _within(face, one, other, at, length):  # pragma: no cover - compiled
             along += (other[axis] - one[axis]) * face.axis[1 - k, axis]
         for side in (-1.0, 1.0):
             inwards = face.half_m[k] - side * across
-            over = 0.0
-            for point in (one, other):
-                out, height = -side * face.half_m[k], -face.offset_m
-                for axis in range(3):
-                    out += (point[axis] - face.centre_m[axis]) * face.axis[k, axis]
-                    height += point[axis] * face.normal[axis]
-                over += np.sqrt(out * out + height * height)
+            over = _from_edge(face, k, side, one) + _from_edge(face, k, side, other)
             longer = np.sqrt(over * over + along * along) - length
             v = 2.0 * np.sqrt((longer if longer > 0.0 else 0.0) / EDGE_WAVE_M)
             t = 0.5 + 0.5 * (v if inwards > 0.0 else -v)
