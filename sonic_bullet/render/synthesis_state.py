@@ -95,11 +95,10 @@ class Window:
     row: Array
 
     def with_bodies(self, position_m: Array, quaternion_xyzw: Array) -> None:
-        """Make room for further bodies (k,), which appeared at these poses."""
-        count = len(position_m)
-        self.position_m = np.concatenate([self.position_m, np.broadcast_to(position_m, (SPAN, count, 3))], axis=1)
-        turned = np.broadcast_to(quaternion_xyzw, (SPAN, count, 4))
-        self.quaternion_xyzw = np.concatenate([self.quaternion_xyzw, turned], axis=1)
+        """Make room for further bodies (k,), which appeared at these poses; tables stay in C order."""
+        count, turned = len(position_m), quaternion_xyzw
+        self.position_m = np.concatenate([self.position_m, np.repeat(position_m[None], SPAN, axis=0)], axis=1)
+        self.quaternion_xyzw = np.concatenate([self.quaternion_xyzw, np.repeat(turned[None], SPAN, axis=0)], axis=1)
         self.teleported = np.concatenate([self.teleported, np.zeros((SPAN, count), bool)], axis=1)
 
     def subset(self, keep: Array, number: Array) -> None:

@@ -90,6 +90,16 @@ def test_values_of_the_state_stand_in_the_order_of_the_groups_fields() -> None:
     assert next(values, None) is None and checked == 66
 
 
+def test_tables_stay_in_c_order_as_bodies_come_and_go() -> None:
+    """A table in another order is another type to the compiled driver, which would be compiled anew for it."""
+    window = state_of().window
+    for count in (1, 3, 4):
+        window.with_bodies(np.ones((count, 3)), np.ones((count, 4)))
+        assert all(getattr(window, one.name).flags.c_contiguous for one in fields(window))
+    window.subset(np.array([0, 2, 5]), np.arange(8))
+    assert all(getattr(window, one.name).flags.c_contiguous for one in fields(window))
+
+
 def test_no_table_is_left_out() -> None:
     kinds = kinds_of(Groups)
     for name, kept, own in (
