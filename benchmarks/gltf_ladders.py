@@ -16,7 +16,7 @@ from benchmarks.ladders.impacts import IMPACTS
 from benchmarks.ladders.observed import Observed
 from benchmarks.ladders.surfaces_swept import SWEPT
 from benchmarks.ladders.verdicts import Verdict
-from sonic_bullet.files.atomic import replacing
+from sonic_bullet.storage.atomic import replacing
 
 HEAD = """# Ladders of the draft glTF extension
 

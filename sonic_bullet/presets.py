@@ -35,14 +35,14 @@ from sonic_bullet.effects.damping_law.damping_form import (
 from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
-from sonic_bullet.files.reading import reading
-from sonic_bullet.files.typed_json import decode_json
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import MaterialError, RecordError
 from sonic_bullet.records.touching.surface_form import waves_of
 from sonic_bullet.residual.code import ResidualForm, residual_of
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.reading import reading
+from sonic_bullet.storage.typed_json import decode_json
 
 FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"

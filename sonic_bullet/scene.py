@@ -22,7 +22,6 @@ from typing import Any
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener import (
     Finding,
     diagnose_world,
@@ -43,6 +42,7 @@ from sonic_bullet.session.material_choice import MaterialChoice, as_choice, choo
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_added
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 Progress = Callable[[float], None]
 Receive = Callable[[tuple[Sensor, ...]], tuple[Sensor, ...]]

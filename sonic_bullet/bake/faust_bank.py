@@ -22,7 +22,7 @@ import numpy as np
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.c_bank import identifier
 from sonic_bullet.bake.strike_playback import CONTACT_S, IMPULSE_N_S, LONGEST_CONTACT_S, point_normals, pressure_of
-from sonic_bullet.files.atomic import replacing
+from sonic_bullet.storage.atomic import replacing
 
 FAUST_HEAD = """\
 // {modes} modes at {points} points of {material}, by sonic_bullet.

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sonic_bullet.bake.baked_model import BakedModel
-from sonic_bullet.files.reading import reading
 from sonic_bullet.records.coerce import as_path, nearest, shown
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.reading import reading
 
 SEVERAL_MODELS = (".glb", ".gltf", ".json")
 ONE_MODEL = (".dsp", ".h", ".wav")

@@ -10,11 +10,11 @@ import numpy as np
 
 from sonic_bullet.bake.baked_form import FORMAT, BakedFile, BodyForm, common_form, model_of
 from sonic_bullet.bake.baked_model import BakedModel
-from sonic_bullet.files.atomic import replacing
-from sonic_bullet.files.typed_json import decode_json
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.atomic import replacing
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.typed_json import decode_json
 
 BAKED_REMEDY = "bake it again, or mend that field; docs/reference/baked.md describes the file"
 

@@ -14,7 +14,7 @@ from sonic_bullet.records.counts import format_count
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sonic_bullet.machine.kept_files import KeptFile
+    from sonic_bullet.storage.cache import KeptFile
 
 
 @click.command(epilog=CACHE_EPILOG)
@@ -28,21 +28,20 @@ if TYPE_CHECKING:
 def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
     """List what is kept between runs (computed modes, machine code), bound it or clear it."""
     from sonic_bullet.cli.output import clean_stdout, places, write_json
-    from sonic_bullet.files.cache import folder as models_folder
-    from sonic_bullet.machine import kept_files
     from sonic_bullet.machine.compiled import folder as code_folder
+    from sonic_bullet.storage import cache as store
 
     if clear and limit is not None:
         raise click.UsageError("--clear and --limit are both given: give one of them")
     (json_to,) = places(json_to)
-    most_bytes = None if limit is None else kept_files.as_bytes(limit, "--limit")
-    allowed_bytes = kept_files.limit_bytes()
-    models, code = models_folder("default"), code_folder()
-    computed = [] if models is None else kept_files.computed(models)
-    compiled = [] if code is None else kept_files.compiled(code)
-    removed = kept_files.bounded([*computed, *compiled], 0) if clear else []
+    most_bytes = None if limit is None else store.as_bytes(limit, "--limit")
+    allowed_bytes = store.limit_bytes()
+    models, code = store.folder("default"), code_folder()
+    computed = [] if models is None else store.computed(models)
+    compiled = [] if code is None else store.compiled(code)
+    removed = store.bounded([*computed, *compiled], 0) if clear else []
     if most_bytes is not None:
-        removed = kept_files.bounded(computed, most_bytes)
+        removed = store.bounded(computed, most_bytes)
     gone = {one.path for one in removed}
     left = [one for one in (*computed, *compiled) if one.path not in gone]
     result = {

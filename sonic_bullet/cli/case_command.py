@@ -23,11 +23,11 @@ from sonic_bullet.files import read_channel, replacing
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.case_schema import case_schema
 from sonic_bullet.files.cases import CASE_FORMAT, LENGTH_UNITS, Case, read_case
-from sonic_bullet.machine.json_text import json_bytes
-from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.leftovers import temporary_folder
 
 Point = tuple[float, float, float]
 

@@ -96,7 +96,7 @@ def _settled(words: list[str]) -> list[str]:
 
 def _say_what_is_not_kept() -> None:
     """Report, once, that there is no folder for compiled code and models, which costs each run a minute."""
-    folder = sys.modules.get("sonic_bullet.machine.user_folder")
+    folder = sys.modules.get("sonic_bullet.storage.user_folder")
     if folder is not None and folder.NOTES:
         _say(
             f"note: compiled code and computed models are not kept for the next run: {folder.NOTES[0]}; "

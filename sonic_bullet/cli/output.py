@@ -113,7 +113,7 @@ def write_json(json_to: str | None, value: Any) -> None:
     """Write ``value`` as strict JSON to a path, to stdout for "-", nowhere for None; raises FileError."""
     if json_to is None:
         return
-    from sonic_bullet.machine.json_text import json_bytes
+    from sonic_bullet.storage.json_text import json_bytes
 
     text = json_bytes(value, indent=2)
     if json_to == "-":

@@ -22,7 +22,7 @@ from sonic_bullet.records.file_endings import AUDIO_FORMATS
 if TYPE_CHECKING:
     from sonic_bullet.files import AudioReport, ContactLog
     from sonic_bullet.files.levels import FileLevel
-    from sonic_bullet.files.rows.spool import KeptSound
+    from sonic_bullet.storage.spooled_sound import KeptSound
 
 DEFAULT_TAIL_DB = -60.0
 OPTIONS = ("peak_dbfs", "lufs", "pascals", "tail_db", "scale_json", "fade_s")
@@ -105,7 +105,7 @@ class LevelWish:
 
     def faded(self, sound: KeptSound, sr: int) -> KeptSound:
         """Return the sound with its fades; AudioError where it is shorter than they are."""
-        from sonic_bullet.files.loudness.gain_curve import GainCurve
+        from sonic_bullet.storage.spooled_sound import GainCurve
 
         if self.fade_s is None:
             return sound

@@ -31,13 +31,13 @@ from sonic_bullet.comparing.tolerance import (
     passes,
 )
 from sonic_bullet.files import replacing
-from sonic_bullet.files.reading import reading
-from sonic_bullet.files.rows.spool import KeptSound
-from sonic_bullet.files.typed_json import decode_json
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.reading import reading
+from sonic_bullet.storage.spooled_sound import KeptSound
+from sonic_bullet.storage.typed_json import decode_json
 
 BASELINE_FOLDER = "sonic_baselines"
 BASELINE_FORMAT = "sonic_bullet baseline 1"

@@ -24,12 +24,12 @@ from sonic_bullet.comparing.revision_tree import unpinned, unpinned_words
 from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, run
 from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records.coerce import as_call
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.render import render_kept
 from sonic_bullet.session.scene_file import defines_build
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 Given = str | Path | SceneSide | ContactLog | Side
 Tell = Callable[[str], None]

@@ -12,8 +12,8 @@ import numpy as np
 from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing, write_audio
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
+from sonic_bullet.storage.json_text import json_bytes
 
 
 def write_failure(folder: Path, found: Comparison) -> None:

@@ -69,10 +69,10 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
     """Call ``check`` in a child process, which a scene may end; return its result."""
-    from sonic_bullet.machine.json_text import json_bytes
     from sonic_bullet.machine.supervisor import supervised
-    from sonic_bullet.machine.worker import temporary_folder
     from sonic_bullet.records.errors import SonicBulletError
+    from sonic_bullet.storage.json_text import json_bytes
+    from sonic_bullet.storage.leftovers import temporary_folder
 
     with temporary_folder() as folder:
         answer = folder / "answer.json"

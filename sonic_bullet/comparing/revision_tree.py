@@ -118,7 +118,7 @@ def unpinned_words(found: set[str]) -> tuple[str, ...]:
 
 def _is_installed(path: Path) -> bool:
     """Tell whether a file belongs to the interpreter, its packages, this package or its cache."""
-    from sonic_bullet.machine.user_folder import cache_folders
+    from sonic_bullet.storage.user_folder import cache_folders
 
     library = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "platstdlib")]
     homes: list[Path] = [*library, *_PACKAGE, *cache_folders()]

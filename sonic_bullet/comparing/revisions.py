@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sonic_bullet.comparing.revision_tree import RevisionTree
-from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import CompareError
+from sonic_bullet.storage.leftovers import temporary_folder
 
 
 @contextmanager

@@ -18,7 +18,6 @@ import numpy as np
 from sonic_bullet.comparing.revision_tree import RevisionTree, noted_files, own_modules
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, shown
@@ -28,6 +27,7 @@ from sonic_bullet.render import render_kept
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.wanted_bodies import WantedBody
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 Say = Callable[[str], None]
 OF_WHOM = ("body", "links", "parts", "own_shapes")

@@ -13,8 +13,8 @@ import numpy as np
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.models import model_key
 from sonic_bullet.listener.animated import matrices
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
+from sonic_bullet.storage.json_text import json_bytes
 
 
 def contact_labels(log: ContactLog) -> list[dict[str, Any]]:

@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.reading import reading
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, shown
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.scene_file import user_code
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.reading import reading
 
 READY = {"impacts": Path(__file__).with_name("impacts.py")}
 """Recipes of the package, by name."""

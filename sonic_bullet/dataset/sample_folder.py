@@ -20,11 +20,11 @@ from typing import Any
 import msgspec
 
 from sonic_bullet.dataset.samples import Sample
-from sonic_bullet.files.atomic import replacing
 from sonic_bullet.files.audio import write_audio
-from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines, written
-from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.atomic import replacing, write_errors
+from sonic_bullet.storage.json_text import json_bytes
 
 LabelledSounds = Callable[[], Iterator[tuple[dict[str, Any], Path]]]
 """Labels and sound file of each sample, by number, from the first at each call."""
@@ -49,7 +49,7 @@ class SampleFolder:
     def keep(self, sample: Sample, split: str) -> None:
         """Write a sample: sound first, labels last."""
         audio = self.place(sample.number, ".wav")
-        with written(audio):
+        with write_errors(audio):
             audio.parent.mkdir(parents=True, exist_ok=True)
         write_audio(audio, sample.sound.astype(float), sample.sr, subtype="FLOAT")
         try:

@@ -33,11 +33,11 @@ from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import choose_lines
 from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, recorded_signals
 from sonic_bullet.files import read_audio, read_channel
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import SPLITS, Case, CaseRecording, read_case
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
+from sonic_bullet.storage.cache import Place
 
 
 @dataclass(frozen=True, slots=True, eq=False)

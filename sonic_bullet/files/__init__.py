@@ -8,7 +8,6 @@ modal models (`logs` describes both), `container` is the npz below them, `meshes
 `reading` is the boundary of all readers, `atomic` replaces files.
 """
 
-from sonic_bullet.files.atomic import cannot, check_output, kept_name, replacing
 from sonic_bullet.files.audio import AudioWriter, check_audio_output, write_at_level, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import check_levels, check_sr
@@ -16,6 +15,7 @@ from sonic_bullet.files.logs import read_log, write_log
 from sonic_bullet.files.loudness.audio_report import AudioReport
 from sonic_bullet.files.models import read_model, write_model
 from sonic_bullet.files.recordings import live_channel, read_audio, read_audio_scale, read_channel
+from sonic_bullet.storage.atomic import cannot, check_output, kept_name, replacing
 
 __all__ = [
     "AudioReport",

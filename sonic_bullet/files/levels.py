@@ -15,11 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.files.loudness.gain_curve import GainCurve
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number, as_whole, shown
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.storage.spooled_sound import GainCurve, KeptSound
 
 LUFS_WITHIN = 0.01
 LIMITER_LOOKS, MOST_STEPS = 6, 20

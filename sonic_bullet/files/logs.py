@@ -56,7 +56,6 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.container import REMEDY, Column, distinct, read_container, take, write_container
 from sonic_bullet.files.levels import check_sr
 from sonic_bullet.files.log_header import (
     RESIDUAL_ARRAYS,
@@ -75,13 +74,14 @@ from sonic_bullet.files.log_header import (
     unpack_sensor,
 )  # fmt: skip
 from sonic_bullet.files.models import PACKED, as_json_text, pack_models, recalled_models, unpack_models
-from sonic_bullet.files.reading import reading
 from sonic_bullet.files.rows.flat_face_entries import face_arrays, taken_faces
 from sonic_bullet.files.rows.step_entries import LAZY, read_steps, step_entries
 from sonic_bullet.files.rows.surface_forms import track_arrays, unpack_form
 from sonic_bullet.records import Air, Array, Material, ModalModel
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import LogError
+from sonic_bullet.storage.container import REMEDY, Column, distinct, read_container, take, write_container
+from sonic_bullet.storage.reading import reading
 
 LOG_FORMAT = "sonic-bullet-contacts/3"
 

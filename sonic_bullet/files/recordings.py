@@ -15,12 +15,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from sonic_bullet.files.reading import reading
 from sonic_bullet.files.riff.scale import read_chunk_scale, scale_in
 from sonic_bullet.records.arrays import Array
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.storage.reading import reading
 
 READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
 # half a gibibyte as float64; or samples a byte of the file, which only packed silence exceeds

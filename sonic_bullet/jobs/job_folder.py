@@ -16,9 +16,9 @@ from typing import Any
 
 import msgspec
 
-from sonic_bullet.files.atomic import cannot, replacing
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.atomic import replacing, write_errors
+from sonic_bullet.storage.json_text import json_bytes
 
 try:
     import fcntl
@@ -49,7 +49,7 @@ def open_job_folder(
         Other settings made it, another run writes it, it holds other files, or it cannot be written.
     """
     place = Path(root).absolute()
-    with written(place):
+    with write_errors(place):
         place.mkdir(parents=True, exist_ok=True)
         lock = os.open(place, os.O_RDONLY) if fcntl is not None else None
     try:
@@ -88,12 +88,3 @@ def write_json_lines(place: Path, values: Iterable[Any]) -> None:
     """Write values of JSON, a line each; FileError where that fails."""
     with replacing(place) as file:
         file.writelines(json_bytes(value) + b"\n" for value in values)
-
-
-@contextmanager
-def written(path: Path) -> Iterator[None]:
-    """Convert errors of writing to a path, or of making a folder there, to a FileError."""
-    try:
-        yield
-    except OSError as error:
-        raise cannot("write", path, error) from error

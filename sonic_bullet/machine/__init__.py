@@ -1,1 +1,1 @@
-"""Platform: private folders, locked unfinished files, compiled code, progress, supervised processes."""
+"""Platform: compiled code, progress, supervised processes."""

@@ -20,7 +20,7 @@ from typing import Any
 
 import numba
 
-from sonic_bullet.machine.user_folder import START_FOLDER, cache_folder, private_folder
+from sonic_bullet.storage.user_folder import START_FOLDER, cache_folder, private_folder
 
 KNOWN_NUMBA = ["0", "68"]
 """The release of numba whose inner parts `linked_once` uses. With any other, numba's own compilation is used: the same

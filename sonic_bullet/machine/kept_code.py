@@ -3,7 +3,7 @@
     index (signature -> file) | machine code, each: numba's bytes, written to a temporary file and renamed
 
 It uses inner parts of numba, and `sonic_bullet.machine.compiled` does without where they moved. numba unpickles what it
-finds, so the folder must be this user's alone (`sonic_bullet.machine.user_folder`). An error while code is loaded is a
+finds, so the folder must be this user's alone (`sonic_bullet.storage.user_folder`). An error while code is loaded is a
 miss, one while it is kept costs the next run time. Code is of the sources it was compiled from, and those are several
 files: `source_stamp`.
 """

@@ -15,7 +15,6 @@ import os
 import signal
 import struct
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -25,6 +24,7 @@ from types import FrameType
 from typing import Any
 
 from sonic_bullet.machine.progress import open_sink
+from sonic_bullet.storage.leftovers import report_leftovers
 
 LONGEST = 4000  # bytes of a message: pipes take so much at once (PIPE_BUF)
 ASK_WHERE, END_IDLE = getattr(signal, "SIGUSR1", None), getattr(signal, "SIGUSR2", None)
@@ -57,6 +57,7 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
     _LINE.fd, _LINE.clock, _LINE.process = fd, clock, os.getpid()
     catch_stops()
     open_sink(fd)
+    report_leftovers(lambda path: tell("left", path))
     faulthandler.enable(traces, all_threads=False)
     # between two bytecodes: faulthandler, at any moment, ends a Python 3.12 or 3.13 now and then
     signal.signal(ASK_WHERE, lambda _, frame: _say_where(traces, frame))  # type: ignore[arg-type]
@@ -126,11 +127,6 @@ def tell(kind: str, text: str = "") -> None:
             os.write(_LINE.fd, f"{kind} {' '.join(text.splitlines())}\n".encode("utf-8", "surrogateescape")[:LONGEST])
 
 
-def note_leftover(path: str | Path) -> None:
-    """Register a file or folder to be removed where this process is killed, unless it has been renamed by then."""
-    tell("left", str(path))
-
-
 def note_closing() -> None:
     """Report that what was made before an interrupt is being written, so that the supervisor waits."""
     tell("closing")
@@ -162,14 +158,6 @@ def scene_line(frame: FrameType | None) -> tuple[str, int]:
     while frame is not None and frame.f_code.co_filename != _LINE.scene:
         frame = frame.f_back
     return Path(_LINE.scene).name, 0 if frame is None else frame.f_lineno
-
-
-@contextmanager
-def temporary_folder() -> Iterator[Path]:
-    """Provide a folder that is removed afterwards, however this process ends."""
-    with tempfile.TemporaryDirectory(prefix="sonic-bullet-") as folder:
-        note_leftover(folder)
-        yield Path(folder)
 
 
 def end_with(parent: int) -> None:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.files import cache as store
 from sonic_bullet.modal import cost, lagrange, polynomials
 from sonic_bullet.modal.elements import CUBIC_UNKNOWNS, MOST_UNKNOWNS, UNKNOWNS_PER_TET, Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
@@ -23,6 +22,7 @@ from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, Wanted
 from sonic_bullet.records import Array, Shape
+from sonic_bullet.storage import cache as store
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled

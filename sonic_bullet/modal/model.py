@@ -15,7 +15,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.files import cache as store
 from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.modal.keys import key
@@ -27,6 +26,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
+from sonic_bullet.storage import cache as store
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files import cache as store
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.model import diagonal_m
@@ -25,6 +24,7 @@ from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, SHIFT
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
 from sonic_bullet.records.errors import MeshError
+from sonic_bullet.storage import cache as store
 
 ANCHORS: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = (
     ((1, 1, 1), (1, 1, 1)),

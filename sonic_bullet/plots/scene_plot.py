@@ -21,11 +21,11 @@ import numpy as np
 from sonic_bullet.files import check_output, check_sr, replacing
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import as_sound
-from sonic_bullet.files.rows.spool import READ_FRAMES, KeptSound
 from sonic_bullet.records import Array, ContactMicrophone, Microphone, Sensor, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, SoundEvent, find_sound_events
+from sonic_bullet.storage.spooled_sound import READ_FRAMES, KeptSound
 
 BARS = {SUPPORT: "rests", ROLL: "rolls", SLIDE: "slides"}
 LANES_MAX = 24

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Microphone, RoomResponse, ShoeboxRoom, channels_of
@@ -31,6 +30,7 @@ from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.silence import body_notes, render_notes, silence_notes, why_silent
 from sonic_bullet.render.standing import placed_points
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
+from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 __all__ = [
     "LATENCY_STEPS",

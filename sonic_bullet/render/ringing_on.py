@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.storage.spooled_sound import KeptSound
 from sonic_bullet.synth.strikes import LOOKAHEAD
 
 if TYPE_CHECKING:

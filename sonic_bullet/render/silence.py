@@ -13,7 +13,6 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import as_sound
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.radiation.compact import COMPACT
 from sonic_bullet.radiation.radiated import radiation_note
 from sonic_bullet.records import Array, Body, Microphone, Vibrometer, channel_sensors
@@ -22,6 +21,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.render.resonator import Resonator, build_resonator
+from sonic_bullet.storage.spooled_sound import KeptSound
 from sonic_bullet.synth.strikes import SPAN
 
 NAMED_SILENT, MANY_SILENT = 3, 20

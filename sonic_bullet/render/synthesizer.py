@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records import Air, Array, Sensor
 from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
@@ -33,6 +32,7 @@ from sonic_bullet.render.standing.supports import settle
 from sonic_bullet.render.surface.finished_channels import finish_channels
 from sonic_bullet.render.surface.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
+from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 from sonic_bullet.synth import path, path_places
 from sonic_bullet.synth.clock import Clock, exact_step
 from sonic_bullet.synth.path_kernel import AT_REST

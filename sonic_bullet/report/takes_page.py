@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files import replacing
-from sonic_bullet.files.rows.spool import KeptSound
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 STYLE = """
 :root{color-scheme:light dark;--line:#8886}

@@ -13,11 +13,11 @@ import warnings
 import numpy as np
 
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
-from sonic_bullet.files.rows.spool import SoundSpool
 from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Event, Step
 from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
+from sonic_bullet.storage.spooled_sound import SoundSpool
 
 
 class KeptRun:

@@ -19,7 +19,6 @@ import numpy as np
 
 from sonic_bullet.files import AudioReport, check_sr, write_audio
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.opening import open_simulator
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
@@ -41,6 +40,7 @@ from sonic_bullet.session.wanted_bodies import (
     wanted_body,
     wanted_cast,
 )
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 
 class Listener:

@@ -15,8 +15,8 @@ from typing import Any
 
 from sonic_bullet.files import replacing
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.soundtrack.sound_events import SOUNDING, SoundEvent
+from sonic_bullet.storage.json_text import json_bytes
 
 EVENT_COLUMNS = (
     "kind",

@@ -16,7 +16,6 @@ import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import FileLevel, check_levels, find_level
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener.pictures import Camera, Standing, open_pictures
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import arrays_in_order
@@ -27,6 +26,7 @@ from sonic_bullet.soundtrack.film_writer import FilmWriter, check_film_output, c
 from sonic_bullet.soundtrack.overlay import shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import SoundEvent, touching_pairs
 from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of, staged
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,16 +29,15 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.files import check_output, check_sr
-from sonic_bullet.files.atomic import cannot, kept_name
 from sonic_bullet.files.riff.scale import scale_text
-from sonic_bullet.files.rows.spool import KeptSound
-from sonic_bullet.machine.partial_file import PartialFile
 from sonic_bullet.machine.worker import note_closing
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest, shown
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.soundtrack.film_codecs import CODECS, CONTAINERS
 from sonic_bullet.soundtrack.frame_rates import fraction_of
+from sonic_bullet.storage.atomic import PartialFile, cannot, kept_name
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 SIDE_MOST = 8192
 SOUND_BLOCK_S = 0.5

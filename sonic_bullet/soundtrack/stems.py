@@ -21,13 +21,13 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import FileLevel, find_level
 from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.files.riff.wave_chunks import Cue
-from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records import channels_of
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.render.apart import render_apart
 from sonic_bullet.render.room.room_convolution import keep_with_room
 from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.synthesis_state import Witness
+from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 NAME_LENGTH = 60
 """Characters of a body's name that its file keeps: 255 bytes hold them in any script, with number and ending."""

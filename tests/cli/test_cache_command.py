@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from sonic_bullet.cli import cli
-from sonic_bullet.files import cache
 from sonic_bullet.machine import compiled
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage import cache
 from tests.made.logs import log
 
 

@@ -26,11 +26,11 @@ import sonic_bullet.scene
 from sonic_bullet.cli import main
 from sonic_bullet.files import read_audio, read_log, write_log
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Body, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.scene import RenderResult
+from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.few_cases import parametrize_few
 
 SR = 8000

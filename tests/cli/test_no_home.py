@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.files import cache
-from sonic_bullet.machine import user_folder
+from sonic_bullet.storage import cache, user_folder
 
 REPO = Path(__file__).resolve().parents[2]
 

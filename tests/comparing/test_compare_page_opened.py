@@ -12,8 +12,8 @@ import pytest
 from sonic_bullet.comparing.compared_sides import compared
 from sonic_bullet.comparing.comparison_record import Consequence, Difference
 from sonic_bullet.comparing.sides import Side
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.report.compare_page import page_entry, write_page
+from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.comparing.chromium import Browser, chromium
 
 HOSTILE = '<script>document.title="ran"</script><img src=x onerror="document.title=1">'

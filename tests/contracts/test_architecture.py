@@ -158,7 +158,7 @@ def test_all_json_goes_through_one_encoder() -> None:
     """json.dumps knows no numpy.bool, and each place had its own answer to NaN."""
     own = {"json.dump", "json.dumps", "msgspec.json.encode", "msgspec.json.Encoder", "msgspec.json.format"}
     who = {str(path.relative_to(PACKAGE)): called(parse(path)) & own for path in MODULES}
-    assert {name for name, found in who.items() if found} == {"machine/json_text.py"}
+    assert {name for name, found in who.items() if found} == {"storage/json_text.py"}
 
 
 def test_materials_become_modes_in_one_place() -> None:

@@ -21,9 +21,9 @@ from sonic_bullet.dataset import sample_folder
 from sonic_bullet.dataset.object_splits import as_shares, splits_of
 from sonic_bullet.dataset.sample_folder import open_folder
 from sonic_bullet.files import read_audio
-from sonic_bullet.files.atomic import cannot
 from sonic_bullet.jobs.job_processes import TRIES, Failed, run_jobs
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.atomic import cannot
 from tests.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 

@@ -14,8 +14,9 @@ from pathlib import Path
 import numba.core.caching
 import pytest
 
-from sonic_bullet.machine import compiled, user_folder
-from sonic_bullet.machine.user_folder import private_folder
+from sonic_bullet.machine import compiled
+from sonic_bullet.storage import user_folder
+from sonic_bullet.storage.user_folder import private_folder
 from tests.few_cases import parametrize_few
 
 PACKAGE = Path(__file__).resolve().parents[2] / "sonic_bullet"

@@ -9,11 +9,11 @@ import pytest
 
 from benchmarks.load_leaps import find_leaps
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows import spool
 from sonic_bullet.plots import scene_plot
 from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.storage import spool, spooled_sound
 
 SR = 48_000
 DT = 1 / 240
@@ -154,7 +154,7 @@ def test_a_picture_of_sound_on_disk_is_that_of_the_same_in_memory(
     monkeypatch.setattr(spool, "MEMORY_BYTES", 1000)
     monkeypatch.setattr(spool, "BLOCK_BYTES", 1000)
     samples = np.random.default_rng(0).normal(size=(2, 20_000))
-    kept = spool.SoundSpool(2)
+    kept = spooled_sound.SoundSpool(2)
     for start in range(0, 20_000, 700):
         kept.add(samples[:, start : start + 700])
     assert kept.on_disk

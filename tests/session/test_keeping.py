@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.files.rows import log_steps, spool
+from sonic_bullet.files.rows import log_steps
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.errors import AudioError, FileError, RecordError, SceneError, SceneWarning
+from sonic_bullet.storage import spool
 from tests.made.disks import full_disk
 from tests.made.logs import same
 from tests.made.worlds import floor, sounding_box

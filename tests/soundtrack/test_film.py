@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.pictures import Camera, Figure, open_pictures, standing_in
 from sonic_bullet.records import Body
@@ -22,6 +21,7 @@ from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
 from sonic_bullet.soundtrack.overlay import COLOURS, pixel, shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events
 from sonic_bullet.soundtrack.staging import chosen_camera, duration_of, staged
+from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.made.films import decoded
 from tests.made.models import STEEL, box_body, box_surface
 from tests.made.soundtracks import MICROPHONES, table_log

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.soundtrack.film_writer import (
     CODECS,
@@ -20,6 +19,7 @@ from sonic_bullet.soundtrack.film_writer import (
     pictures_of,
     samples_of,
 )
+from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.made.disks import full_disk
 from tests.made.films import SIDE, SR, click_film, click_pictures, click_sound, decoded, write_film
 

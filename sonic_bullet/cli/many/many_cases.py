@@ -23,12 +23,12 @@ from sonic_bullet.cli.line_table import finite, write_csv
 from sonic_bullet.cli.many.case_jobs import PRESET, VALUES, WORDS_FILE, CaseFolder, CaseResult, digest, run_case
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, write_json
 from sonic_bullet.cli.parameters import ManyOptions, cores
-from sonic_bullet.files.atomic import replacing
 from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
-from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines, written
-from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, SonicBulletError
+from sonic_bullet.storage.atomic import replacing, write_errors
+from sonic_bullet.storage.json_text import json_bytes
 
 DONE_FILE = "done.json"
 OUTPUTS = {"picture": "--picture", "csv_to": "--csv", "uff_to": "--uff", "predict": "--predict", "report": "--report"}
@@ -121,7 +121,7 @@ def _is_done(place: Path, case: CaseFolder) -> bool:
 def _keep(folder: Path, found: CaseResult) -> None:
     """Write a case's results, the mark that they are whole last; leave none of them where that fails."""
     marked = {**found.files, DONE_FILE: json_bytes({"case_sha256": found.case_sha256})}
-    with written(folder):
+    with write_errors(folder):
         (folder / DONE_FILE).unlink(missing_ok=True)
         for name in marked:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -14,13 +14,13 @@ from sonic_bullet.records.file_endings import SCENE_ENDINGS
 
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
-    from sonic_bullet.files.rows.spool import KeptSound
     from sonic_bullet.listener.pictures import Standing
     from sonic_bullet.records import RoomResponse, ShoeboxRoom
     from sonic_bullet.render.room.room_plan import RoomPlan
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
     from sonic_bullet.session.material_choice import MaterialChoice
+    from sonic_bullet.storage.spooled_sound import KeptSound
 
 DEFAULT_SR = 48_000
 

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from sonic_bullet.cli.scenes.scene_runs import Replay
     from sonic_bullet.files import AudioReport, ContactLog
     from sonic_bullet.files.levels import FileLevel
-    from sonic_bullet.files.loudness.gain_curve import GainCurve
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.soundtrack.sound_events import SoundEvent
     from sonic_bullet.soundtrack.stems import Stem
+    from sonic_bullet.storage.spooled_sound import GainCurve
 
 
 def soundtrack_options(command: Any) -> Any:

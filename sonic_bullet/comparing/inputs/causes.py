@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 LEVEL_WINDOW, FLOOR_DB = 1024, -100.0
 """Log spectra: samples of a frame, and floor re the loudest value of A."""

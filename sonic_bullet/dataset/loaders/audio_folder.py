@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sonic_bullet.dataset.sample_folder import LabelledSounds
-from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.storage.json_text import json_bytes
 
 
 def write_audio_folder(samples: LabelledSounds, to: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,10 @@ from sonic_bullet.dataset.loaders.lerobot_rows import write_lerobot
 from sonic_bullet.dataset.loaders.maniwav import write_replay_buffers
 from sonic_bullet.dataset.loaders.tar_shards import write_tar_shards
 from sonic_bullet.dataset.sample_folder import LabelledSounds, SampleFolder
-from sonic_bullet.files.atomic import cannot
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.atomic import replacing_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,22 +60,12 @@ def write_layout(name: str, kept: SampleFolder, numbers: range, say: Say) -> Pat
         It cannot be written, or the format cannot hold these samples.
     """
     to = kept.root / name
-    partial = to.with_name(f".{name}.partial")
 
     def samples() -> Iterator[tuple[dict[str, Any], Path]]:
         for labels in kept.labels(numbers):
             yield labels, kept.root / labels["audio"]
 
     say(name)
-    try:
-        shutil.rmtree(partial, ignore_errors=True)
-        partial.mkdir()
+    with replacing_folder(to) as partial:
         FORMATS[name].write(samples, partial)
-        if to.is_dir():
-            shutil.rmtree(to)
-        partial.replace(to)
-    except OSError as error:
-        raise cannot("write", to, error) from error
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
     return to

@@ -20,8 +20,8 @@ import numpy as np
 
 from sonic_bullet.dataset.loaders.audio_rows import ROWS_PER_S, audio_rows, count_rows, one_kind
 from sonic_bullet.dataset.sample_folder import LabelledSounds
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
+from sonic_bullet.storage.json_text import json_bytes
 
 
 def write_replay_buffers(samples: LabelledSounds, to: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sonic_bullet.dataset.sample_folder import LabelledSounds
-from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.storage.json_text import json_bytes
 
 
 def write_tar_shards(samples: LabelledSounds, to: Path) -> None:

@@ -29,10 +29,10 @@ from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.material_fit import fit_evidence
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.storage.cache import Place
 
 BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
 

@@ -18,11 +18,11 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, inward, moda
 from sonic_bullet.effects.protocol import Elastic
 from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.recorded import guess_of
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.tensor import TensorFamily, tensor_family
 from sonic_bullet.records import Array, Material, ModalModel
+from sonic_bullet.storage.cache import Place
 
 MODES = (30, 160)
 

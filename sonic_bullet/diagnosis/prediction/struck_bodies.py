@@ -22,10 +22,10 @@ from sonic_bullet.estimator.fit.radiation_share import into_air
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.recorded import body_family, guess_of
 from sonic_bullet.estimator.fit.typical_strike import ringing, strike_lines
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.storage.cache import Place
 
 
 @dataclass(frozen=True, slots=True, eq=False)

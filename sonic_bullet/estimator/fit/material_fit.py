@@ -29,12 +29,12 @@ from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.joint_lines import HIGHEST_OF_RATE, RINGING_LINES, Lines, noise_rms
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.storage.cache import Place
 
 __all__ = [
     "POISSON_IDENTIFIED",

@@ -22,7 +22,6 @@ from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_r
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.files import read_channel
-from sonic_bullet.files.cache import Place
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
@@ -30,6 +29,7 @@ from sonic_bullet.modal.reduced import family
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
+from sonic_bullet.storage.cache import Place
 
 
 @dataclass(frozen=True, slots=True, eq=False)

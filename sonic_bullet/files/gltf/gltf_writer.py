@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.atomic import replacing
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage.atomic import replacing
+from sonic_bullet.storage.json_text import json_bytes
 
 FLOAT, UNSIGNED_INT = 5126, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963

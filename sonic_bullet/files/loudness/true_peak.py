@@ -12,8 +12,8 @@ from functools import cache
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound
 from sonic_bullet.records import Array
+from sonic_bullet.storage.spooled_sound import KeptSound
 
 OVERSAMPLING = 16
 SINC_REACH, SINC_BETA = 20, 7.0

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.files.container import REMEDY, Column, RowsOfEntry, take
 from sonic_bullet.files.rows.log_steps import (
     BLOCK_ROWS,
     LOGGED_POSE,
@@ -28,6 +27,7 @@ from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.touching.link_motions import LINK_MOTION, MOTION_FIELDS, check_motions
+from sonic_bullet.storage.container import REMEDY, Column, RowsOfEntry, take
 
 POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "position_m": (float, (3,)),

@@ -22,12 +22,12 @@ from unittest.mock import patch
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.files.reading import refuse_lfs_pointer
 from sonic_bullet.listener.pybullet.clients import disconnect as end
 from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.machine.worker import mark_step, stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words
+from sonic_bullet.storage.reading import refuse_lfs_pointer
 
 ClientHook = Callable[[int], None]
 MOST_CLIENTS = 1024

@@ -33,9 +33,9 @@ from sonic_bullet.listener.polling import (
     loaded,
     packed,
 )
-from sonic_bullet.machine.worker import note_leftover
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError
+from sonic_bullet.storage.leftovers import note_leftover
 
 SUBSTEP_REMEDY = "set numSubSteps to 0 and a smaller time step instead"
 RECORD = np.dtype(

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
+from sonic_bullet.storage.leftovers import temporary_folder
 
 GUARD_S, GUARD_S_PER_TET = 20, 0.002
 """Processor time after which a child counts as hung: ten times what meshes take. That is an error, and nothing else is

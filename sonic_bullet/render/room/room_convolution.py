@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from sonic_bullet.files.rows.spool import KeptSound, SoundSpool
 from sonic_bullet.records import Array
 from sonic_bullet.render.room.room_plan import RoomPlan
+from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 SHORTEST = 1 << 15
 """Samples of a transform: shorter ones cost more a sample."""

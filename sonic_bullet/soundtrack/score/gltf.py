@@ -21,13 +21,13 @@ import numpy as np
 from sonic_bullet.files.gltf.gltf_animation import STRETCH, Sampler, local_transforms, read_channels
 from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
-from sonic_bullet.files.reading import reading
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.frame_rates import rate_of_keys
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 from sonic_bullet.soundtrack.score.keyframes import tipped, upright
+from sonic_bullet.storage.reading import reading
 
 BYTES_MAX = 1 << 30
 POSES_MAX = 2_000_000

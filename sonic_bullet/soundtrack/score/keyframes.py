@@ -15,14 +15,14 @@ from typing import Annotated, Literal
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.container import read_container
-from sonic_bullet.files.reading import reading
-from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.frame_rates import fraction_of
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
+from sonic_bullet.storage.container import read_container
+from sonic_bullet.storage.reading import reading
+from sonic_bullet.storage.typed_json import decode_json
 
 ANIMATION_FORMAT = "sonic-bullet-animation/1"
 Positive = Annotated[float, msgspec.Meta(gt=0)]

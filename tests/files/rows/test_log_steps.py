@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from sonic_bullet import files
-from sonic_bullet.files import container
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.rows import log_steps, spool
+from sonic_bullet.files.rows import log_steps
 from sonic_bullet.files.rows.log_steps import LogSteps, StepLog
 from sonic_bullet.records.contacts import CONTACT, ROW_FIELDS, Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError
+from sonic_bullet.storage import container, spool
 from tests.made.logs import log, same
 
 

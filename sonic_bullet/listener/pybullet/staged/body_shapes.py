@@ -11,8 +11,8 @@ import pybullet
 
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.listener.pybullet.staged.mesh_parts import pieces
-from sonic_bullet.machine.worker import temporary_folder
 from sonic_bullet.records import Array, Shape
+from sonic_bullet.storage.leftovers import temporary_folder
 
 
 def compound(shapes: Sequence[dict[str, Any]], client_id: int) -> int:

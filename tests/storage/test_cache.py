@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.files import cache
-from sonic_bullet.machine import kept_files
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage import cache
 
 
 def name(i: int, kind: str = "modes") -> str:
@@ -33,13 +32,13 @@ def kept(folder: Path, i: int, age_s: float, kind: str = "modes") -> Path:
     [("0", 0), ("500MB", 500_000_000), ("1.5 GB", 1_500_000_000), ("2kB", 2000), ("1MiB", 2**20), ("3G", 3 * 10**9)],
 )
 def test_sizes_in_words(words: str, size: int) -> None:
-    assert kept_files.as_bytes(words, "--limit") == size
+    assert cache.as_bytes(words, "--limit") == size
 
 
 @pytest.mark.parametrize("words", ["", "much", "-1", "1 PB", "1e9", "5MBs", "MB"])
 def test_what_is_no_size_is_named(words: str) -> None:
     with pytest.raises(FileError, match=f"--limit is '{words}'"):
-        kept_files.as_bytes(words, "--limit")
+        cache.as_bytes(words, "--limit")
 
 
 def test_a_save_past_the_limit_drops_what_was_unused_for_longest(
@@ -47,7 +46,7 @@ def test_a_save_past_the_limit_drops_what_was_unused_for_longest(
 ) -> None:
     paths = [kept(tmp_path, i, age_s=1000 - 100 * i) for i in range(5)]
     assert cache.load(tmp_path, name(0)) is not None  # used now, it is the oldest no more
-    monkeypatch.setenv(kept_files.LIMIT_VARIABLE, str(4 * paths[0].stat().st_size))
+    monkeypatch.setenv(cache.LIMIT_VARIABLE, str(4 * paths[0].stat().st_size))
     new = kept(tmp_path, 9, 0)
     assert [path.exists() for path in paths] == [True, False, False, True, True] and new.exists()
 
@@ -55,15 +54,15 @@ def test_a_save_past_the_limit_drops_what_was_unused_for_longest(
 def test_models_that_logs_refer_to_go_last(tmp_path: Path) -> None:
     old, new = kept(tmp_path, 1, 1e6, "model"), kept(tmp_path, 2, 0)
     size = old.stat().st_size
-    (removed,) = kept_files.bounded(kept_files.computed(tmp_path), size)
+    (removed,) = cache.bounded(cache.computed(tmp_path), size)
     assert (removed.path, removed.kind) == (new, "modes") and not new.exists()
-    assert [one.path for one in kept_files.bounded(kept_files.computed(tmp_path), 0)] == [old]
+    assert [one.path for one in cache.bounded(cache.computed(tmp_path), 0)] == [old]
 
 
 def test_a_limit_that_is_no_size_is_said_after_the_result_was_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(kept_files.LIMIT_VARIABLE, "plenty")
+    monkeypatch.setenv(cache.LIMIT_VARIABLE, "plenty")
     with pytest.raises(FileError, match=r"SONIC_BULLET_CACHE_LIMIT is 'plenty'.*2GB"):
         cache.save(tmp_path, name(0), {"x": np.zeros(1000)}, "")
     assert cache.load(tmp_path, name(0)) is not None
@@ -75,15 +74,15 @@ def test_only_what_was_kept_here_is_listed(tmp_path: Path) -> None:
         (tmp_path / foreign).write_bytes(b"x")
     (tmp_path / f"{name(3)}.npz").mkdir()
     (tmp_path / f"{name(4)}.npz").symlink_to(ours)
-    assert [one.path for one in kept_files.computed(tmp_path)] == [ours]
-    assert kept_files.computed(tmp_path / "missing") == kept_files.compiled(tmp_path / "missing") == []
+    assert [one.path for one in cache.computed(tmp_path)] == [ours]
+    assert cache.computed(tmp_path / "missing") == cache.compiled(tmp_path / "missing") == []
 
 
 def test_machine_code_is_listed_a_folder_deeper(tmp_path: Path) -> None:
     (tmp_path / "render_0").mkdir()
     for file in ("a.nbi", "a.1.nbc", "a.txt"):
         (tmp_path / "render_0" / file).write_bytes(bytes(10))
-    found = kept_files.compiled(tmp_path)
+    found = cache.compiled(tmp_path)
     assert sorted(one.path.name for one in found) == ["a.1.nbc", "a.nbi"]
     assert {(one.kind, one.size_bytes) for one in found} == {("machine code", 10)}
 
@@ -91,11 +90,11 @@ def test_machine_code_is_listed_a_folder_deeper(tmp_path: Path) -> None:
 CLEARING = """
 import sys, time
 from pathlib import Path
-from sonic_bullet.machine import kept_files
+from sonic_bullet.storage import cache
 removed, end = 0, time.monotonic() + 20
 print("begun", flush=True)
 while not (Path(sys.argv[1]) / "stop").exists() and time.monotonic() < end:
-    removed += len(kept_files.bounded(kept_files.computed(Path(sys.argv[1])), 0))
+    removed += len(cache.bounded(cache.computed(Path(sys.argv[1])), 0))
 print(removed)
 """
 

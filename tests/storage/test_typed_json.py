@@ -10,10 +10,10 @@ import pytest
 
 from sonic_bullet.files.case_fields import CaseFields
 from sonic_bullet.files.cases import read_case
-from sonic_bullet.files.typed_json import decode_json
 from sonic_bullet.presets import read_preset
 from sonic_bullet.records.errors import AnimationError, FileError, SonicBulletError
 from sonic_bullet.soundtrack.score.keyframes import read_keyframes, read_rules
+from sonic_bullet.storage.typed_json import decode_json
 
 CASE = {"format": "sonic-bullet-case/1", "recordings": []}
 ANIMATION = {"format": "sonic-bullet-animation/1", "fps": 24, "bodies": []}

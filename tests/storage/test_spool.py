@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonic_bullet.files.rows import spool as spool_module
-from sonic_bullet.files.rows.spool import BLOCK_BYTES, KeptSound, SoundSpool, Spool
 from sonic_bullet.records.contacts import CONTACT
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.storage import spool as spool_module
+from sonic_bullet.storage.spool import BLOCK_BYTES, Spool
+from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 from tests.made.disks import full_disk
 
 

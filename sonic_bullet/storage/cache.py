@@ -1,9 +1,13 @@
-"""Cached files: listed, bounded and removed.
+"""Cache of computed arrays on disk, under a hash of their inputs, and how much of it is kept.
 
-    folder -> KIND-<sha256>.npz: size, last use (its time of modification, set at every use) -> over the limit?
-        least recently used files go first; models that logs refer to go last, for nothing computes them anew
+    KIND-sha256(numbers, options, source text that computes it) -> KEY.npz in SONIC_BULLET_CACHE, or the user's cache
+        folder; its time of modification is set at every use
+    over the limit? least recently used files go first; models that logs refer to go last, for nothing computes them
+        anew
 
-Another process may do the same at the same time: a file that has gone is no error, neither here nor to its reader.
+Files are written atomically. A cut, foreign or damaged file is a miss: it is computed anew and replaced. Nothing is
+pickled. Another process may remove any entry at any time: a file that has gone is no error. The user's cache folder is
+private (`sonic_bullet.storage.user_folder`); without a home directory nothing is cached.
 """
 
 from __future__ import annotations
@@ -13,9 +17,18 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from sonic_bullet.records.errors import FileError
+import msgspec
+
+from sonic_bullet.records import Array
+from sonic_bullet.records.errors import FileError, LogError
+from sonic_bullet.storage.container import read_container, write_container
+from sonic_bullet.storage.user_folder import START_FOLDER, cache_folder
+
+Place = Path | Literal["default"] | None
+CACHE_FORMAT = "sonic-bullet-cache/2"
+
 
 LIMIT_VARIABLE = "SONIC_BULLET_CACHE_LIMIT"
 ENTRY_NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
@@ -24,6 +37,69 @@ SIZE = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
 OF_LOGS, CODE_KIND = "models of logs", "machine code"
 ENTRY_KINDS = {"radiation": "radiation", "model": OF_LOGS}
 """Kind of an entry by the first word of its name; all others are modes, and what they are made of."""
+
+
+class _Header(msgspec.Struct):
+    format: str
+    note: str
+
+
+def folder(place: Place) -> Path | None:
+    """Return the cache's folder: ``place``, or for "default" SONIC_BULLET_CACHE or the user's; None: no cache."""
+    if place is None:
+        return None
+    if place != "default":
+        return Path(place)
+    given = os.environ.get("SONIC_BULLET_CACHE")
+    return START_FOLDER / given if given else cache_folder("modal")
+
+
+def holds(place: Place, name: str) -> bool:
+    """Tell whether there is an entry of that name, valid or not."""
+    at = folder(place)
+    return at is not None and (at / f"{name}.npz").is_file()
+
+
+def load(place: Place, name: str) -> tuple[dict[str, Array], str] | None:
+    """Return arrays and note of the entry ``name``, or None where no entry can be read."""
+    where = folder(place)
+    if where is None:
+        return None
+    path = where / f"{name}.npz"
+    try:
+        header, arrays = read_container(path, _Header, CACHE_FORMAT, "cached model")
+    except (FileError, LogError):
+        return None
+    touch(path)
+    return arrays, header.note
+
+
+def save(place: Place, name: str, arrays: dict[str, Array], note: str) -> None:
+    """Store arrays and note under ``name``; a full or read-only disk is ignored.
+
+    Raises
+    ------
+    FileError
+        SONIC_BULLET_CACHE_LIMIT is not a size.
+    """
+    where = folder(place)
+    if where is None:
+        return
+    with suppress(OSError, FileError):
+        where.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_container(where / f"{name}.npz", _Header(CACHE_FORMAT, note), arrays)
+    bound(where)
+
+
+def bound(where: Path) -> None:
+    """Remove the entries unused for longest, where the cache is over its limit.
+
+    Raises
+    ------
+    FileError
+        SONIC_BULLET_CACHE_LIMIT is not a size.
+    """
+    bounded(computed(where), limit_bytes())
 
 
 class KeptFile(NamedTuple):

@@ -13,8 +13,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from sonic_bullet.files.atomic import cannot
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
+from sonic_bullet.storage.atomic import cannot
 
 # most characters from a file: in all; in the fault and in the remedy, where it would be more
 QUOTED, WHAT, REMEDY_LETTERS = 200, 120, 80

@@ -11,7 +11,6 @@ import pytest
 
 from sonic_bullet import files, presets
 from sonic_bullet.files.cases import read_case
-from sonic_bullet.files.reading import QUOTED, reading
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import (
     MESSAGE_BYTES,
@@ -22,6 +21,7 @@ from sonic_bullet.records.errors import (
     SonicBulletError,
     excerpt,
 )
+from sonic_bullet.storage.reading import QUOTED, reading
 
 LONG = "Q" * 185_000
 WORDS = "Q QQ " * 40_000

@@ -23,13 +23,13 @@ from typing import Any, BinaryIO, TypeVar
 import msgspec
 import numpy as np
 
-from sonic_bullet.files.atomic import replacing
-from sonic_bullet.files.reading import reading
-from sonic_bullet.files.rows.spool import read_at
-from sonic_bullet.files.typed_json import decode_json
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
+from sonic_bullet.storage.atomic import replacing
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.reading import reading
+from sonic_bullet.storage.spool import read_at
+from sonic_bullet.storage.typed_json import decode_json
 
 HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonic_bullet.machine.json_text import json_bytes
+from sonic_bullet.storage.json_text import json_bytes
 
 
 @dataclass

@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from sonic_bullet.files.unread import nearest_field, shown
-from sonic_bullet.machine.json_text import json_bytes
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.storage.json_text import json_bytes
+from sonic_bullet.storage.unread import nearest_field, shown
 
 T = TypeVar("T")
 Key = str | int
