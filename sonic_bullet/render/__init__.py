@@ -28,7 +28,6 @@ from sonic_bullet.render.room import room_of
 from sonic_bullet.render.room.room_convolution import add_room, keep_with_room
 from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.silence import body_notes, render_notes, silence_notes, why_silent
-from sonic_bullet.render.standing import placed_points
 from sonic_bullet.render.synthesizer import LATENCY_STEPS, Synthesizer
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
@@ -239,4 +238,3 @@ def make_ready() -> None:
     """Load the run time's machine code, or compile it where it is not cached: else the first step would wait for it."""
     nobody = Step(1 / 240, np.zeros((0, 3)), np.zeros((0, 4)), np.zeros(0, bool), Contacts.none())
     Synthesizer(sr=8000, sensors=(Microphone(np.zeros(3)),), seed=0, air=Air()).feed(nobody, ())
-    placed_points.make_ready()

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from sonic_bullet.render.ringing_on import with_tail
 from sonic_bullet.render.room.room_plan import RoomPlan
 from sonic_bullet.render.space.directions import take_aim, until_turned
 from sonic_bullet.render.space.space_state import hears_apart
-from sonic_bullet.render.standing.supports import settle
+from sonic_bullet.render.standing.supports import prepare_supports, settle
 from sonic_bullet.render.surface.finished_channels import finish_channels
 from sonic_bullet.render.surface.rigid_motion import enter_mobility, until_motions
 from sonic_bullet.render.synthesis_state import Setup, State, quench, start
@@ -88,7 +89,15 @@ def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Cloc
     return np.frombuffer(table, driver.STEP), clock, waiting
 
 
-def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # noqa: PLR0912 - a branch a reason
+def _load_code(setup: Setup, state: State, values: tuple[Any, ...]) -> None:
+    """Load, or compile, before the first step what it and the first resting contact would wait for."""
+    if not getattr(driver.advance_steps, "overloads", True):
+        make_driver(values)
+        if setup.supports:
+            prepare_supports(state)
+
+
+def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """Advance by steps without a quench between; by one alone where a body has a residual."""
     sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
     enter_mobility(state.table.bodies, state.body, steps[0].motions)
@@ -112,8 +121,7 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:  # no
     frames = Frames(begin, int(by_body), state.reads, state.sets, pressure, out)
     while done < len(steps):
         values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
-        if not getattr(driver.advance_steps, "overloads", True):
-            make_driver(values)
+        _load_code(setup, state, values)
         more, status = driver.advance_steps(values)
         done, resume = done + more, driver.ANEW if status in (driver.TO_GROW, path_places.DONE) else driver.RINGS
         if status == path_places.DONE:

@@ -23,7 +23,7 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.render.contact_place import FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.render.resonator import Resonator
-from sonic_bullet.render.standing.placed_points import placed_points
+from sonic_bullet.render.standing.placed_points import make_ready, placed_points
 from sonic_bullet.render.standing.turned_modes import turn_modes
 from sonic_bullet.render.strike_pulses import STRUCK_FLAT
 from sonic_bullet.render.synthesis_state import State
@@ -35,6 +35,8 @@ from sonic_bullet.support import (
     contact_spring,
     first_order,
 )
+from sonic_bullet.support.moving import Moving
+from sonic_bullet.support.springs import ContactSide
 from sonic_bullet.synth import bank
 from sonic_bullet.synth.strikes import SPAN
 
@@ -61,6 +63,16 @@ def _blas() -> ThreadpoolController:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
+
+
+def prepare_supports(state: State) -> None:
+    """Load, or compile, what the first resting contact would wait for, of a body with one mode on one spring."""
+    make_ready()
+    bank.prepare_poles(state.ringing)
+    body, side = Moving(np.ones(1), np.zeros(1)), ContactSide(1.0, 0.3, 0.0, 0.0)
+    spring = contact_spring(Region((1.0, 1.0), (0.0, 0.0)), (side, side), 1.0)
+    first_order(body, [body], [Touch(0, np.ones((3, 7)), np.zeros((3, 7)), spring)])
+    _blas()
 
 
 def settle(state: State, number: int) -> None:

@@ -29,7 +29,7 @@ from sonic_bullet.synth.bank.instrument import (
 from sonic_bullet.synth.bank.layout import FLOOR
 from sonic_bullet.synth.bank.mode_set import ModeSet, Translation
 from sonic_bullet.synth.bank.passing import PASSES, set_passes
-from sonic_bullet.synth.bank.poles import set_poles
+from sonic_bullet.synth.bank.poles import prepare_poles, set_poles
 
 __all__ = [
     "FLOOR",
@@ -41,6 +41,7 @@ __all__ = [
     "append",
     "audible",
     "empty_bank",
+    "prepare_poles",
     "set_passes",
     "set_poles",
     "silence",

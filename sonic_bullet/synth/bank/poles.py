@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numba
 import numpy as np
 
 from sonic_bullet.records import Array
@@ -60,6 +61,12 @@ def bend_poles(b, span, bank):  # pragma: no cover - compiled
         if span == BLOCK:
             q = np.exp(-fall)
             block[m], block[modes + m] = q * np.cos(turn * BLOCK), q * np.sin(turn * BLOCK)
+
+
+def prepare_poles(state: BankState) -> None:
+    """Compile what `set_poles` calls, or load its machine code."""
+    values = 0, 0, 0, state.ringing, state.law, state.pole, state.block, state.coming
+    take_coming.compile(tuple(numba.typeof(one) for one in values))
 
 
 def set_poles(bank: Bank, state: BankState, b: int, step: Array, lift: Array | None = None) -> None:
