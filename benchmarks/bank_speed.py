@@ -18,8 +18,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.peers.plain_python import FRAME, best_s, by_lfilter, by_outer, by_textbook
 from benchmarks.peers.tools import SR
+from sonic_bullet.bank import FLOOR, ModeSet, append, bank_kernel, empty_bank
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank import FLOOR, ModeSet, append, bank_kernel, empty_bank
 from tests.made.banks import Force, Strike, advance, room, step_scratch, tables
 
 FRAMES = 32  # 6400 samples: 25 of the bank's blocks

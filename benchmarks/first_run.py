@@ -20,7 +20,7 @@ REPO = Path(__file__).resolve().parents[1]
 CACHES = ("SONIC_BULLET_CACHE", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
 COMPILE = """
 import time
-from sonic_bullet.render import make_ready
+from sonic_bullet.runtime.replay import make_ready
 begin = time.perf_counter()
 make_ready()
 print(time.perf_counter() - begin)

@@ -22,14 +22,14 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
+from sonic_bullet.bank import ModeSet, Translation, append, empty_bank
+from sonic_bullet.contact.force_pulse import pulse_length, pulse_spectrum
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.presets import load_material
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.records import Air, Array, Material
 from sonic_bullet.records.mounting import IN_PLACE
 from sonic_bullet.scene import render_scene
-from sonic_bullet.synth.bank import ModeSet, Translation, append, empty_bank
-from sonic_bullet.synth.pulse import pulse_length, pulse_spectrum
 from tests.made.banks import Strike, advance
 
 AIR = Air()

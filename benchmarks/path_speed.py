@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from sonic_bullet.path.propagation import append_bodies, empty_path
 from sonic_bullet.records import Air
-from sonic_bullet.synth.path import append_bodies, empty_path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.made.paths import propagate

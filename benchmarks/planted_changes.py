@@ -29,7 +29,7 @@ from sonic_bullet.comparing.baselines import samples_digest
 from sonic_bullet.comparing.compared_sides import compared
 from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.sides import SceneSide, Side, of_log, run
-from sonic_bullet.render import render_blocks
+from sonic_bullet.runtime.replay import render_blocks
 
 Change = tuple[tuple[Any, ...], Any]
 

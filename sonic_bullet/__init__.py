@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     )
     from sonic_bullet.records.contacts import Contacts, Step
     from sonic_bullet.records.errors import SonicBulletError
-    from sonic_bullet.render import render_log
+    from sonic_bullet.runtime.replay import render_log
     from sonic_bullet.session import Listener, attach
     from sonic_bullet.session.log_writer import LogWriter
 
@@ -80,7 +80,7 @@ _HOME = {
     "read_log": "files",
     "read_response": "files.responses.sensor_responses",
     "read_room_response": "files.responses.room_responses",
-    "render_log": "render",
+    "render_log": "runtime.replay",
     "write_audio": "files",
 }
 

@@ -33,7 +33,7 @@ from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, shown
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import as_tail_db, render_kept, render_notes
+from sonic_bullet.runtime.replay import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.gltf_in.running import run_gltf

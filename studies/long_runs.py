@@ -32,7 +32,7 @@ from sonic_bullet.files.rows.log_steps import StepLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Body, Microphone
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
-from sonic_bullet.render import render_kept
+from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.storage.spooled_sound import SoundSpool
 
 DT_S, SETTLED_S, EVERY = 1 / 240, 5.0, 24

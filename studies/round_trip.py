@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet import modal
+from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.estimator.fit.fitted_preset import preset_of
 from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
@@ -35,8 +36,7 @@ from sonic_bullet.presets import load_material, material_of
 from sonic_bullet.records import Air, Array, Body, Material, Microphone, ModalModel, Shape, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SonicBulletError
-from sonic_bullet.render import render_log
-from sonic_bullet.render.resonator import build_resonator
+from sonic_bullet.runtime.replay import render_log
 
 SR = 48_000
 STEP_S = 1 / 240

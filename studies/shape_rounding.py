@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import model as solved
 from sonic_bullet.records.mode_shapes import SHAPE_BITS, rounded
-from sonic_bullet.render import render_log
+from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.scene import render_scene
 
 SCENE_FOLDER = Path(__file__).resolve().parents[1] / "scenes"

@@ -24,7 +24,7 @@ import numpy as np
 from sonic_bullet.files import read_audio, read_log, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
-from sonic_bullet.render import render_kept
+from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film
 from sonic_bullet.soundtrack.film_writer import samples_of
 from sonic_bullet.soundtrack.stems import render_stems, write_stems

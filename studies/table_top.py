@@ -24,15 +24,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
 from benchmarks.load_leaps import find_leaps
+from sonic_bullet.bank.tile import BLOCK
+from sonic_bullet.contact.coupling import Region, contact_spring
+from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Array
-from sonic_bullet.render import Synthesizer, render_log
-from sonic_bullet.render.standing import supports
+from sonic_bullet.runtime.replay import Synthesizer, render_log
+from sonic_bullet.runtime.supports import pole_updates
 from sonic_bullet.scene import render_scene
-from sonic_bullet.support import Region, contact_spring
-from sonic_bullet.synth.bank.tile import BLOCK
-from sonic_bullet.synth.strikes import SPAN
 
 ROOT = Path(__file__).resolve().parents[1]
 WINDOW_S, AFTER_S = 0.05, 1.5
@@ -118,7 +118,7 @@ def shares(log: ContactLog, until_s: float = 4.9) -> Iterator[str]:
     for b, one in enumerate(state.resonators):
         if one.body.mass_kg <= 0 or not one.mode_count:
             continue
-        _, touches, load, placed = supports.standing(state, b, turned)
+        _, touches, load, placed = pole_updates.standing(state, b, turned)
         if not touches:
             continue
         rang, lifted = synth.lifted.get(one.body.name, (0, 0))
@@ -175,18 +175,18 @@ def rod() -> Iterator[str]:
 def clicks() -> Iterator[str]:
     """Changes that lie apart from strikes; the sound at the microphone is 2.5 ms late, at every change alike."""
     made: list[int] = []
-    old = supports._stand
+    old = pole_updates._stand
 
     def stand(state: Any, b: int, quaternion: Array) -> None:
         made.append(state.ringing.at)
         old(state, b, quaternion)
 
-    supports._stand = stand
+    pole_updates._stand = stand
     try:
         shape = {"shapeType": 5, "fileName": str(ROOT / "assets" / "bowl.obj")}
         client, listener = fallen(shape, 0.06, (0.5, 0.2, 0), 5.0, 7850 * 75.1e-6)
     finally:
-        supports._stand = old
+        pole_updates._stand = old
     sound, sr, struck = listener.sound()[0], listener.sr, find_leaps(listener.contacts).strike_s
     disconnect(client)
     travel = round(np.hypot(0.7, 0.5) / 343 * sr)

@@ -25,10 +25,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
+from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records import Array
-from sonic_bullet.render.standing import supports
-from sonic_bullet.synth.strikes import SPAN
+from sonic_bullet.runtime.supports import pole_updates
 
 NEAR = 0.006
 """Of a frequency: lines nearer than this are one."""
@@ -83,7 +83,7 @@ def stand_in(material: str, scale: float) -> tuple[Array, Array]:
         client.stepSimulation()
     state = listener._synth._state
     b = next(i for i, one in enumerate(state.resonators) if one.body.mass_kg > 0)
-    _, touches, _, placed = supports.standing(state, b, state.window.quaternion_xyzw[(state.number - 1) % SPAN])
+    _, touches, _, placed = pole_updates.standing(state, b, state.window.quaternion_xyzw[(state.number - 1) % SPAN])
     assert touches, "it does not stand"
     one = state.resonators[b]
     disconnect(client)

@@ -27,7 +27,7 @@ from sonic_bullet.geometry import is_closed, volume_m3
 from sonic_bullet.records import Body, Material, Microphone, ModalModel, ModalSum, Residual, Vibrometer
 from sonic_bullet.records.contacts import Contacts, Event, Step
 from sonic_bullet.records.mode_shapes import rounded
-from sonic_bullet.render import render_log
+from sonic_bullet.runtime.replay import render_log
 
 SR = 8000
 STEEL = Material.isotropic(

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.contact.surface_kernel import _PATCH, _ROWS, VOICE, _law
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
-from sonic_bullet.render import render_log
-from sonic_bullet.render.apart import render_apart
+from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.scene import RenderResult, render_scene
-from sonic_bullet.synth.surface_kernel import _PATCH, _ROWS, VOICE, _law
 
 SR = 48_000
 SECONDS = 2.0

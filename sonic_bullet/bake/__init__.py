@@ -1,7 +1,7 @@
 r"""A body's modal sound in a file for other engines.
 
     mesh + material -> session.body_models -> Body \
-    scene, log      ->                        Body -> render.resonator: decays with the air's, pressure at 1 m
+    scene, log      ->                        Body -> bank.resonator: decays with the air's, pressure at 1 m
         -> mode_importance: order, masked and weak modes
         -> sample_points: the user's own vertices, fewer or more -> shapes there
         -> BakedModel

@@ -2,7 +2,7 @@
 
     velocity of a mode q̇ = Re z,   strike j at p:  z += (1 + i d/ω) φ(p)·j,   ż = (-d + iω) z
     pressure at 1 m = Re Σ pressure·z
-        [as the bank has it, synth.bank]
+        [as the bank has it]
 
 The draft glTF extension KHR_audio_rigid_bodies holds frequency, decay and shape; the pressure is the transfer that it
 leaves to the engine.

@@ -1,6 +1,6 @@
 """A body with its modes -> BakedModel.
 
-    Body -> render.resonator, as in scenes: decays with the air's and the mounting's, pressure at 1 m
+    Body -> bank.resonator, as in scenes: decays with the air's and the mounting's, pressure at 1 m
          -> modes in order of importance -> shapes at points of the user's surface, by nearest point on the solved one
 
 A mesh's own vertices are where its file has them, in its order; the solver's mesh has others.
@@ -142,7 +142,7 @@ def bake_body(
         Where the body has no mode to bake.
     """
     highest_rate_hz = 384_000  # Modes up to half of it are baked; a player leaves out those above half its own rate
-    from sonic_bullet.render.resonator import build_resonator
+    from sonic_bullet.bank.resonator import build_resonator
 
     model, material, pruning = body.model, body.material, pruning or PruningOptions()
     if model is None or material is None or not model.mode_count:
@@ -213,8 +213,8 @@ def _coarse(
 
 def bake_material(material: Material) -> BakedMaterial:
     """Return what a baked file holds of a material."""
-    from sonic_bullet.render.body_table import pressed_pa
-    from sonic_bullet.support import ContactSide
+    from sonic_bullet.contact.coupling import ContactSide
+    from sonic_bullet.runtime.body_table import pressed_pa
 
     return BakedMaterial(
         name=material.name,

@@ -19,9 +19,9 @@ import numpy as np
 
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.strike_playback import LONGEST_CONTACT_S, NODES_PER_SAMPLE, pressure_of
+from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
 from sonic_bullet.records import Array
 from sonic_bullet.storage.atomic import replacing
-from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
 
 RESERVED = frozenset(
     re.findall(

@@ -15,13 +15,13 @@ import numpy as np
 
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.mode_importance import SLOWEST_PER_S
+from sonic_bullet.bank import audible
+from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.records import Air, Array, ModalModel, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
-from sonic_bullet.synth.bank import audible
-from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
 
 NODES_PER_SAMPLE = 2
 PLAYED_BLOCK = 256

@@ -92,7 +92,7 @@ class LevelWish:
     def check(self) -> None:
         """Raise AudioError where options are not valid, before anything is rendered."""
         from sonic_bullet.files import check_levels
-        from sonic_bullet.render.ringing_on import as_tail_db
+        from sonic_bullet.runtime.ringing_on import as_tail_db
 
         if self.pascals and not (self.peak_dbfs is None and self.lufs is None):
             raise AudioError("--pascals does not scale, and a level is given", "give one of both")
@@ -123,7 +123,7 @@ class LevelWish:
         # Peak level that leaves room for overshoots of converters and lossy codecs [EBU R 128, sec. h].
         default_peak_dbfs = -1.0
         from sonic_bullet.files.levels import find_level
-        from sonic_bullet.render.silence import is_silent
+        from sonic_bullet.runtime.silence import is_silent
 
         peak_dbfs = self.peak_dbfs
         own = AUDIO_FORMATS.get(Path(path).suffix.lower())

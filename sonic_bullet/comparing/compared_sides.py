@@ -27,7 +27,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records.coerce import as_call
 from sonic_bullet.records.errors import CompareError
-from sonic_bullet.render import render_kept
+from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.storage.spooled_sound import KeptSound
 

@@ -23,7 +23,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, shown
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
-from sonic_bullet.render import render_kept
+from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.wanted_bodies import WantedBody

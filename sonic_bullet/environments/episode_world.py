@@ -13,7 +13,7 @@ from sonic_bullet.environments.episode_steps import EpisodeWorld
 from sonic_bullet.listener.opening import is_mujoco
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.synth.clock import exact_step
+from sonic_bullet.runtime.clock import exact_step
 
 
 def episode_world(client: Any) -> EpisodeWorld:

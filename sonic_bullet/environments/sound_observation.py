@@ -25,10 +25,10 @@ from sonic_bullet.files import check_sr
 from sonic_bullet.records import Air, Array, Material, channels_of
 from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_whole
 from sonic_bullet.records.errors import AudioError, SceneError
+from sonic_bullet.runtime.clock import exact_step
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.drawn_recording import ChainSpread, RecordingChain, RecordingState, draw_chain, record
-from sonic_bullet.synth.clock import exact_step
 
 AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
 

@@ -232,7 +232,7 @@ class Step:
     teleported : Array of bool, shape (b,)
         True where the body was moved by hand since the previous step.
     gravity_m_s2 : Array, shape (3,)
-        World frame; a body that falls for one step gains that speed, which is no impact (see synth.strikes).
+        World frame; a body that falls for one step gains that speed, which is no impact (see contact.load_splitting).
     body : Array, shape (b,)
         Ascending indices of these bodies into the log's `bodies`, by default the first b; a removed body never returns.
     motions : Array of LINK_MOTION, shape (r,)

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.path.surface.sensor_chain import filter_rows, response_taps, sensor_noise
 from sonic_bullet.records import Array, Body, Material, SensorResponse, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_items, as_number, as_whole
-from sonic_bullet.render.surface.sensor_chain import filter_rows, response_taps, sensor_noise
 from sonic_bullet.session.variation import draw_factors, vary_body
 
 Range = tuple[float, float]

@@ -19,7 +19,7 @@ from sonic_bullet.listener.names import matched
 from sonic_bullet.records import Body, Material
 from sonic_bullet.records.coerce import as_items, shown
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.render.silence import can_sound
+from sonic_bullet.runtime.silence import can_sound
 from sonic_bullet.session.arguments import as_material, as_name
 
 if TYPE_CHECKING:

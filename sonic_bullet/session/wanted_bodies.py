@@ -35,7 +35,7 @@ from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeW
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.records.roughness import with_roughness
-from sonic_bullet.render import make_ready
+from sonic_bullet.runtime.replay import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction

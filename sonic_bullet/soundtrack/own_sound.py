@@ -4,8 +4,8 @@
         + the rigid body's click
     friction: force of a step on modes at rest before the pair's first -> p(t), its energy
 
-The closed form of the bank (synth.bank), with its poles and weights as they are in that step; r from the body's centre,
-as in the path [render.resonator explains the click]. Not included: noise of residuals, and transmission to a partner.
+The closed form of the bank, with its poles and weights as they are in that step; r from the body's centre,
+as in the path [bank.resonator explains the click]. Not included: noise of residuals, and transmission to a partner.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.contact.force_pulse import SPECTRUM_CELLS_PER_F_TAU, cumulated, pulse_table, spectrum_table
+from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.records import Array, Microphone
-from sonic_bullet.render.synthesis_state import State
-from sonic_bullet.synth.pulse import SPECTRUM_CELLS_PER_F_TAU, cumulated, pulse_table, spectrum_table
-from sonic_bullet.synth.strikes import SPAN
+from sonic_bullet.runtime.synthesis_state import State
 
 
 class _Voice(NamedTuple):

@@ -6,8 +6,8 @@
 
 Table, cues, overlay and picture show this one list.
 
-Nothing is judged here a second time: an impact is a pulse that the run time plays (render.strike_pulses), a roll or a
-slide a pair whose contact oscillator makes a force (render.friction). Slip decides which of both: a contact slides
+Nothing is judged here a second time: an impact is a pulse that the run time plays (contact.strike_pulses), a roll or a
+slide a pair whose contact oscillator makes a force (contact.friction). Slip decides which of both: a contact slides
 where it slips faster than the least audible sweep, and than half of its own. What carries load and does neither is
 support; a load that leaps and is not accepted is a strike without a cause.
 """
@@ -21,18 +21,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sonic_bullet.contact.friction import SWEEP_FLOOR_M_S
+from sonic_bullet.contact.load_splitting import NOW, SPAN
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.riff.wave_chunks import Cue
 from sonic_bullet.listener.animated import matrices
+from sonic_bullet.path.fractional_delay import AHEAD
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
-from sonic_bullet.render.apart import render_apart
-from sonic_bullet.render.friction import SWEEP_FLOOR_M_S
-from sonic_bullet.render.synthesis_state import State
+from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.synthesis_state import State
 from sonic_bullet.soundtrack.own_sound import OwnSound
-from sonic_bullet.synth.fractional_delay import AHEAD
-from sonic_bullet.synth.strikes import NOW, SPAN
 
 IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED = "impact", "roll", "slide", "support", "uncaused strike"
 SOUNDING = (IMPACT, ROLL, SLIDE)

@@ -22,7 +22,7 @@ from sonic_bullet.listener.pictures import VIEW_DEG, Camera, Figure, Standing
 from sonic_bullet.records import Array, Body, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
-from sonic_bullet.synth.clock import Clock
+from sonic_bullet.runtime.clock import Clock
 
 HOW_IT_IS_DRAWN = "film the scene, or, of an animation that was scored, give it a material in the table of score"
 WIDE_M = 20.0

@@ -21,12 +21,12 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import FileLevel, find_level
 from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.files.riff.wave_chunks import Cue
+from sonic_bullet.path.room.room_convolution import keep_with_room
+from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.records import channels_of
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.render.apart import render_apart
-from sonic_bullet.render.room.room_convolution import keep_with_room
-from sonic_bullet.render.room.room_plan import RoomPlan
-from sonic_bullet.render.synthesis_state import Witness
+from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.synthesis_state import Witness
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 NAME_LENGTH = 60

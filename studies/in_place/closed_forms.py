@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from sonic_bullet.records import Array
-from sonic_bullet.support import (
+from sonic_bullet.contact.coupling import (
     ContactSide,
     ContactSpring,
     InPlace,
@@ -20,6 +19,7 @@ from sonic_bullet.support import (
     contact_spring,
     first_order,
 )
+from sonic_bullet.records import Array
 from studies.in_place.lines import Line
 from tests.made.bars import AXES, bar, exact_poles, stood
 from tests.made.newton import in_place

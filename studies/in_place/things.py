@@ -14,12 +14,12 @@ from typing import cast
 
 import numpy as np
 
+from sonic_bullet.bank.resonator import Resonator, build_resonator
+from sonic_bullet.contact.coupling import ContactSpring, InPlace, Moving, Place, Touch, first_order
 from sonic_bullet.geometry.nearest_point import nearest
 from sonic_bullet.modal import analyse, read_mesh
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel, Shape
-from sonic_bullet.render.resonator import Resonator, build_resonator
-from sonic_bullet.support import ContactSpring, InPlace, Moving, Place, Touch, first_order
 from studies.thin_walls.blocks import cartesian, welded
 from tests.made.newton import in_place
 

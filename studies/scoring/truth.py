@@ -16,9 +16,9 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.animated import AnimatedBody
 from sonic_bullet.records import Material, Microphone
-from sonic_bullet.render.presence import admit
-from sonic_bullet.render.synthesis_state import Setup, start
-from sonic_bullet.render.synthesizer import advance
+from sonic_bullet.runtime.body_lifetime import admit
+from sonic_bullet.runtime.synthesis_state import Setup, start
+from sonic_bullet.runtime.synthesizer import advance
 from sonic_bullet.soundtrack.score.animation import Animation
 from studies.scoring.scenes import Scene
 from tests.made.models import box_model

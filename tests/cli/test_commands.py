@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 import soundfile
 
-import sonic_bullet.render
+import sonic_bullet.runtime.replay
 import sonic_bullet.scene
 from sonic_bullet.cli import main
 from sonic_bullet.files import read_audio, read_log, write_log
@@ -102,7 +102,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         return KeptSound.of(sound(given.duration_s, sr or given.sr))
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
-    monkeypatch.setattr(sonic_bullet.render, "render_kept", render_kept)
+    monkeypatch.setattr(sonic_bullet.runtime.replay, "render_kept", render_kept)
     monkeypatch.setattr("sonic_bullet.soundtrack.sound_events.find_sound_events", lambda *_, **__: ())
     return kept
 
@@ -394,7 +394,7 @@ def test_what_a_replay_rendered_before_an_interrupt_is_a_valid_named_file(
         yield sound(0.25)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sonic_bullet.render, "_blocks", render_blocks)
+    monkeypatch.setattr(sonic_bullet.runtime.replay, "_blocks", render_blocks)
     write_log("a.npz", log())
     assert run("render", "a.npz", "-o", "a.wav") == 130
     assert "the first 0.250 s are in a.partial.wav" in capfd.readouterr().err

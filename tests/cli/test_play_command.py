@@ -18,7 +18,7 @@ import pytest
 from sonic_bullet.files import read_log, write_log
 from sonic_bullet.live import playback
 from sonic_bullet.records import Ambisonics, Array
-from sonic_bullet.render import log_frames, render_log
+from sonic_bullet.runtime.replay import log_frames, render_log
 from sonic_bullet.scene import render_scene, run_scene
 from sonic_bullet.session import Listener
 from tests.cli.test_commands import error_of, run

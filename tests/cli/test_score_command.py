@@ -14,7 +14,7 @@ import pytest
 
 from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.records.errors import FileError
-from sonic_bullet.render import render_log
+from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.soundtrack.score.scoring import read_animation, score_scene
 from tests.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few

@@ -100,7 +100,7 @@ def test_help_is_quick() -> None:
     ("modules", "light"),
     [
         ("sonic_bullet, sonic_bullet.cli", True),
-        ("sonic_bullet.files, sonic_bullet.presets, sonic_bullet.plots.scene_plot, sonic_bullet.render", False),
+        ("sonic_bullet.files, sonic_bullet.presets, sonic_bullet.plots.scene_plot, sonic_bullet.runtime.replay", False),
     ],
 )
 def test_importing_brings_nothing_heavy(modules: str, light: bool) -> None:
@@ -124,8 +124,10 @@ def test_importing_brings_nothing_heavy(modules: str, light: bool) -> None:
 def test_everything_but_the_listener_lives_without_pybullet() -> None:
     modules = (
         "modal",
-        "synth",
-        "render",
+        "contact",
+        "bank",
+        "path",
+        "runtime.replay",
         "files",
         "presets",
         "plots.scene_plot",
@@ -228,7 +230,7 @@ def exported_words(package: Path) -> set[str]:
 
 
 def missing_modules(text: str) -> list[str]:
-    """Modules that a docstring names, by a path (`synth/pulse.py`) or dots (`sonic_bullet.synth.pulse`), that are not
+    """Modules that a docstring names, by a path (`bank/poles.py`) or dots (`sonic_bullet.bank.poles`), that are not
     there.
     """
     paths = [name for name in re.findall(r"(?<![\w/])(?:\w+/)*\w+\.py\b", text) if Path(name).name not in EXAMPLE_FILES]
@@ -246,9 +248,9 @@ def missing_modules(text: str) -> list[str]:
 
 
 def test_docstrings_name_modules_that_exist() -> None:
-    assert missing_modules("pour.py, synth/pulse.py, `sonic_bullet.synth.bank`, `files.write_audio`") == []
-    assert missing_modules("synth/tally.py `synth.tally` sonic_bullet.synth.tally") == [
-        "synth/tally.py", "synth.tally", "sonic_bullet.synth.tally"
+    assert missing_modules("pour.py, contact/force_pulse.py, `sonic_bullet.bank`, `files.write_audio`") == []
+    assert missing_modules("bank/tally.py `bank.tally` sonic_bullet.bank.tally") == [
+        "bank/tally.py", "bank.tally", "sonic_bullet.bank.tally"
     ]  # fmt: skip
     assert missing_modules("sonic_bullet.gone.tally, `sonic_bullet.attach`, `sonic_bullet.scene`") == [
         "sonic_bullet.gone.tally"

@@ -18,8 +18,8 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.errors import AudioError, MaterialError, RecordError, SceneError, SceneWarning
+from sonic_bullet.runtime.clock import Clock, exact_step
 from sonic_bullet.session.drawn_recording import ChainSpread, draw_chain, record
-from sonic_bullet.synth.clock import Clock, exact_step
 
 gymnasium = pytest.importorskip("gymnasium")
 

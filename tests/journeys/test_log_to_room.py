@@ -11,7 +11,7 @@ import soundfile
 
 from tests.cli.test_commands import error_of, run
 from tests.journeys.test_scene_log_film import SCENE
-from tests.render.room.test_measured_room import hall
+from tests.path.room.test_measured_room import hall
 
 FLAT = ("--pascals", "--tail", "0")
 ROOM = ("--room", "3x2.5x2.4", "--absorption", "0.4")

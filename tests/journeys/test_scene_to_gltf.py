@@ -11,10 +11,10 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet import bake
+from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.files import read_log
 from sonic_bullet.records import Air, Body
 from sonic_bullet.records.rigid_scene import RigidBody, RigidScene
-from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.session.gltf_in.own_words import without_mounting
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from tests.cli.called_here import call_here

@@ -17,7 +17,7 @@ from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
-from sonic_bullet.render import render_log
+from sonic_bullet.runtime.replay import render_log
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model
 

@@ -58,7 +58,8 @@ print(total(np.array([1.0])), sum(total.stats.cache_hits.values()), len(scaled.p
 """,
 }
 FIRST_RUN = """
-from sonic_bullet.render import driver, first_run, make_ready
+from sonic_bullet.runtime import driver, first_run
+from sonic_bullet.runtime.replay import make_ready
 make_ready()
 assert driver.advance_steps.stats.cache_misses and not driver.advance_steps.stats.cache_hits
 print(*(len(stage.part.overloads) for stage in first_run.STAGES))

@@ -8,22 +8,22 @@ from functools import lru_cache
 
 import numpy as np
 
+from sonic_bullet.bank import Bank, BankState, bank_kernel
+from sonic_bullet.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
+from sonic_bullet.bank.instrument import flushed
+from sonic_bullet.bank.layout import DRIVEN, BankTables, BankWork, ScratchTables
+from sonic_bullet.bank.strike_pool import BodyPulse, enter_strike
 from sonic_bullet.machine.grouping import gather
+from sonic_bullet.machine.vector import LANES
 from sonic_bullet.records import Array
-from sonic_bullet.render.tables import PULSE
-from sonic_bullet.synth.bank import Bank, BankState, bank_kernel
-from sonic_bullet.synth.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
-from sonic_bullet.synth.bank.instrument import flushed
-from sonic_bullet.synth.bank.layout import DRIVEN, BankTables, BankWork, ScratchTables
-from sonic_bullet.synth.bank.strike_pool import BodyPulse, enter_strike
-from sonic_bullet.synth.vector import LANES
+from sonic_bullet.runtime.tables import PULSE
 
 NOWHERE = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strike:
-    """A finite force pulse on one body (synth.pulse).
+    """A finite force pulse on one body (contact.force_pulse).
 
     start: absolute time of its begin in samples (any fraction). length_s, flat (half-sine, else Hertz'): its shape.
     gain (m,): φᵀĵ of the body's modes in N·s/√kg. shove_n_s (3,): the impulse, for its translations.

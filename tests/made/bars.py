@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eig, eigh
 
+from sonic_bullet.contact.coupling import ContactSpring, Moving, Place, Touch
 from sonic_bullet.records import Array
-from sonic_bullet.support import ContactSpring, Moving, Place, Touch
 
 AXES = np.eye(3)[[2, 0, 1]]
 """Normal z, along which the bar bends; x along it."""

@@ -1,7 +1,7 @@
 """Exact poles of a body in contact, by Newton: what `first_order` is proven against. T(s) q = 0 of modes and motions.
 
     T(s) = s² + 2Ds + Λ + s Φᵀ W(s) Φ,  W = (s/K + Y_p(s))⁻¹,  forces F = W Φ s q
-        Φ (r, m + 6): the body's modes and rigid motions at r springs; Y_p: the partners' mobility (`moving`)
+        Φ (r, m + 6): the body's modes and rigid motions at r springs; Y_p: the partners' mobility (`mobility`)
     real start   (Λ + Bᵀ Re(K) B) q = λ q,  B = (Φ, −Φ_p), of partners their rigid motions
     Newton       s <- s − qᵀT q/qᵀT'q,  q <- T⁻¹ T' q               [Rayleigh quotients: Lancaster 1966, sec. 5.3]
     T⁻¹ = D⁻¹ − s D⁻¹Φᵀ S⁻¹ Φ D⁻¹,  D = s² + 2Ds + Λ,  S = s/K + Y_p + s Φ D⁻¹ Φᵀ                 [Woodbury 1950]
@@ -20,10 +20,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from sonic_bullet.contact.coupling import InPlace, Moving, Touch, first_order
+from sonic_bullet.contact.coupling.coupled_modes import STIFFEST_RATIO, STOPPED_RATIO, Touched, touched_rows
+from sonic_bullet.contact.coupling.first_order import likest
 from sonic_bullet.records import Array
-from sonic_bullet.support import InPlace, Moving, Touch, first_order
-from sonic_bullet.support.first_order import likest
-from sonic_bullet.support.in_place import STIFFEST_RATIO, STOPPED_RATIO, Touched, touched_rows
 
 STEPS = 12
 """Newton steps at most; three are usual, their order is cubic."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.machine.grouping import gather
+from sonic_bullet.path.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
+from sonic_bullet.path.path_places import DONE, Arrivals, Course, Emission, PathTables
+from sonic_bullet.path.propagation import Path, PathState, grow
 from sonic_bullet.records import Array
-from sonic_bullet.synth.path import Path, PathState, grow
-from sonic_bullet.synth.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
-from sonic_bullet.synth.path_places import DONE, Arrivals, Course, Emission, PathTables
 
 
 def propagate(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.bank.strike_pool import NODES_PER_PULSE
+from sonic_bullet.contact.force_pulse import cumulated, pulse_table
 from sonic_bullet.records import Array
-from sonic_bullet.synth.bank.strike_pool import NODES_PER_PULSE
-from sonic_bullet.synth.pulse import cumulated, pulse_table
 
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:

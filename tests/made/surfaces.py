@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.contact.octave_heights import height_octaves
+from sonic_bullet.contact.profile import gained_heights
+from sonic_bullet.contact.surface_kernel import FASTEST_M_S, VOICE, sound_voices
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
-from sonic_bullet.render.tables import PAIR
-from sonic_bullet.synth.octave_heights import height_octaves
-from sonic_bullet.synth.profile import gained_heights
-from sonic_bullet.synth.surface_kernel import FASTEST_M_S, VOICE, sound_voices
+from sonic_bullet.runtime.tables import PAIR
 
 
 def octave_heights(roughness_m: float, hurst: float) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet import presets
+from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.effects.presets_of_effects import with_modes
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
@@ -22,11 +23,10 @@ from sonic_bullet.files import read_log, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Material, Microphone, Residual
 from sonic_bullet.records.errors import AudioError, MaterialError, RecordError
-from sonic_bullet.render import render_log
-from sonic_bullet.render.residual_voice import build_residual_voice
-from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.residual.code import form_of, residual_of
 from sonic_bullet.residual.compute import damped
+from sonic_bullet.runtime.replay import render_log
+from sonic_bullet.runtime.residual_voice import build_residual_voice
 from tests.made.models import box_body, row, step, wall_body
 from tests.made.residuals import SR, modes, residual
 

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.cli import cli
 from sonic_bullet.files import read_audio, read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Air, Material, Microphone, ModalSum
 from sonic_bullet.records.contacts import Contacts
-from sonic_bullet.render import Synthesizer, render_log
-from sonic_bullet.render.residual_voice import build_residual_voice, struck_power
-from sonic_bullet.render.resonator import build_resonator
 from sonic_bullet.residual.grains import faded, filtered, make_voice, mixed_number, placed, response, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain, section_window
+from sonic_bullet.runtime.replay import Synthesizer, render_log
+from sonic_bullet.runtime.residual_voice import build_residual_voice, struck_power
 from tests.made.models import STEEL, box_body, row, step, wall_body
 from tests.made.residuals import SR, modes, residual
 

@@ -122,7 +122,7 @@ def test_frames_that_nobody_reads_go_to_the_disk_too(client: Any, usual: Any, li
 
 
 def test_a_replay_in_blocks_is_the_replay(usual: Any, little_memory: Path) -> None:
-    from sonic_bullet.render import render_blocks, render_kept
+    from sonic_bullet.runtime.replay import render_blocks, render_kept
 
     log, sound, _ = usual
     blocks = [*render_blocks(log)]

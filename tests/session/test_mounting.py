@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import sonic_bullet as sb
+from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.files import read_log
 from sonic_bullet.records import Air, Body
 from sonic_bullet.records.errors import RecordError, SceneError
 from sonic_bullet.records.mounting import IN_PLACE
-from sonic_bullet.render import render_log
-from sonic_bullet.render.resonator import build_resonator
+from sonic_bullet.runtime.replay import render_log
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model
 

@@ -16,7 +16,7 @@ from sonic_bullet.listener.pictures import Camera, Figure, open_pictures, standi
 from sonic_bullet.records import Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError, RecordError, SceneError
-from sonic_bullet.render import render_kept
+from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
 from sonic_bullet.soundtrack.overlay import COLOURS, pixel, shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events

@@ -13,8 +13,8 @@ from sonic_bullet.files import read_audio, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Microphone, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
-from sonic_bullet.render import render_log
-from sonic_bullet.render.apart import render_apart
+from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.soundtrack.stems import Stem, render_stems, stem_name, write_stems
 from tests.few_cases import parametrize_few
 from tests.made.disks import full_disk

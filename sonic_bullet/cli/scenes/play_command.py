@@ -140,7 +140,7 @@ def _play_log(
     from sonic_bullet.live import start_playback
     from sonic_bullet.records import Microphone, channels_of
     from sonic_bullet.records.coerce import as_number
-    from sonic_bullet.render import LATENCY_STEPS, log_frames
+    from sonic_bullet.runtime.replay import LATENCY_STEPS, log_frames
     from sonic_bullet.session.chosen_in_log import with_choice
 
     log, said = with_choice(read_log(path), materials.choice(), path, show.tell)

@@ -118,7 +118,7 @@ class RenderOutputs:
 
 def find_level_of(result: RenderResult | Replay, level: LevelWish, output: str) -> FileLevel:
     """Find the level of the sound; where silence prevents that, the error explains the silence."""
-    from sonic_bullet.render import why_silent
+    from sonic_bullet.runtime.replay import why_silent
 
     try:
         return level.found(result.sound, result.sr, result.log, output)

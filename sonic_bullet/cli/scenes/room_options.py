@@ -1,6 +1,6 @@
 """The room that a render is heard in: a box whose walls send sound back, or one that was measured.
 
-options, checked -> ShoeboxRoom or RoomResponse of `Wish` -> room_of (render/room) -> render
+options, checked -> ShoeboxRoom or RoomResponse of `Wish` -> room_of (path/room) -> render
 """
 
 from __future__ import annotations

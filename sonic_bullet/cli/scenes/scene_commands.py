@@ -116,7 +116,7 @@ def run_render(
 
 def log_of(scene: str, wish: Wish, space: SpaceWish) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log of a scene, run, or a log as it is to be rendered, and notes for the user."""
-    from sonic_bullet.render import render_notes
+    from sonic_bullet.runtime.replay import render_notes
 
     if is_log(scene):
         log, _, said = prepared(scene, wish)
@@ -140,7 +140,7 @@ def rendered_in_space(scene: str, wish: Wish, space: SpaceWish) -> RenderResult 
 
 def rendered_again(result: RenderResult, wish: Wish, space: SpaceWish, where: str) -> Replay:
     """Render what was rendered once more, from its log, with other microphones or in a room."""
-    from sonic_bullet.render import render_notes
+    from sonic_bullet.runtime.replay import render_notes
 
     of_other_sensors = render_notes(result.sound, result.log)
     said = tuple(note for note in result.notes if note not in of_other_sensors)

@@ -15,8 +15,8 @@ from sonic_bullet.records.file_endings import SCENE_ENDINGS
 if TYPE_CHECKING:
     from sonic_bullet.files.contact_log import ContactLog
     from sonic_bullet.listener.pictures import Standing
+    from sonic_bullet.path.room.room_plan import RoomPlan
     from sonic_bullet.records import RoomResponse, ShoeboxRoom
-    from sonic_bullet.render.room.room_plan import RoomPlan
     from sonic_bullet.scene import RenderResult
     from sonic_bullet.session import Listener
     from sonic_bullet.session.material_choice import MaterialChoice
@@ -190,8 +190,8 @@ def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
 
 def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
     """Render a log as it is."""
-    from sonic_bullet.render import render_kept, render_notes
-    from sonic_bullet.render.room import room_of
+    from sonic_bullet.path.room import room_of
+    from sonic_bullet.runtime.replay import render_kept, render_notes
 
     rate, plan = wish.rate or log.sr, None
     if wish.room is not None:

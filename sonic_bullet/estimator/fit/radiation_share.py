@@ -1,7 +1,7 @@
 """What an object's modes lose to the air, as the run time has it, so that a fit of the material leaves it out.
 
     d_line = ½(α + βλ) + Δd
-        Δd: radiation.far_field, in the air that the run time plays in (render/resonator.py), of the modes on the
+        Δd: radiation.far_field, in the air that the run time plays in (bank/resonator.py), of the modes on the
         family's surface, which follows their waves as the run time's own does (modal/methods.py makes both)
 
 Modes that count as one line: their mean, weighted by the squares of what the strikes let the sensor

@@ -6,8 +6,8 @@
     all other rows pass as they are
 
 A soft constraint spreads an impact over its time constant, 10 ms and more, where real ones last microseconds. Taken
-step by step it would be a support (synth.strikes). No impulse is lost or made: what is held is given out later, so that
-the sums balance momentum over each impact. The strike comes as the impact ends.
+step by step it would be a support (contact.load_splitting). No impulse is lost or made: what is held is given out
+later, so that the sums balance momentum over each impact. The strike comes as the impact ends.
 
 The load has settled: what exceeds the support is below `TAIL` of its peak. The speed has: it is below `REST_SPEED` of
 the first and, at its present rate, would not have changed by more than twice that since the impact began; at the

@@ -21,7 +21,7 @@ from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, shown
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
-from sonic_bullet.render import render_notes
+from sonic_bullet.runtime.replay import render_notes
 from sonic_bullet.scene import RenderResult, render_scene
 from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike
@@ -164,7 +164,7 @@ def score_scene(
     Raises what `render_scene` does, AnimationError where it drives no body or its driven bodies cannot be scored;
     interrupted, the exception carries what was scored so far as ``partial``.
     """
-    from sonic_bullet.render import render_kept
+    from sonic_bullet.runtime.replay import render_kept
     from sonic_bullet.soundtrack.score.by_hand import move_notes, moves_of, scored_by_hand
 
     shapes: dict[tuple[int, int], tuple[Shape, ...]] = {}

@@ -1,0 +1,12 @@
+"""Contacts become forces: strikes, rolling and sliding, and springs that couple the bodies at rest.
+
+    contact rows of a step -> contact_rows: pairs and their histories of load; contact_place: where on both surfaces
+      -> load_splitting: what lasts is support, what is shorter a strike; friction is what moves under support
+           strike  -> strike_pulses: which strikes there are; strike_timing: their cause, and their time in the step;
+                      force_pulse: length and shape of the force (Hertz)
+           sliding -> friction: loads and speeds at audio rate; surface_kernel: the contact oscillator;
+                      profile, track, octave_heights: heights of the surfaces it sweeps
+           support -> contact_patches: points tracked and loads smoothed; coupling: springs, mobility, new poles
+
+Values and tables in, forces out: no scene, no sample of sound. `bank` plays the forces on modes.
+"""

@@ -1,1 +1,0 @@
-"""Resting contacts: contact patches, and the poles of bodies on them."""

@@ -1,1 +1,0 @@
-"""What strikes of one physics step have to do with each other."""

@@ -1,0 +1,1 @@
+"""Channels of a run: which faces mirror its bodies, weights by direction, and what is added behind the driver."""

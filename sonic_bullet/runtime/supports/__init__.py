@@ -1,0 +1,1 @@
+"""Resting contacts: points of contact patches on both bodies, and the poles of bodies on them."""

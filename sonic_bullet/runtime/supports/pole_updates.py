@@ -1,0 +1,224 @@
+"""Effect of resting contacts on a body: other poles while they last, and transmission to the bodies it touches.
+
+    HELD of a body's pairs -> touches: places on both bodies, springs of the regions that touch     (coupling)
+        -> first_order -> poles, transmission to each partner, contact separation -> the bank, from its next block on
+
+The driver chooses the bodies (`contact_patches.choose_bodies`): active ones whose contacts differ from those of their
+poles. The modes of each body stay its own, with its poles, but pairs of one frequency turn to the contact's axes
+(turned_modes); the small coupling of its other modes by the contacts is left out.
+Lines of a residual take the change of the mode that they follow. Chains of bodies are not claimed: a body's poles use
+its partners as they are free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sonic_bullet import bank
+from sonic_bullet.bank.resonator import Resonator
+from sonic_bullet.contact.contact_place import FLAT_CURVATURE, SIZELESS_M
+from sonic_bullet.contact.coupling import (
+    ContactSpring,
+    InPlace,
+    Region,
+    Touch,
+    contact_spring,
+    first_order,
+)
+from sonic_bullet.contact.coupling.mobility import Moving
+from sonic_bullet.contact.coupling.springs import ContactSide
+from sonic_bullet.contact.load_splitting import SPAN
+from sonic_bullet.contact.strike_pulses import STRUCK_FLAT
+from sonic_bullet.records import Array
+from sonic_bullet.runtime.supports.patch_points import make_ready, placed_points
+from sonic_bullet.runtime.supports.turned_modes import turn_modes
+from sonic_bullet.runtime.synthesis_state import State
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
+ON = 0.02
+"""Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
+NARROW = 0.1
+"""Least width of a face that touches over its length: where two corners alone are known."""
+LEAST_PASSED = 0.3
+"""Of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out."""
+FAINTEST = 1e-3
+"""Of a body's loudest mode: 60 dB below, it is what is left when all else has decayed."""
+SLIPPERY = 1e-9
+"""Of its normal spring: what holds two bodies sideways that have no friction."""
+FASTEST_TURN, STOPPED = 3.0, 0.05
+"""Radians a sample beyond which the contacts have made a mode too fast to play, and its decay a sample then."""
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Return the controller of BLAS threads: on matrices of a hundred, more threads take seconds and change bits."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def prepare_supports(state: State) -> None:
+    """Load, or compile, what the first resting contact would wait for, of a body with one mode on one spring."""
+    make_ready()
+    bank.prepare_poles(state.ringing)
+    body, side = Moving(np.ones(1), np.zeros(1)), ContactSide(1.0, 0.3, 0.0, 0.0)
+    spring = contact_spring(Region((1.0, 1.0), (0.0, 0.0)), (side, side), 1.0)
+    first_order(body, [body], [Touch(0, np.ones((3, 7)), np.zeros((3, 7)), spring)])
+    _blas()
+
+
+def settle(state: State, number: int) -> None:
+    """Update the poles of the bodies that the driver wants, before step ``number`` rings."""
+    many = any(one.user_api == "blas" and one.num_threads != 1 for one in _blas().lib_controllers)
+    with _blas().limit(limits=1, user_api="blas") if many else nullcontext():
+        for b in np.flatnonzero(state.stand["wanted"]).tolist():
+            state.stand["wanted"][b] = 0
+            _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
+
+
+def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
+    """Compute a body's partners, its touches, the load (c,) on each, and its coupled modes.
+
+    quaternion (b, 4): all bodies'.
+    """
+    partners, touches, load_n = _touches(state, b, quaternion)
+    moving = [state.resonators[p].moving for p in partners]
+    return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches, state.table.turn_of(b))
+
+
+def _stand(state: State, b: int, quaternion: Array) -> None:
+    partners, touches, load_n, placed = standing(state, b, quaternion)
+    free = _lanes(state, b)
+    m = state.resonators[b].mode_count
+    turn_modes(state, b, placed.turn if touches else None)
+    if not touches:
+        bank.set_poles(state.bank, state.ringing, b, free)
+        bank.set_passes(state.bank, state.ringing, b, {})
+        return
+    new = _audible((-placed.decay_per_s + 1j * placed.omega_rad_s) / state.bank.sr, free[:m])
+    voice = state.voices[b]
+    if voice is not None:
+        new = np.concatenate([new, free[m : m + len(voice.follows)] + (new - free[:m])[voice.follows]])
+    new = np.concatenate([new, free[len(new) :]])  # rigid motions
+    lift = np.zeros(len(free))
+    lift[:m] = np.nan_to_num(np.abs(placed.force_n_s) / load_n[:, None]).max(axis=0)
+    bank.set_poles(state.bank, state.ringing, b, new, lift)
+    bank.set_passes(state.bank, state.ringing, b, dict(_passed(state, b, partners, placed, len(free))))
+
+
+def _lanes(state: State, b: int) -> Array:
+    """Return s a sample (m + lines,) of a body without contacts."""
+    row = state.bank.body[b]
+    lanes = slice(int(row["start"]), int(row["start"] + row["columns"]))
+    step: Array = state.bank.law[0, lanes] + 1j * state.bank.law[1, lanes]
+    return step
+
+
+def _audible(new: Array, free: Array) -> Array:
+    """Limit poles to what the bank can play: a mode that the contacts stop or make too fast decays within a block."""
+    stopped = np.minimum(free.real, -STOPPED) + 1j * np.minimum(free.imag, FASTEST_TURN)
+    fast = ~np.isfinite(new) | (new.imag > FASTEST_TURN) | (new.imag <= 1e-6) | (-new.real > new.imag)
+    return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
+
+
+def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
+    """Yield weights (W, columns) of the transmission to each audible partner.
+
+    Audible: more than LEAST_PASSED of the body's own sound in some mode, of those within FAINTEST of its loudest, both
+    without gains.
+    """
+    own = np.abs(state.resonators[b].weight[0] @ placed.turn) / state.resonators[b].body.gain
+    least = np.maximum(LEAST_PASSED * own, FAINTEST * own.max(initial=0.0))
+    for p, rate in zip(partners, placed.passes, strict=True):
+        weight = np.zeros((len(state.bank.observed), columns), complex)
+        weight[:, : rate.shape[1]] = passed_weight(state.resonators[p], rate, placed.omega_rad_s)
+        passed = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
+        if (passed > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
+            yield p, weight
+
+
+def passed_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
+    """Compute weights (W, m) of another body's modes, at omega_rad_s (m,), in the sound of a partner.
+
+    rate (m_p, m): motion of the partner's own modes per motion of them. Pressure is iωρ₀ times velocity: it is
+    proportional to the frequency at which a mode is moved; its other radiation is taken at the mode's own.
+    """
+    rate = np.nan_to_num(rate)
+    weight: Array = partner.weight @ rate
+    weight[0] = (partner.weight[0] / partner.omega_rad_s) @ rate * omega_rad_s
+    return weight
+
+
+def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array]:
+    """Return a body's partners, its touches, and the load on each (c,)."""
+    partners: list[int] = []
+    touches, loads = [], []
+    pairs = state.pairs
+    for slot in pairs.active[: pairs.count[0]].tolist():
+        held, both = pairs.held[slot], pairs.pair["body"][slot].tolist()
+        if b not in both or not held["count"]:
+            continue
+        side = both.index(b)
+        other = both[1 - side]
+        if other not in partners:
+            partners.append(other)
+        if not sum(state.resonators[one].side.compliance_per_pa for one in both):
+            continue  # both rigid: their materials are unknown
+        turns = np.stack([state.resonators[one].moving.turn for one in both])
+        placed = placed_points(state.table, quaternion, held, pairs.pair["body"][slot], turns)
+        own, there = placed.moves[side], placed.moves[1 - side]
+        load = held["load_n"][: held["count"]]
+        for i, spring in enumerate(_springs(state, both, held, placed.curvature_per_m, placed.off_m, load)):
+            touches.append(Touch(partners.index(other), own[i], there[i], spring))
+            loads.append(load[i])
+    return partners, touches, np.array(loads)
+
+
+def _springs(
+    state: State, both: list[int], held: Array, curvature: Array, off_m: float, load: Array
+) -> Iterator[ContactSpring]:
+    """Yield the spring of each of a pair's points: of its part of one region, or of a region of its own.
+
+    off_m: distance of the points' middle from the surfaces.
+    """
+    sides = state.resonators[both[0]].side, state.resonators[both[1]].side
+    sizes = [float(row["size_m"]) for row in state.table.bodies[both] if row["volume_m3"] > 0]
+    size = min(sizes, default=SIZELESS_M)
+    region = _one_region(held["point_m"][: held["count"], 0], float(curvature.mean()), off_m, size)
+    whole = float(load.sum())
+    slips = any(state.resonators[one].body.dynamics.get("lateralFriction") == 0 for one in both)  # μ is their product
+    if region is not None:
+        spring = _gripped(contact_spring(region, sides, whole), slips=slips)
+        yield from (spring.share(float(n) / whole) for n in load)
+        return
+    for n, bent in zip(load.tolist(), curvature.tolist(), strict=True):
+        small = STRUCK_FLAT * size
+        point = (
+            Region((small, small), (0.0, 0.0)) if bent * size <= FLAT_CURVATURE else Region((0.0, 0.0), (bent, bent))
+        )
+        yield _gripped(contact_spring(point, sides, n), slips=slips)
+
+
+def _gripped(spring: ContactSpring, *, slips: bool) -> ContactSpring:
+    """Return a spring as friction holds it: without any, nothing is held sideways [Mindlin 1949: what sticks is]."""
+    return replace(spring, tangential_n_m=SLIPPERY * spring.normal_n_m) if slips else spring
+
+
+def _one_region(point_m: Array, curvature_per_m: float, off_m: float, size_m: float) -> Region | None:
+    """Return the line or face that touches between a pair's points (c, 3); None where there is none."""
+    middle = point_m - point_m.sum(axis=0) / len(point_m)
+    spread = np.sqrt(((middle.max(axis=0) - middle.min(axis=0)) ** 2).sum())
+    if spread < STRUCK_FLAT * size_m or off_m > ON * spread:
+        return None
+    half = np.abs(middle @ np.linalg.svd(middle)[2].T).max(axis=0)
+    if curvature_per_m * size_m > FLAT_CURVATURE:  # mean of both principal curvatures, of which a line has one
+        return Region((float(half[0]), 0.0), (0.0, 2 * curvature_per_m))
+    return Region((float(half[0]), float(max(half[1], NARROW * half[0]))), (0.0, 0.0))

@@ -1,0 +1,341 @@
+"""Run time: physics steps in, frames of sound out, with one explicit state between (synthesis_state.py).
+
+    Step, Step, … -> STEP table -> driver.advance_steps, enlarging tables where it asks for it -> frames
+                                        + grains of residuals, where a body has one: then a step at a time
+
+A step's sound is made when the `LOOKAHEAD` steps after it are known. Live listening, `sound` (which drains a copy of
+the state) and the replay of a log run the same code on the same numbers in the same order: the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sonic_bullet.bank.rigid_motion import enter_mobility, until_motions
+from sonic_bullet.contact.load_splitting import LOOKAHEAD
+from sonic_bullet.path import path_places, propagation
+from sonic_bullet.path.path_kernel import AT_REST
+from sonic_bullet.path.room.room_plan import RoomPlan
+from sonic_bullet.path.space.space_state import hears_apart
+from sonic_bullet.records import Air, Array, Sensor
+from sonic_bullet.records.arrays import joined
+from sonic_bullet.records.contacts import CONTACT, Contacts, Step
+from sonic_bullet.records.errors import AudioError, FileError
+from sonic_bullet.runtime import driver
+from sonic_bullet.runtime.body_lifetime import Records, admit, in_tables, lifted, release
+from sonic_bullet.runtime.channels.body_images import completed
+from sonic_bullet.runtime.channels.directional_weights import take_aim, until_turned
+from sonic_bullet.runtime.channels.finished_channels import finish_channels
+from sonic_bullet.runtime.clock import Clock, exact_step
+from sonic_bullet.runtime.first_run import make_driver
+from sonic_bullet.runtime.groups import DriverCall, Frames, StepTables
+from sonic_bullet.runtime.residual_voice import add_residuals
+from sonic_bullet.runtime.ringing_on import with_tail
+from sonic_bullet.runtime.supports.pole_updates import prepare_supports, settle
+from sonic_bullet.runtime.synthesis_state import Setup, State, quench, start
+from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
+
+LATENCY_STEPS = LOOKAHEAD
+LOOK_EVERY = 64
+"""Steps between two checks for bodies that have left and are silent: a check costs 20 µs, so that it and the removal of
+a body cost nothing, and tables hold at most what left in so many steps beside what still rings."""
+
+
+def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+    """Take in steps of the bodies present; return (channels, n) of what can be rendered then, LOOKAHEAD before them.
+
+    Changes ``state`` in place: `copy` it first to come back to it.
+    """
+    if len(steps) == 1 and not state.quenches:  # live, where a microsecond counts
+        return _advanced(setup, state, steps)
+    frames = []
+    while steps:
+        if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
+            quench(state)
+        count = 1 if state.has_residual or state.witness is not None else len(steps)
+        ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
+        count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead), until_motions(steps)])
+        count = min(count, until_turned(setup, state, steps[:count]))
+        frames.append(_advanced(setup, state, steps[:count]))
+        steps = steps[count:]
+    return np.concatenate(frames, axis=1) if len(frames) != 1 else frames[0]
+
+
+def _schedule(sr: int, state: State, steps: Sequence[Step]) -> tuple[Array, Clock, tuple[float, ...]]:
+    """Build the STEP table of steps to be taken in, and clock and waiting lengths after them."""
+    layout, clock, waiting, number, at = driver.STEP_LAYOUT, state.clock, state.waiting, state.number, 0
+    table = bytearray(len(steps) * layout.size)
+    first = clock.sample(sr)
+    for i, step in enumerate(steps):
+        dt_s, rows = step.dt_s, len(step.contacts.row)
+        waiting = (*waiting, dt_s)
+        count, offset, begin_s, after_s, quenched = 0, 0.0, 0.0, 0.0, False
+        sample = first
+        if len(waiting) > LOOKAHEAD:
+            number += 1
+            after = clock.after(waiting[0])
+            offset, begin_s, after_s, quenched = clock.offset(sr), clock.time_s, after.time_s, number in state.quenches
+            first, clock, waiting = after.sample(sr), after, waiting[1:]
+            count = first - sample
+        layout.pack_into(
+            table, i * layout.size, dt_s, *step.gravity_m_s2.tolist(), at, at + rows, sample, count, offset, begin_s,
+            after_s, quenched,
+        )  # fmt: skip
+        at += rows
+    return np.frombuffer(table, driver.STEP), clock, waiting
+
+
+def _load_code(setup: Setup, state: State, values: tuple[Any, ...]) -> None:
+    """Load, or compile, before the first step what it and the first resting contact would wait for."""
+    if not getattr(driver.advance_steps, "overloads", True):
+        make_driver(values)
+        if setup.supports:
+            prepare_supports(state)
+
+
+def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
+    """Advance by steps without a quench between; by one alone where a body has a residual."""
+    sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
+    enter_mobility(state.table.bodies, state.body, steps[0].motions)
+    table, clock, waiting = _schedule(sr, state, steps)
+    contacts, poses = _joined(steps)
+    if state.present is not state.body or state.mapped:
+        contacts, poses = in_tables(state, contacts, poses)
+    stop = clock.sample(sr)
+    aim, sensors = AT_REST, len(state.reads)
+    by_body = setup.apart or hears_apart(setup.sensors) or state.surface is not None
+    if state.space is not None:
+        aim = state.space.aim(table, clock.after(waiting[0]).time_s, poses, state.resonators)
+    take_aim(setup, state)
+    groups, microphones = len(state.body) if by_body else 1, len(state.path.microphone_m)
+    out = np.zeros((groups * sensors, stop - begin))
+    pressure = out if microphones == sensors else np.zeros((groups * microphones, stop - begin))
+    longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
+    if state.scratch.samples < longest:
+        _make_room(state, table[0], longest)
+    given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.ANEW
+    frames = Frames(begin, int(by_body), state.reads, state.sets, pressure, out)
+    while done < len(steps):
+        values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
+        _load_code(setup, state, values)
+        more, status = driver.advance_steps(values)
+        done, resume = done + more, driver.ANEW if status in (driver.TO_GROW, path_places.DONE) else driver.RINGS
+        if status == path_places.DONE:
+            continue
+        if status == driver.TO_GROW:
+            _make_room(state, table[done], longest)
+        elif status == driver.TO_SETTLE:
+            settle(state, state.taken + done - LOOKAHEAD)
+            resume = driver.EXCITED
+        elif status == driver.PAUSED:
+            found, drives = state.scratch.count.tolist()
+            if state.has_residual:
+                add_residuals(setup, state, table[done], found, drives)
+            if state.witness is not None:
+                state.witness(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
+        elif status == driver.BROKEN:
+            what = "the synthesizer made NaN or infinite samples, or lost a strike"
+            raise AudioError(what, "report the contact log: this must not happen")
+        else:
+            state.travelling.at = int(table[done]["sample"])
+            propagation.grow(state.path, state.travelling, status)
+            state.changed()
+    state.taken += len(steps)
+    state.clock, state.waiting = clock, waiting
+    state.ringing.at = state.travelling.at = stop
+    return finish_channels(setup, state, table, steps, out, pressure)
+
+
+def _joined(steps: Sequence[Step]) -> tuple[Array, tuple[Array, ...]]:
+    """Join contact rows of all steps, and their poses (k, b, ·): read-only, so that one type is compiled once."""
+    first = steps[0]
+    if len(steps) == 1:
+        return first.contacts.row, (first.position_m[None], first.quaternion_xyzw[None], first.teleported[None])
+    b = len(first.position_m)
+    position = joined([step.position_m for step in steps], float, (b, 3))
+    turned = joined([step.quaternion_xyzw for step in steps], float, (b, 4))
+    moved = joined([step.teleported for step in steps], bool, (b,))
+    return joined([step.contacts.row for step in steps], CONTACT), (position, turned, moved)
+
+
+def _make_room(state: State, step: Array, samples: int) -> None:
+    """Make room for the step: its rows, the pairs and the strikes that they may become."""
+    rows = int(step["row"][1] - step["row"][0])
+    pairs = int(state.pairs.count[0]) + rows
+    columns = state.bank.columns
+    state.window.with_room(rows)
+    state.pairs.with_room(rows, columns)
+    state.ringing.with_room(4 * pairs)
+    state.scratch.fit(pairs, columns, samples, state.bank.observed.shape)
+    state.changed()
+
+
+def drained(setup: Setup, state: State, last: Step | None) -> Array:
+    """Render the steps taken in but not yet rendered, (channels, n), as if nothing touched any more afterwards.
+
+    last: the newest of them. ``state`` is not changed.
+    """
+    missing = len(state.waiting)
+    if last is None or not missing:
+        return np.zeros((setup.channels * (len(state.body) if setup.apart else 1), 0))
+    state = state.copy()
+    count = clock_after(state).sample(setup.sr) - state.clock.sample(setup.sr)
+    still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
+    return advance(setup, state, [still] * LOOKAHEAD)[:, :count]
+
+
+def clock_after(state: State) -> Clock:
+    """Return the clock at the end of the last step taken in."""
+    clock = state.clock
+    for dt_s in state.waiting:
+        clock = clock.after(dt_s)
+    return clock
+
+
+class Synthesizer:
+    """Live form of `advance`: steps in, lagging frames out; the sound so far is kept, unless ``keep`` is False.
+
+    unkept: why no more of it is kept, once a disk is full; frames continue.
+    """
+
+    def __init__(
+        self, *, sr: int, sensors: tuple[Sensor, ...], seed: int, air: Air, residual: bool = True,
+        supports: bool = True, image: bool = False, room: RoomPlan | None = None, keep: bool = True,
+    ) -> None:  # fmt: skip
+        setup = Setup(sr, sensors, seed, air, residual=residual, supports=supports, room=room)
+        self._setup = completed(setup, image=image)
+        self._keep = keep
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew at time 0, in silence, as one just made."""
+        self._state = start(self._setup)
+        self._clock = Clock()
+        self._sound = SoundSpool(self._setup.channels, "attach with keep_sound=False") if self._keep else None
+        self.unkept: FileError | None = None
+        self._lag = np.zeros((self._setup.channels, 0))
+        self._last: Step | None = None
+        self._failed: AudioError | None = None
+        self._steps = 0
+        self._looked = 0
+
+    @property
+    def time_s(self) -> float:
+        """Physics time taken in."""
+        return self._clock.time_s
+
+    @property
+    def lifted(self) -> dict[str, tuple[int, int]]:
+        """Steps with contact separation, see `body_lifetime.lifted`."""
+        return lifted(self._state)
+
+    def feed(self, step: Step, bodies: Records) -> Array:
+        """Take in a step; return the frame (channels, n) as long as the step, LATENCY_STEPS late.
+
+        bodies: by index, at least those new in the step. Without a sensor nothing is computed but the time. Raises
+        LogError where a body comes that had left.
+        """
+        return self.feed_all([step], bodies)
+
+    def feed_all(self, steps: Sequence[Step], bodies: Records) -> Array:
+        """Take in steps of the same bodies each; return what `feed` gives for each of them, joined."""
+        lengths = {*self._state.waiting, *(one.dt_s for one in steps)} if len(steps) > 1 else ()
+        if len(lengths) > 1:  # a frame that grows may have to wait
+            return np.concatenate([self.feed(one, bodies) for one in steps], axis=1)
+        channels, sr, rendered = self._setup.channels, self._setup.sr, len(self._state.waiting) == LATENCY_STEPS
+        begin, before_first, first = self._clock.sample(sr), LATENCY_STEPS - len(self._state.waiting), self._steps == 0
+        silent = 0
+        for number, one in enumerate(steps, 1):
+            self._clock = self._clock.after(one.dt_s)
+            if number <= before_first:
+                silent = self._clock.sample(sr) - begin
+        count = self._clock.sample(sr) - begin
+        self._steps += len(steps)
+        if channels == 0:
+            return np.zeros((0, count))
+        fresh = self._take(steps, bodies)
+        if not rendered:
+            # where a step is no whole number of samples (44.1 kHz at 240 Hz), one more, so that uneven frames never run
+            # dry
+            uneven = (exact_step(steps[0].dt_s) * sr).denominator != 1
+            fresh = np.concatenate([np.zeros((channels, silent + (uneven and first))), fresh], axis=1)
+        if self._lag.shape[1] == 0 and fresh.shape[1] == count:
+            return fresh
+        queue = np.concatenate([self._lag, fresh], axis=1)
+        if rendered and queue.shape[1] < count:  # the step grew, and with it the lag in samples
+            queue = np.concatenate([np.zeros((channels, count - queue.shape[1])), queue], axis=1)
+        out, self._lag = queue[:, :count], queue[:, count:]
+        return np.ascontiguousarray(out)
+
+    def play(self, steps: Sequence[Step], bodies: Records) -> Array:
+        """Take in steps of the same bodies each; return (channels, n) of what can be rendered then, without lag."""
+        for step in steps:
+            self._clock = self._clock.after(step.dt_s)
+        self._steps += len(steps)
+        return self._take(steps, bodies) if self._setup.sensors else np.zeros((0, 0))
+
+    def _take(self, steps: Sequence[Step], bodies: Records) -> Array:
+        if self._failed is not None:  # it failed within a step: the state cannot be continued
+            raise self._failed
+        state = self._state
+        if steps[0].body is not state.present:
+            admit(self._setup, state, steps[0], bodies)
+        try:
+            frame = advance(self._setup, state, steps)
+        except AudioError as error:
+            self._failed = error
+            raise
+        if state.present is not state.body and state.taken >= self._looked + LOOK_EVERY:
+            self._looked = state.taken
+            release(state)
+        self._last = steps[-1]
+        if self._sound is not None and self.unkept is None:
+            try:
+                self._sound.add(frame)
+            except FileError as error:
+                self.unkept = error
+        return frame
+
+    def rest(self) -> Array:
+        """Render the rest of the steps taken in, (channels, n), as if nothing touched any more."""
+        channels = self._setup.channels
+        if not channels:
+            return np.zeros((0, self._clock.sample(self._setup.sr)))
+        return drained(self._setup, self._state, self._last) if self._failed is None else np.zeros((channels, 0))
+
+    def sound(self) -> Array:
+        """Return all sound so far, (channels, floor(sr·time)), without lag; as `kept_sound`, in memory."""
+        return self.kept_sound().samples()
+
+    def kept_sound(self, tail_db: float | None = None) -> KeptSound:
+        """Return all sound so far, without lag, where it is stored.
+
+        After an AudioError: what was made before it; after a full disk: what was kept. tail_db: see `with_tail`. Raises
+        AudioError where none is kept.
+        """
+        if self._sound is None:
+            raise AudioError("the sound is not kept", "attach with keep_sound=True, or read() the frames")
+        rest = self.rest() if self.unkept is None else np.zeros((self._setup.channels, 0))
+        sound = KeptSound(self._sound, len(self._sound), rest)
+        return sound if self.unkept is not None else self.with_tail(sound, tail_db)
+
+    def with_tail(self, sound: KeptSound, tail_db: float | None, longer_s: float = 0.0) -> KeptSound:
+        """Extend the whole sound so far by its tail until it is tail_db below its peak; None: nothing more.
+
+        longer_s: by so much more.
+        """
+        if tail_db is None or self._failed is not None:
+            return sound
+        return with_tail(sound, self._setup, self._state, self._last, tail_db, longer_s)
+
+    def quench(self) -> None:
+        """Stop all ringing where the steps taken in so far end, exactly there at any rate.
+
+        In frames that is LATENCY_STEPS later.
+        """
+        if self._setup.sensors:
+            self._state.quenches = self._state.quenches | {self._steps}
