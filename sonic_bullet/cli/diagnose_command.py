@@ -108,7 +108,7 @@ def _summary(found: Any) -> str:
 
     words = {
         "none": "the model suffices: no effect is accepted",
-        "explained": "the model lacks",
+        "explained": "the model lacks" + (", not alone" if found.unexplained else ""),
         "unexplained": "something is left that no known effect explains",
         "worse-than-silence": "what was fitted is farther from the recordings than silence: no effect was sought",
         "nothing": NOTHING,

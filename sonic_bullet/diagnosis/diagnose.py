@@ -24,7 +24,7 @@ from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db, take_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.remainder import listing, remainder
+from sonic_bullet.diagnosis.remainder import indistinct_places, listing, remainder
 from sonic_bullet.diagnosis.selection.effect_table import effect_table
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
@@ -62,7 +62,7 @@ class Diagnosis:
     errors_lines : dict
         Likewise for measured lines in place of audio, of ln f and ln d.
     unexplained : dict
-        What is left, in words and numbers; empty where nothing is.
+        What is left, beside names too, in words and numbers; empty where nothing is.
     not_compared : dict
         By split, what could not be compared; empty where all could.
     warnings : tuple of str
@@ -176,7 +176,7 @@ def _warnings(end: Closed | NothingCompared, out: dict[str, tuple[LeftOut, ...]]
             f"upper modes are up to {100 * end.mesh_off:.1f} % off, more than is corrected: what is left "
             "open is the mesh's; a finer one closes it"
         )
-    return said
+    return [*said, *indistinct_places(end)]
 
 
 def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompared) -> dict[str, Any]:

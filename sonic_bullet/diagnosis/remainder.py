@@ -18,6 +18,8 @@ from sonic_bullet.diagnosis.selection.band_levels import in_words
 from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, WorseThanSilence
 from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.effects.common.points import places_alike
+from sonic_bullet.effects.protocol import ActsAtPlaces
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
@@ -26,7 +28,10 @@ NOTHING = "nothing could be compared"
 
 
 def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str, Any]:
-    """Describe what the last hypothesis leaves; empty where the verdict leaves nothing open or there is no audio."""
+    """Describe what the last hypothesis leaves; empty where that is nothing, or there is no audio.
+
+    Of `explained` it is what is left beside the names, where that is more than suffices_db.
+    """
     if isinstance(end, WorseThanSilence):
         words = (
             f"what was fitted is {end.before_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
@@ -37,7 +42,8 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
     judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, Take)}
     takes = [t for t in takes if (t.body.name, t.strike) in judged]
-    if end.verdict != "unexplained" or not takes:
+    left_db = end.after_db - end.floor_db
+    if not takes or not (end.verdict == "unexplained" or (end.added and left_db > RULES.suffices_db)):
         return {}
     made = predict_takes(end.after, takes)
     share, band_hz, level = _shares(takes, made)
@@ -61,6 +67,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
     thirds = ["first", "second", "last"]
     words = in_words(end.bands) + "; " if end.bands else ""
+    words += f"{left_db:.1f} dB beside what is named, which closes the rest; " if end.added else ""
     words += f"most of it in the {thirds[int(np.nanargmax(when))]} third of the recordings, around " + ", ".join(
         f"{b['from_hz']:.0f} to {b['to_hz']:.0f} Hz" for b in bands[:2]
     )
@@ -84,7 +91,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
             "every strike: an echo of something that moves does that"
         )
     return {
-        "left_db": end.after_db - end.floor_db,
+        "left_db": left_db,
         "words": words,
         "bands": bands,
         "bands_off": [asdict(band) for band in end.bands],
@@ -105,6 +112,26 @@ def _places(takes: Sequence[Take], scatter: float) -> str:
     if len(at) == 1:
         return "all strikes are at one place: whether it differs elsewhere is not known"
     return "it differs from place to place" if scatter > 0.5 else "it is alike wherever the body is struck"
+
+
+def indistinct_places(end: Closed) -> list[str]:
+    """List the images of effects' places that lines cannot separate from them, a sentence a place."""
+    body, said = end.judged[0].body, []
+    near = 0.1 * float(np.linalg.norm(np.ptp(body.model.vertex_m, axis=0)))
+    for effect in (c.effect for c in end.added if isinstance(c.effect, ActsAtPlaces)):
+        known = np.empty((0, 3))
+        for place in effect.places() if body.family is not None else ():
+            if (np.linalg.norm(known - np.array(place), axis=1) < near).any():
+                continue  # with an earlier one
+            known = np.concatenate([known, images := places_alike(body.model, place)])
+            here, *there = (f"({', '.join(f'{x:.3g}' for x in p)}) m" for p in (place, *images))
+            if there:
+                more = f" or {len(there) - SHOWN} more" if len(there) > SHOWN else ""
+                said.append(
+                    f"{effect.id} at {here} may as well be at {' or '.join(there[:SHOWN])}{more}, or divided between "
+                    "them: all move alike in every mode, so lines cannot tell; a finger laid on each in turn would"
+                )
+    return said
 
 
 def listing(left_out: Sequence[LeftOut]) -> str:

@@ -21,6 +21,7 @@ from sonic_bullet.records import Array, ModalModel
 
 __all__ = [
     "CARRIES",
+    "ActsAtPlaces",
     "BaselineChange",
     "ChangesBaseline",
     "Cost",
@@ -201,6 +202,14 @@ class RingsAlong(ABC):
     @abstractmethod
     def lines(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return its frequencies in Hz and decays in 1/s."""
+
+
+class ActsAtPlaces(ABC):
+    """An effect at places of the surface, which may have images under the body's symmetry that do the same."""
+
+    @abstractmethod
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """Return its places (p, 3) in the mesh's frame, in metres."""
 
 
 class Effect(Protocol):

@@ -44,7 +44,8 @@ def page(d: Diagnosis) -> str:
     """Render the page's text."""
     words = {
         "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
-        "explained": "The model lacks something, and what it lacks has a name.",
+        "explained": "The model lacks something, and what it lacks has a name."
+        + (" It does not lack that alone." if d.unexplained else ""),
         "unexplained": "Something is left that none of the known effects accounts for.",
         "worse-than-silence": "What was fitted is farther from the recordings than silence, so no effect was sought.",
         "nothing": "Nothing could be compared, so nothing is known of what the model lacks.",

@@ -7,9 +7,10 @@ import pytest
 
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.added_mass.mass_loaded_modes import FAR, attached, loaded
+from sonic_bullet.effects.common.points import places_alike
 from sonic_bullet.effects.rebound import _agreed
 from sonic_bullet.effects.rebound.later_hits import _delayed, _sought
-from tests.made.body import plate
+from tests.made.body import SIDE_M, plate
 
 
 def test_a_mass_where_no_mode_moves_hangs_on_what_the_point_yields() -> None:
@@ -33,6 +34,17 @@ def test_a_yielding_point_carries_a_mass_as_if_it_were_heavier() -> None:
     low = x.freq_hz < 3_000
     assert np.all(soft.freq_hz[low] <= held.freq_hz[low] * (1 + 1e-9))
     assert soft.freq_hz[low].sum() < held.freq_hz[low].sum()
+
+
+def test_a_rectangles_images_move_alike() -> None:
+    """sin² mπx sin² nπy is the same at x and 1 − x, at y and 1 − y, in every mode; the middle has no image."""
+    x = plate()
+    a, b = SIDE_M
+    u, v = 5 * a / 22, 4 * b / 14
+    found = {tuple(np.round(p[:2], 6)) for p in places_alike(x, (u, v, 0.0))}
+    assert found == {tuple(np.round(p, 6)) for p in ((a - u, v), (u, b - v), (a - u, b - v))}
+    assert len(places_alike(x, (a / 2, b / 2, 0.0))) == 0
+    assert len(places_alike(x, (0.0, 0.0, 0.0))) == 0, "what never moves tells of no place"
 
 
 def test_a_later_hit_is_found_between_samples() -> None:

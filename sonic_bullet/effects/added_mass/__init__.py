@@ -24,7 +24,17 @@ from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
 from sonic_bullet.effects.added_mass.mass_search import WIDTHS, MassFit, Scored, strict
 from sonic_bullet.effects.common.pairs import agreed, patterns
 from sonic_bullet.effects.common.points import nearest, spread_out, vertex_normals
-from sonic_bullet.effects.protocol import BaselineChange, ChangesBaseline, Cost, Evidence, Mixing, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import (
+    ActsAtPlaces,
+    BaselineChange,
+    ChangesBaseline,
+    Cost,
+    Evidence,
+    Mixing,
+    Owner,
+    Stage,
+    Traits,
+)
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array, ModalModel
 
@@ -36,7 +46,7 @@ TRIES = 6
 
 
 @dataclass(frozen=True)
-class AddedMass(ChangesBaseline):
+class AddedMass(ChangesBaseline, ActsAtPlaces):
     """A point mass on the surface, and what was fitted of the bare body with it.
 
     Attributes
@@ -81,6 +91,10 @@ class AddedMass(ChangesBaseline):
     def baseline_change(self) -> BaselineChange:
         """Return E/ρ and ν of the bare body, found with the mass."""
         return BaselineChange(stretch=self.stretch, poisson_ratio=self.poisson_ratio)
+
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """Return the mass's place."""
+        return (self.position_m,)
 
     def parameters(self) -> dict[str, Any]:
         """Return its parameters by name, in SI units, for reports and JSON."""

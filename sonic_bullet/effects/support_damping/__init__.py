@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.effects.common.dashpots import damped
 from sonic_bullet.effects.common.points import nearest, vertex_normals
-from sonic_bullet.effects.protocol import Cost, Evidence, Mixing, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import ActsAtPlaces, Cost, Evidence, Mixing, Owner, Stage, Traits
 from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import NEARER, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
@@ -27,7 +27,7 @@ LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though
 
 
 @dataclass(frozen=True)
-class SupportDamping:
+class SupportDamping(ActsAtPlaces):
     """Dashpots on the surface, one entry a dashpot.
 
     Attributes
@@ -63,6 +63,10 @@ class SupportDamping:
             phi = x.shape[at].astype(float)
             rows.append(np.sqrt(c) * (phi if direction == "every" else normal[at][None] @ phi))
         return damped(x, np.concatenate(rows))
+
+    def places(self) -> tuple[tuple[float, float, float], ...]:
+        """Return the dashpots' places."""
+        return self.position_m
 
     def parameters(self) -> dict[str, Any]:
         """Return its parameters by name, in SI units, for reports and JSON."""
