@@ -30,12 +30,6 @@ FACE = np.dtype(
 NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
 """A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
 
-# A face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness 2V/A,
-# at most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin wall near
-# both).
-WALL_PART = 0.03
-# Faces whose distances differ by less than this part of the surface's diagonal are equally near.
-TIE_PART = 1e-7
 # Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
 LOOKS = 1e-6
 # Boxes that wait in a search: a balanced tree of 2^64 faces leaves no more.
@@ -46,8 +40,8 @@ _DEEPEST = 64
 class SurfaceIndex:
     """A surface ready for `nearest`.
 
-    faces (f,) of FACE in tree order, ``order`` (f,) their own numbers, nodes (k,) of NODE; wall_m: see WALL_PART;
-    tie_m: see TIE_PART.
+    faces (f,) of FACE in tree order, ``order`` (f,) their own numbers, nodes (k,) of NODE; wall_m: the thinnest wall;
+    tie_m: what counts as equally near.
     """
 
     faces: Array
@@ -79,14 +73,19 @@ def surface_index(vertex_m: Array, face: Array, curvature_per_m: Array | None = 
         / 6
     )
     diagonal = float(np.linalg.norm(nodes["high_m"][0] - nodes["low_m"][0]))
-    wall = min(4 * volume / max(float(length.sum()), 1e-300), WALL_PART * diagonal)
+    # a face that looks the right way may be this much farther than the nearest: twice as far, plus a wall's thickness
+    # 2V/A, at most this part of the surface's diagonal (a point on the lid of a bowl is far from both, one in a thin
+    # wall near both)
+    wall_part = 0.03
+    wall = min(4 * volume / max(float(length.sum()), 1e-300), wall_part * diagonal)
     faces = np.zeros(len(face), FACE)
     faces["corner_m"] = corner[order]
     faces["normal"] = (vector / np.where(length > 0, length, 1)[:, None])[order]
     faces["vertex"] = np.asarray(face)[order]
     if curvature_per_m is not None:
         faces["curvature_per_m"] = curvature_per_m[order]
-    return SurfaceIndex(faces, nodes, order, wall, TIE_PART * diagonal)
+    tie_part = 1e-7  # faces whose distances differ by less than this part of the surface's diagonal are equally near
+    return SurfaceIndex(faces, nodes, order, wall, tie_part * diagonal)
 
 
 def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
@@ -96,8 +95,10 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     surface should have there, or None; a face with normal·n > 0 is taken if it is at most twice as far as the nearest
     one plus a wall's thickness.
     """
-    points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
-    wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
+    points = np.array(points_m, float, order="C").reshape(
+        -1, 3
+    )  # copies: a read-only array has machine code of its own
+    wanted = np.zeros_like(points) if normals is None else np.array(normals, float, order="C").reshape(-1, 3)
     face, found = _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted)
     return index.order[face], found[:, :3], found[:, 3]
 

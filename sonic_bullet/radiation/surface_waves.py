@@ -74,7 +74,7 @@ class SurfaceWaves:
 @lru_cache(maxsize=1)
 def _kept_kernels(corner: bytes) -> Array:
     """Compute `static_kernels` of triangles, in single precision; once for several materials of a shape."""
-    corner_m = np.frombuffer(corner).reshape(-1, 3, 3)
+    corner_m = np.frombuffer(corner).reshape(-1, 3, 3).copy()  # read-only, it would have machine code of its own
     twice = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0])
     made = static_kernels(corner_m, twice / np.linalg.norm(twice, axis=1, keepdims=True))
     return np.asarray(made, np.float32)

@@ -77,13 +77,13 @@ def factorise(matrix: Any) -> Factor:
             children = left.pop(number, [])
             while children:  # each is freed once it is added
                 child_row, child_rest = children.pop(0)
-                _add_rest(child_rest, np.searchsorted(index, child_row), column, rest)
+                _add_rest(child_rest, np.searchsorted(index, child_row), column.T, rest.T)
                 del child_rest
             root = cholesky(column[:width], lower=True, check_finite=False)
             below = dtrsm(1.0, root, column[width:], side=1, lower=1, trans_a=1)
             if len(row):
                 rest = dsyrk(-1.0, below, beta=1.0, c=rest, lower=1, overwrite_c=1)
-                left.setdefault(parent, []).append((row, _packed(rest)))
+                left.setdefault(parent, []).append((row, _packed(rest.T)))
             del column, rest
             made.append(Supernode(start, row, root, below))
     except (LinAlgError, MemoryError) as error:
@@ -135,26 +135,32 @@ def _supernodes(lower: Any) -> list[tuple[int, int, Array, int]]:
 
 @njit(nogil=True)
 def _packed(rest):
-    """Pack the columns of a lower triangle (c, c) one after the other: half the memory."""
+    """Pack the rows of an upper triangle (c, c) one after the other: half the memory.
+
+    Kernels here take what BLAS made by columns as rows of its transpose, C order at any size: one machine code.
+    """
     size = len(rest)
     made = np.empty(size * (size + 1) // 2)
     at = 0
     for j in range(size):
-        made[at : at + size - j] = rest[j:, j]
+        made[at : at + size - j] = rest[j, j:]
         at += size - j
     return made
 
 
 @njit(nogil=True)
 def _add_rest(child, place, column, rest):
-    """Add a child's rest, a packed triangle of c rows, at its ``place`` (c,) among its parent's rows."""
-    width = column.shape[1]
+    """Add a child's rest, a packed triangle of c rows, at its ``place`` (c,) among the columns of its parent.
+
+    column (w, n), rest (n - w, n - w): transposed.
+    """
+    width = len(column)
     at = 0
     for j in range(len(place)):
         if place[j] < width:
             for i in range(j, len(place)):
-                column[place[i], place[j]] += child[at + i - j]
+                column[place[j], place[i]] += child[at + i - j]
         else:
             for i in range(j, len(place)):
-                rest[place[i] - width, place[j] - width] += child[at + i - j]
+                rest[place[j] - width, place[i] - width] += child[at + i - j]
         at += len(place) - j
