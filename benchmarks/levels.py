@@ -28,9 +28,10 @@ from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.presets import load_material
 from sonic_bullet.radiation.far_field import jerk_coefficient
 from sonic_bullet.records import Air, Array, Material
-from sonic_bullet.records.mounting import IN_PLACE
 from sonic_bullet.scene import render_scene
 from tests.made.banks import Strike, advance
+
+IN_PLACE = 0.03
 
 AIR = Air()
 RHO_C = AIR.density_kg_m3 * AIR.sound_speed_m_s

@@ -31,6 +31,8 @@ from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.sides import SceneSide, Side, of_log, run
 from sonic_bullet.runtime.replay import render_blocks
 
+PLAYED_S = 12.0
+
 Change = tuple[tuple[Any, ...], Any]
 
 
@@ -270,7 +272,7 @@ def processes(bench: Bench, count: int = 10) -> None:
 
 def page(bench: Bench, count: int = 20) -> None:
     """The size of a page of so many scenes that differ, each as long as a player plays."""
-    from sonic_bullet.report.compare_page import PLAYED_S, page_entry, write_page
+    from sonic_bullet.report.compare_page import page_entry, write_page
 
     place = write(bench.folder / "long.py", changed(SCENES["pile"], (("seconds",), PLAYED_S)))
     a = run(SceneSide(place), "a")

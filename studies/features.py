@@ -20,7 +20,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from sonic_bullet.estimator.lines import exact_modes, likelihood, noise_density, subspace
-from sonic_bullet.estimator.lines.extraction import BAND_HZ, FASTEST_PER_S, extract
+from sonic_bullet.estimator.lines.extraction import extract
+from sonic_bullet.estimator.lines.line_values import EXTRACTION
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
@@ -115,7 +116,7 @@ def steps() -> None:
 
         begun = time.process_time()
         density = np.maximum(noise_density.noise_density(x, SR, (20, 21_600), tail=True), 1e-12)
-        pole = subspace.poles(x, SR, density, (20, 21_600), BAND_HZ, FASTEST_PER_S)
+        pole = subspace.poles(x, SR, density, (20, 21_600), EXTRACTION.band_hz, EXTRACTION.fastest_per_s)
         timed("poles by bands", pole, begun)
         if len(freq) == 100:
             begun = time.process_time()
@@ -135,7 +136,12 @@ def steps() -> None:
             timed("… the significant", kept, begun)
             band = (60.0, 2 * np.pi * 22_000)
             fitted = likelihood.fitted(
-                x, likelihood.amplitudes(x, kept, SR), SR, band=band, fastest_per_s=FASTEST_PER_S, tolerance=1e-6
+                x,
+                likelihood.amplitudes(x, kept, SR),
+                SR,
+                band=band,
+                fastest_per_s=EXTRACTION.fastest_per_s,
+                tolerance=1e-6,
             )
             timed("… refined jointly", fitted.pole, begun)
         begun = time.process_time()

@@ -21,7 +21,7 @@ import numpy as np
 
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.c_bank import identifier
-from sonic_bullet.bake.strike_playback import CONTACT_S, IMPULSE_N_S, LONGEST_CONTACT_S, point_normals, pressure_of
+from sonic_bullet.bake.strike_playback import TAP, point_normals, pressure_of
 from sonic_bullet.storage.atomic import replacing
 
 FAUST_HEAD = """\
@@ -91,9 +91,9 @@ def faust_bank_text(model: BakedModel) -> str:
         name=identifier(model.name),
         point=loudest,
         last=len(model.point_m) - 1,
-        impulse=IMPULSE_N_S,
-        contact=1e3 * CONTACT_S,
-        longest=1e3 * LONGEST_CONTACT_S,
+        impulse=TAP.impulse_n_s,
+        contact=1e3 * TAP.contact_s,
+        longest=1e3 * TAP.longest_contact_s,
     )
     lines = []
     for m in range(model.mode_count):

@@ -10,6 +10,7 @@ It has no travel time, no click of the rigid body and no residual: the modes alo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,10 +25,17 @@ from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
 
 NODES_PER_SAMPLE = 2
-PLAYED_BLOCK = 256
-IMPULSE_N_S, CONTACT_S = 0.01, 1e-4
-"""Of a strike without given impulse and length: a light tap, as long as steel on steel."""
-LONGEST_CONTACT_S = 0.05
+
+
+class _Tap(NamedTuple):
+    """A strike without given impulse and length: a light tap, as long as steel on steel."""
+
+    impulse_n_s: float = 0.01  # of a strike without given impulse and length: a light tap, as long as steel on steel
+    contact_s: float = 1e-4
+    longest_contact_s: float = 0.05
+
+
+TAP = _Tap()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,16 +54,16 @@ class BakedStrike:
 
     point_m: Array
     impulse_n_s: Array
-    contact_s: float = CONTACT_S
+    contact_s: float = TAP.contact_s
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        remedy = f"give 0 to {LONGEST_CONTACT_S} s"
+        remedy = f"give 0 to {TAP.longest_contact_s} s"
         store(
             self,
             point_m=frozen_array(self.point_m, float, (3,), "point_m"),
             impulse_n_s=frozen_array(self.impulse_n_s, float, (3,), "impulse_n_s"),
-            contact_s=as_number(self.contact_s, "contact_s", remedy, least=0, most=LONGEST_CONTACT_S),
+            contact_s=as_number(self.contact_s, "contact_s", remedy, least=0, most=TAP.longest_contact_s),
         )
         require(bool(self.impulse_n_s.any()), "a strike without impulse", "give one above zero")
 
@@ -65,8 +73,8 @@ def choose_strike(
     *,
     point_m: Array | None = None,
     direction: Array | None = None,
-    impulse_n_s: float = IMPULSE_N_S,
-    contact_s: float = CONTACT_S,
+    impulse_n_s: float = TAP.impulse_n_s,
+    contact_s: float = TAP.contact_s,
 ) -> BakedStrike:
     """Make a strike, with defaults for what is not given.
 
@@ -195,9 +203,10 @@ def render_strike(model: BakedModel, strike: BakedStrike, sr: int = 48_000, seco
             z = z + weight[j] * amplitude * np.exp(step * (n - node[j]))
         done = until
         out[n] = z.real.sum()
-    starts = np.arange(during, count, PLAYED_BLOCK) - (during - 1)
+    played_block = 256
+    starts = np.arange(during, count, played_block) - (during - 1)
     free = np.exp(np.multiply.outer(starts, step)) * z
-    tail = (free @ np.exp(np.multiply.outer(step, np.arange(PLAYED_BLOCK)))).real.ravel()
+    tail = (free @ np.exp(np.multiply.outer(step, np.arange(played_block)))).real.ravel()
     out[during:] = tail[: count - during]
     return out
 

@@ -15,10 +15,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from sonic_bullet.cli.hammer import FORCE_COLUMNS, StrikeFiles, part_force
+from sonic_bullet.cli.hammer import StrikeFiles, part_force
 from sonic_bullet.cli.output import places, table, warn
-from sonic_bullet.cli.responses import RESPONSE_COLUMNS, UFF, ResponseTakes, with_responses, write_takes
-from sonic_bullet.cli.takes import TAKE_COLUMNS, cut_takes
+from sonic_bullet.cli.responses import UFF, ResponseTakes, with_responses, write_takes
+from sonic_bullet.cli.takes import cut_takes
 from sonic_bullet.files import read_channel, replacing
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.case_schema import case_schema
@@ -70,21 +70,24 @@ def run_case_new(
 
         read_mesh(mesh, LENGTH_UNITS[units])
     thing = _object(mesh, units, material)
+    force_columns = ("force", "impulse", "peak", "contact", "")
+    response_columns = ("take", "struck at", "measured at", "of", "")
+    take_columns = ("take", "at", "length", "peak", "")
     with temporary_folder() as takes:
         if split:
             sounds, rows = cut_takes(sounds, takes, force_channel, drawing)
-            print(table(TAKE_COLUMNS, rows))
+            print(table(take_columns, rows))
         struck: list[StrikeFiles] = []
         made: ResponseTakes | None = None
         if force_channel is not None:
             struck, rows = part_force(sounds, force_channel, force_newton, takes)
             sounds = [take.sound for take in struck]
-            print(table(FORCE_COLUMNS, rows))
+            print(table(force_columns, rows))
         elif universal:
             made = write_takes(sounds, takes)
             sounds = list(made.sounds)
             warn(made.warnings)
-            print(table(RESPONSE_COLUMNS, made.rows))
+            print(table(response_columns, made.rows))
         elif not split:
             for sound in sounds:
                 warn(_doubts(sound))

@@ -18,7 +18,6 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
 SIDES = ("before", "after")  # the folders of --predict
-SHOWN_NUMBERS = 4  # numbers of a list, in the summary: all of them are in the JSON
 
 
 def run_diagnose(
@@ -147,9 +146,10 @@ def _summary(found: Any) -> str:
 def _number(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
+    shown_numbers = 4  # numbers of a list, in the summary: all of them are in the JSON
     if isinstance(value, list):
-        more = f", and {len(value) - SHOWN_NUMBERS} more" if len(value) > SHOWN_NUMBERS else ""
-        return "[" + ", ".join(_number(v) for v in value[:SHOWN_NUMBERS]) + more + "]"
+        more = f", and {len(value) - shown_numbers} more" if len(value) > shown_numbers else ""
+        return "[" + ", ".join(_number(v) for v in value[:shown_numbers]) + more + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{k} {_number(v)}" for k, v in value.items()) + "}"
     return str(value)

@@ -16,8 +16,6 @@ from sonic_bullet.estimator.hammer_pulse import HammerPulse, measure_pulse
 from sonic_bullet.files import live_channel, read_audio, read_audio_scale, write_audio
 from sonic_bullet.records.errors import AudioError, FileError
 
-FORCE_COLUMNS = ("force", "impulse", "peak", "contact", "")
-
 
 @dataclass(frozen=True, slots=True)
 class StrikeFiles:
@@ -49,7 +47,7 @@ def part_force(
     list of StrikeFiles
         One a take, in order.
     list of tuple
-        A row a take, by `FORCE_COLUMNS`.
+        A row a take: its number, force, impulse, peak, length of contact, and a note.
 
     Raises
     ------

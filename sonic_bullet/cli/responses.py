@@ -3,8 +3,8 @@
 responses -> those of one sensor, as a case has one -> recordings (impulse_response.py), one common factor
     -> NAME-01.wav and so on, strike {place, direction, impulse}, sensor, onset, band
 
-Responses per force are written as struck with J N·s, J such that the loudest take peaks at RESPONSE_PEAK: then files
-are in m/s or Pa. For responses at many points to one exciter, both ends are exchanged: H_ij = H_ji of motion.
+Responses per force are written as struck with J N·s, J such that the loudest take peaks at half of full scale: then
+files are in m/s or Pa. For responses at many points to one exciter, both ends are exchanged: H_ij = H_ji of motion.
 [Maxwell-Betti]
 """
 
@@ -25,13 +25,11 @@ from sonic_bullet.files.uff.reader import Freedom, Point, Response, read_uff
 from sonic_bullet.records.errors import FileError
 
 UFF = frozenset({".uff", ".unv"})
-RESPONSE_COLUMNS = ("take", "struck at", "measured at", "of", "")
-RESPONSE_PEAK = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class ResponseTakes:
-    """Takes made of UFF files: sounds and strikes (JSON) in order, rows by `RESPONSE_COLUMNS`, and the case's fields.
+    """Takes made of UFF files: sounds and strikes (JSON) in order, a row a take, and the case's fields.
 
     warnings: one line each.
     """
@@ -81,7 +79,8 @@ def write_takes(files: Sequence[Path], to: Path) -> ResponseTakes:
     if not loudest > 0:
         raise FileError(f"{files[0]} holds zeros alone", "export what was measured")
     first = kept[0]
-    impulse = min(float(f"{RESPONSE_PEAK / loudest:.5g}"), LARGEST_NUMBER) if first.per_force else None
+    response_peak = 0.5
+    impulse = min(float(f"{response_peak / loudest:.5g}"), LARGEST_NUMBER) if first.per_force else None
     sounds, strikes, rows = [], [], []
     number: dict[Path, int] = defaultdict(int)
     for (file, response), (sound, sr, _) in zip(chosen, recordings, strict=True):

@@ -1,6 +1,6 @@
 """Cut a recording of several strikes into takes of one each.
 
-recording (channels, n) -> strikes of its loudest channel (onset.py) -> from LEAD_S before each to LEAD_S before
+recording (channels, n) -> strikes of its loudest channel (onset.py) -> from 50 ms before each to 50 ms before
 the next -> a file each
 """
 
@@ -16,10 +16,6 @@ from sonic_bullet.plots.takes_plot import DrawnRecording, write_takes_picture
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError
-
-LEAD_S = 0.05
-"""Sound kept before a strike, for the noise level; less where the previous strike is nearer."""
-TAKE_COLUMNS = ("take", "at", "length", "peak", "")
 
 
 def cut_takes(
@@ -43,7 +39,7 @@ def cut_takes(
     list of Path
         A file a take, in order.
     list of tuple
-        A row a take, by `TAKE_COLUMNS`.
+        A row a take: its number, place, length, peak, and a note.
 
     Raises
     ------
@@ -85,7 +81,8 @@ def take_bounds(signal: Array, sr: int) -> list[tuple[int, int, int]]:
 
     found = span(signal, sr)
     strikes = np.array([found.start, *found.later])
-    lead = round(LEAD_S * sr)
+    lead_s = 0.05  # sound kept before a strike, for the noise level; less where the previous strike is nearer
+    lead = round(lead_s * sr)
     starts = np.maximum(strikes - lead, 0)
     # the end of a strike whose next one comes within the lead is that strike
     stops = np.append(np.maximum(starts[1:], np.minimum(strikes[:-1] + lead, strikes[1:])), len(signal))

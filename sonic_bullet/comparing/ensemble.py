@@ -29,11 +29,6 @@ from sonic_bullet.session.scene_file import defines_build
 
 RUNS = 99
 """Fewest runs in which a rank can be at the 1 % level."""
-SIGNIFICANCE = 0.01
-SHIFT_M = 1e-4
-FLOOR_DB = -90.0
-REST_M = 1e-5
-"""Largest motion of a resting body in the last tenth of a second."""
 Tell = Callable[[str], None]
 
 
@@ -84,7 +79,7 @@ class Audibility:
 
 @dataclass(slots=True, eq=False)
 class Shifted:
-    """A `Plan`: every moving body starts SHIFT_M away, along the support, in a direction of its own."""
+    """A `Plan`: every moving body starts 0.1 mm away, along the support, in a direction of its own."""
 
     seed: int
     _count: int = 0
@@ -110,7 +105,8 @@ class Shifted:
     def _moved(self, place: Any, who: Who) -> tuple[float, ...]:
         angle = np.random.default_rng([self.seed, who.serial]).uniform(0, 2 * np.pi)
         x, y, z = place
-        return (x + SHIFT_M * float(np.cos(angle)), y + SHIFT_M * float(np.sin(angle)), z)
+        shift_m = 1e-4
+        return (x + shift_m * float(np.cos(angle)), y + shift_m * float(np.sin(angle)), z)
 
 
 def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
@@ -159,7 +155,8 @@ def at_rest(log: ContactLog) -> bool:
     if len(one.body) != len(other.body):
         return False
     sounds = np.array([log.bodies[i].material is not None for i in one.body], bool)
-    return bool(np.abs(one.position_m - other.position_m)[sounds].max(initial=0) < REST_M)
+    rest_m = 1e-5  # largest motion of a resting body in the last tenth of a second
+    return bool(np.abs(one.position_m - other.position_m)[sounds].max(initial=0) < rest_m)
 
 
 def measured(side: Side) -> tuple[Array, Array]:
@@ -186,7 +183,7 @@ def _contacts(log: ContactLog) -> tuple[float, float]:
 
 
 def _band_spectra(x: Array, sr: int) -> Array:
-    """Return mean squares (slices, bands) in octave bands, dB, with a floor FLOOR_DB below the largest."""
+    """Return mean squares (slices, bands) in octave bands, dB, with a floor floor_db below the largest."""
     slices = 12
     n = x.shape[1] // slices
     frames = x[:, : n * slices].reshape(len(x), slices, n)
@@ -196,7 +193,8 @@ def _band_spectra(x: Array, sr: int) -> Array:
         power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in AUDIBLE_OCTAVES_HZ if f < sr / 2**1.5
     ]
     table = np.array(bands).T
-    return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (FLOOR_DB / 10)) + 1e-12))
+    floor_db = -90.0
+    return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (floor_db / 10)) + 1e-12))
 
 
 def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
@@ -211,7 +209,8 @@ def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
     statistic = np.square(table @ axes[:, kept] / np.sqrt(values[kept])).sum(axis=1)
     rank = 1 + int((statistic[:-1] >= statistic[-1]).sum())
     note = "" if known.rests else "the scene does not come to rest: its end is cut in every run"
-    return Audibility(float(statistic[-1]), rank, n - 1, rank / n, rank / n <= SIGNIFICANCE, note)
+    significance = 0.01
+    return Audibility(float(statistic[-1]), rank, n - 1, rank / n, rank / n <= significance, note)
 
 
 def audible(a: Side, b: Side, tell: Tell, known: Ensemble | None = None) -> Audibility:

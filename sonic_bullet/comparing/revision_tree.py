@@ -25,12 +25,6 @@ from typing import Any
 
 import sonic_bullet
 
-INSTALLED = ("site-packages", "dist-packages")
-METADATA = (".egg-info", ".dist-info")
-"""Folders of installed packages' metadata, wherever a package itself is."""
-OF_SYSTEM = ("/proc", "/dev", "/sys", "/etc", "/usr", "/lib", "/run", "/bin", "/opt")
-MOST_NAMED = 8
-
 
 @dataclass(frozen=True, slots=True)
 class RevisionTree:
@@ -87,12 +81,13 @@ def unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:
     """Return those of the files read by a side that are not of its version, each with the reason."""
     found = set()
     temporary = Path(tempfile.gettempdir()).resolve()
+    system_folders = ("/proc", "/dev", "/sys", "/etc", "/usr", "/lib", "/run", "/bin", "/opt")
     for name in paths:
         path = Path(os.path.normpath(name))
         real = path.resolve()
         if not path.is_file() or _is_installed(path) or _is_installed(real) or "__pycache__" in path.parts:
             continue
-        of_system = any(real.is_relative_to(one) for one in (*OF_SYSTEM, sys.prefix, sys.base_prefix))
+        of_system = any(real.is_relative_to(one) for one in (*system_folders, sys.prefix, sys.base_prefix))
         home = revision.tree if old else revision.top
         inside = next((one.relative_to(home) for one in (path, real) if one.is_relative_to(home)), None)
         if inside is not None:
@@ -112,8 +107,9 @@ def unpinned_words(found: set[str]) -> tuple[str, ...]:
     if not found:
         return ()
     named = sorted(found)
-    more = f", and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
-    return (f"both sides read the same of what no revision holds: {', '.join(named[:MOST_NAMED])}{more}",)
+    most_named = 8
+    more = f", and {len(named) - most_named} more" if len(named) > most_named else ""
+    return (f"both sides read the same of what no revision holds: {', '.join(named[:most_named])}{more}",)
 
 
 def _is_installed(path: Path) -> bool:
@@ -122,7 +118,10 @@ def _is_installed(path: Path) -> bool:
 
     library = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "platstdlib")]
     homes: list[Path] = [*library, *_PACKAGE, *cache_folders()]
-    return any(part in INSTALLED or part.endswith(METADATA) for part in path.parts) or any(
+    package_folders = ("site-packages", "dist-packages")
+    # folders of installed packages' metadata, wherever a package itself is
+    metadata_endings = (".egg-info", ".dist-info")
+    return any(part in package_folders or part.endswith(metadata_endings) for part in path.parts) or any(
         path.is_relative_to(one) for one in homes
     )
 

@@ -17,24 +17,6 @@ from sonic_bullet.listener.calls import Call, InputFile, Who, same
 if TYPE_CHECKING:
     from sonic_bullet.comparing.comparison_record import Comparison
 
-PLAIN_WORDS = {
-    "density_kg_m3": "density",
-    "stiffness_pa": "stiffness",
-    "roughness_m": "roughness",
-    "sr": "sample rate",
-    "seconds": "length",
-    "sound_speed_m_s": "speed of sound",
-    "to_hz": "modes up to",
-    "count": "number of modes",
-    "thickness_m": "wall",
-    "fixed": "clamps",
-    "seed": "seed of the surfaces",
-    "since_step": "added in step",
-    "until_step": "gone in step",
-}
-COUNTS = ("seed", "since_step", "until_step")
-"""Numbers without a relative change."""
-
 
 def difference_words(a: Side, b: Side, one: Asked) -> tuple[str, str]:
     """Return the body, and a line: "steel ball: friction 0.5 → 0.45 (−10 %)"."""
@@ -86,8 +68,23 @@ def change_words(what: str, a: Any, b: Any) -> str:
         "sound_speed_m_s": "m/s",
     }
     last = what.rsplit(maxsplit=1)[-1]
-    key = last if last in PLAIN_WORDS else what
-    name, unit = PLAIN_WORDS.get(key, what), quantity_units.get(key, "")
+    plain_words = {
+        "density_kg_m3": "density",
+        "stiffness_pa": "stiffness",
+        "roughness_m": "roughness",
+        "sr": "sample rate",
+        "seconds": "length",
+        "sound_speed_m_s": "speed of sound",
+        "to_hz": "modes up to",
+        "count": "number of modes",
+        "thickness_m": "wall",
+        "fixed": "clamps",
+        "seed": "seed of the surfaces",
+        "since_step": "added in step",
+        "until_step": "gone in step",
+    }
+    key = last if last in plain_words else what
+    name, unit = plain_words.get(key, what), quantity_units.get(key, "")
     unit = f" {unit}" if unit else ""
     if a is None or b is None:
         return f"{name} {shown(a)} → {shown(b)}{unit}"
@@ -101,7 +98,10 @@ def change_words(what: str, a: Any, b: Any) -> str:
         if key == "damping":
             return f"damping (α in 1/s, β in s) {shown(a)} → {shown(b)}"
         return f"{name} changed in {int((one != other).sum())} of {one.size} numbers"
-    share = f" ({_percent(float(other) / float(one))})" if one.ndim == 0 and float(one) and key not in COUNTS else ""
+    count_fields = ("seed", "since_step", "until_step")  # numbers without a relative change
+    share = (
+        f" ({_percent(float(other) / float(one))})" if one.ndim == 0 and float(one) and key not in count_fields else ""
+    )
     if key in ("start position",):
         share = f" (moved by {_distance(other - one)})"
     return f"{name} {shown(a)} → {shown(b)}{unit}{share}"

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,16 @@ from sonic_bullet.storage.reading import reading
 
 READY = {"impacts": Path(__file__).with_name("impacts.py")}
 """Recipes of the package, by name."""
-RECIPE_MICROPHONE = (0.0, -1.0, 0.5)
-SAMPLE_SECONDS = 2.0
+
+
+class _RecipeDefaults(NamedTuple):
+    """Defaults of a recipe."""
+
+    microphone_m: tuple[float, float, float] = (0.0, -1.0, 0.5)
+    seconds: float = 2.0
+
+
+RECIPE = _RecipeDefaults()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +62,8 @@ class DatasetScene:
     build: Callable[[Any], Mapping[Any, Any]]
     parameters: Mapping[str, Any] = field(default_factory=dict)
     object: str = "object"
-    seconds: float = SAMPLE_SECONDS
-    microphones: MicrophoneLike = RECIPE_MICROPHONE
+    seconds: float = RECIPE.seconds
+    microphones: MicrophoneLike = RECIPE.microphone_m
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -111,8 +119,8 @@ class Recipe:
             lambda client: module.build(client, **drawn),
             drawn,
             str(drawn.get("object", Path(self.path).stem)),
-            getattr(module, "SECONDS", SAMPLE_SECONDS),
-            getattr(module, "MICROPHONE", RECIPE_MICROPHONE),
+            getattr(module, "SECONDS", RECIPE.seconds),
+            getattr(module, "MICROPHONE", RECIPE.microphone_m),
         )
 
 

@@ -28,8 +28,6 @@ from sonic_bullet.storage.json_text import json_bytes
 
 LabelledSounds = Callable[[], Iterator[tuple[dict[str, Any], Path]]]
 """Labels and sound file of each sample, by number, from the first at each call."""
-A_FOLDER = 1000
-"""Samples in one folder: file systems slow down with many more."""
 
 
 class SampleFolder:
@@ -40,7 +38,8 @@ class SampleFolder:
 
     def place(self, number: int, ending: str) -> Path:
         """Return where a sample's file is."""
-        return self.root / "samples" / f"{number // A_FOLDER:03d}" / f"{number:06d}{ending}"
+        a_folder = 1000  # samples in one folder: file systems slow down with many more
+        return self.root / "samples" / f"{number // a_folder:03d}" / f"{number:06d}{ending}"
 
     def is_done(self, number: int) -> bool:
         """Tell whether there is such a sample, whole."""

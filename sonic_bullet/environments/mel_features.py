@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,22 +19,32 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_flag, as_number, as_whole
 from sonic_bullet.records.errors import AudioError
 
-RATE_HZ, N_FFT, MEL_HOP, MELS = 16_000, 400, 160, 64
-FLOOR_PA2 = 1e-12
-"""Least power of a band: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there, far
-below hearing (2e-5 Pa)."""
+
+class _MelDefaults(NamedTuple):
+    """Default mel features."""
+
+    rate_hz: int = 16_000
+    n_fft: int = 400
+    hop: int = 160
+    mels: int = 64
+    # least power of a band: |STFT|² of a sine of amplitude a at a bin's middle is (a · N_FFT / 4)², so 1e-8 Pa there,
+    # far below hearing (2e-5 Pa)
+    floor_pa2: float = 1e-12
+
+
+MEL = _MelDefaults()
 
 
 def log_mel(
     audio: Array,
     sr: int,
     *,
-    rate_hz: int = RATE_HZ,
-    mels: int = MELS,
-    n_fft: int = N_FFT,
-    hop: int = MEL_HOP,
+    rate_hz: int = MEL.rate_hz,
+    mels: int = MEL.mels,
+    n_fft: int = MEL.n_fft,
+    hop: int = MEL.hop,
     center: bool = False,
-    floor: float = FLOOR_PA2,
+    floor: float = MEL.floor_pa2,
 ) -> Array:
     """Compute the natural logarithm of the power in mel bands.
 
@@ -86,7 +97,7 @@ def log_mel(
 
 
 @lru_cache(maxsize=8)
-def mel_filters(rate_hz: int = RATE_HZ, n_fft: int = N_FFT, mels: int = MELS) -> Array:
+def mel_filters(rate_hz: int = MEL.rate_hz, n_fft: int = MEL.n_fft, mels: int = MEL.mels) -> Array:
     """Return weights (n_fft//2 + 1, mels) of a power spectrum's bins in the mel bands, read-only.
 
     Band i rises from 0 at edge i to 1 at edge i+1 and falls to 0 at edge i+2; mels + 2 edges are even in mel from 0 to

@@ -13,9 +13,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-PART = 0.1  # of the peak: what exceeds it is contact; two such stretches further apart than GAP_S are two hits
-GAP_S = 2e-4
-
 
 @dataclass(frozen=True, slots=True)
 class HammerPulse:
@@ -51,8 +48,11 @@ def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
     noise, peak = 1.4826 * float(np.median(np.abs(rest))), float(rest.max())
     if not peak > above_noise * noise:
         return None
-    touching = np.flatnonzero(rest > max(PART * peak, above_noise * noise / 2))
-    parts = np.split(touching, np.flatnonzero(np.diff(touching) > max(1, round(GAP_S * sr))) + 1)
+    # of the peak: what exceeds it is contact; two such stretches further apart than gap_s are two hits
+    contact_share = 0.1
+    touching = np.flatnonzero(rest > max(contact_share * peak, above_noise * noise / 2))
+    gap_s = 2e-4
+    parts = np.split(touching, np.flatnonzero(np.diff(touching) > max(1, round(gap_s * sr))) + 1)
     at = int(np.argmax(rest))
     hit = next(part for part in parts if part[0] <= at <= part[-1])
     over = rest > noise

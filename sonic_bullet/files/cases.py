@@ -36,10 +36,8 @@ from sonic_bullet.storage.unread import shown, unread_fields
 __all__ = [
     "CASE_FORMAT",
     "DIMENSION_TOLERANCE",
-    "IN_AIR",
     "LENGTH_UNITS",
     "MEDIA",
-    "MOST_TOLERANCE",
     "SPLITS",
     "Case",
     "CaseObject",
@@ -55,13 +53,10 @@ CASE_FORMAT = "sonic-bullet-case/1"
 LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 SPLITS = ("fit", "holdout", "transfer")
 MEDIA = ("air", "none", "unknown")
-IN_AIR = ("velocity", "pressure")
-"""Sensors of real objects: their recordings are in air where a case does not say otherwise."""
 DIMENSION_TOLERANCE = 0.005
 """Relative standard error of a mesh's dimensions by default: ± 0.1 mm, any error in it as likely, has
 0.058 mm, 0.5 % of 12 mm. [ISO 2768-1, class f, 6 to 30 mm]
 """
-MOST_TOLERANCE = 0.2  # with a larger one the shape is unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,8 +197,10 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
 
 def medium_of(declared: str | None, sensor: str) -> str:
     """Return the medium that the object radiates into: "air", "none" or "unknown"."""
+    # sensors of real objects: their recordings are in air where a case does not say otherwise
+    in_air = ("velocity", "pressure")
     if declared is None:
-        return "air" if sensor in IN_AIR else "unknown"
+        return "air" if sensor in in_air else "unknown"
     return declared if declared in MEDIA else "unknown"
 
 
@@ -217,10 +214,11 @@ def dimension_tolerance(given: float | None, name: str, default: float = DIMENSI
     """
     if given is None:
         return default
-    if not 0 <= given <= MOST_TOLERANCE:
+    most_tolerance = 0.2  # with a larger one the shape is unknown
+    if not 0 <= given <= most_tolerance:
         raise FileError(
             f"{name} is {100 * given:g} %",
-            f"give their relative standard error, 0 to {100 * MOST_TOLERANCE:g} %; in a case.json 0.005 is 0.5 %",
+            f"give their relative standard error, 0 to {100 * most_tolerance:g} %; in a case.json 0.005 is 0.5 %",
         )
     return float(given)
 

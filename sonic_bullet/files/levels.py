@@ -80,18 +80,19 @@ def find_level(
 
 def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceiling_dbtp: float) -> FileLevel:
     """Find the level of a loudness below a true peak; raises AudioError."""
-    from sonic_bullet.files.loudness.limiter import MARGIN_DB
     from sonic_bullet.files.loudness.true_peak import find_true_peak, sample_true_peaks
 
     gain = _loudness_gain(sound, sr, peak_pa, lufs)
     peak_db = 20 * np.log10(np.maximum(sample_true_peaks(sound.samples()) * gain, 1e-30))
     if peak_db.max() <= ceiling_dbtp:
         return FileLevel(gain, sound.curve)
-    goal_db = ceiling_dbtp - MARGIN_DB
+    # margin below the ceiling: excess that meters of other interpolations read, of noise up to half the rate
+    margin_db = 0.25
+    goal_db = ceiling_dbtp - margin_db
     for _ in range(LIMITER_LOOKS):  # a varying factor creates new peaks between samples: tenths of a dB
         rise, factor = _rise(sound.scaled(gain), sr, peak_db, lufs, goal_db)
         left = sound.limited(factor)
-        excess_db = 20 * math.log10(gain * rise * find_true_peak(left)) - (ceiling_dbtp - MARGIN_DB)
+        excess_db = 20 * math.log10(gain * rise * find_true_peak(left)) - (ceiling_dbtp - margin_db)
         if excess_db <= 0.0:
             break
         goal_db -= excess_db + 0.01
@@ -108,7 +109,7 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
     gain_rise_db, most_rise_db = 6.0, 36.0
     from scipy.optimize import brentq
 
-    from sonic_bullet.files.loudness.limiter import RELEASES_DB_S, limiter_factor
+    from sonic_bullet.files.loudness.limiter import limiter_factor
     from sonic_bullet.files.loudness.meter import integrated_lufs
 
     gain = 1.0 if sound.curve is None else sound.curve.gain
@@ -119,7 +120,10 @@ def _rise(sound: KeptSound, sr: int, peak_db: Array, lufs: float, goal_db: float
         measured = integrated_lufs(sound.limited(factor).scaled(gain * 10 ** (rise_db / 20)), sr)
         return factor, (-math.inf if measured is None else measured) - lufs
 
-    for release_db_s in RELEASES_DB_S:
+    # 6 dB in 60 ms, longer than a period of 20 Hz: low tones are not distorted. Struck bodies decay faster; where their
+    # loudness asks for it, the next is taken.
+    releases_db_s = (100.0, 400.0, 1600.0, 6400.0)
+    for release_db_s in releases_db_s:
         low_db = high_db = 0.0
         factor, missed = limited(0.0, release_db_s)
         while missed < -LUFS_WITHIN and high_db < most_rise_db:

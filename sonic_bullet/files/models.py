@@ -32,8 +32,6 @@ from sonic_bullet.storage.json_text import json_bytes
 from sonic_bullet.storage.reading import reading
 
 MODEL_FORMAT = "sonic-bullet-model/2"
-MODELS = ("included", "reference")
-"""Place of a log's models: in it, or in the cache."""
 PACKED = "model"
 """Prefix of the arrays that are deflated."""
 MODEL_ARRAYS: dict[str, tuple[type, tuple[int | None, ...]]] = {
@@ -99,7 +97,7 @@ def pack_models(
     Parameters
     ----------
     where
-        One of `MODELS`; by reference they are stored in the cache.
+        One of `places`; by reference they are stored in the cache.
 
     Returns
     -------
@@ -111,8 +109,9 @@ def pack_models(
     FileError
         `where` is unknown, or the cache cannot take them.
     """
-    if not isinstance(where, str) or where not in MODELS:
-        raise FileError(f"models is {shown(where)}", nearest(str(where), MODELS))
+    places = ("included", "reference")  # place of a log's models: in it, or in the cache
+    if not isinstance(where, str) or where not in places:
+        raise FileError(f"models is {shown(where)}", nearest(str(where), places))
     different, number = distinct(list(models), model_key)
     if where == "reference":
         return [*_keep_models(different)], number, {}

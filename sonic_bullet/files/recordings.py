@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -22,12 +22,22 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.storage.reading import reading
 
-READ_MIN_HZ, READ_MAX_HZ = 1000, 10_000_000  # from a slow accelerometer's to a fast vibrometer's
+
+class _RecordingLimits(NamedTuple):
+    """What is read of a recording."""
+
+    least_hz: int = 1000  # from a slow accelerometer's to a fast vibrometer's
+    most_hz: int = 10_000_000
+    # a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
+    silent_peak: float = 2e-7
+    quiet: float = 1e-3
+    fewest_levels: int = 8
+
+
+RECORDING_LIMITS = _RecordingLimits()
+
 # half a gibibyte as float64; or samples a byte of the file, which only packed silence exceeds
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
-DEAD = 1e-3  # of the loudest channel's range: an input with nothing plugged in
-# a range of full scale 1: below the first nothing is audible, below the second only the last bits toggle
-SILENT_PEAK, QUIET, FEWEST_LEVELS = 2e-7, 1e-3, 8
 UNBROKEN = "give an unbroken audio file"
 T = TypeVar("T")
 
@@ -97,10 +107,10 @@ def _samples(sound: Any, path: object, file_bytes: int) -> Array:
     """Read all samples (channels, n) of an open file; raises FileError."""
     unknown_length = 1 << 62  # libsndfile's count for a stream that does not state its length, and more
     block_samples = 1 << 18
-    if not READ_MIN_HZ <= sound.samplerate <= READ_MAX_HZ:
+    if not RECORDING_LIMITS.least_hz <= sound.samplerate <= RECORDING_LIMITS.most_hz:
         raise FileError(
             f"cannot read {path}: sampled at {sound.samplerate} Hz",
-            f"give a recording of {READ_MIN_HZ} to {READ_MAX_HZ} Hz",
+            f"give a recording of {RECORDING_LIMITS.least_hz} to {RECORDING_LIMITS.most_hz} Hz",
         )
     most = max(MOST_SAMPLES, UNPACKED * file_bytes)
     size = max(1, block_samples // sound.channels)
@@ -175,13 +185,16 @@ def live_channel(samples: Array, channel: int | None, name: object) -> tuple[Arr
     if frames < shortest:
         raise AudioError(f"{name} holds {frames} samples", "give a recording of an impact, from before it to its decay")
     level = np.ptp(np.nan_to_num(samples), axis=1)
-    live = level > DEAD * level.max()
+    dead_share = 1e-3  # of the loudest channel's range: an input with nothing plugged in
+    live = level > dead_share * level.max()
     used = int(np.argmax(live)) if channel is None else channel
     observed: Array = samples[used]
     if not np.isfinite(observed).all():
         raise AudioError(f"{name} holds NaN or infinite samples", "export it again")
     others = f"{'channel' if live.sum() == 1 else 'channels'} {_listed(np.flatnonzero(live))}"
-    if level[used] < SILENT_PEAK or (level[used] < QUIET and len(np.unique(observed)) < FEWEST_LEVELS):
+    if level[used] < RECORDING_LIMITS.silent_peak or (
+        level[used] < RECORDING_LIMITS.quiet and len(np.unique(observed)) < RECORDING_LIMITS.fewest_levels
+    ):
         if live[used] or not live.any():
             raise AudioError(f"{name} is silent", "record an impact, or leave it out")
         raise AudioError(f"channel {used} of {name} is silent", f"sound is in {others}")

@@ -14,12 +14,6 @@ from sonic_bullet.geometry.triangles import face_areas_m2, outward_normals, weld
 from sonic_bullet.records import Array, Shape
 
 SHORTEST_SIDE_M = 0.25
-UNBOUNDED_M = 1e6
-"""Half a side of a plane."""
-FILLED = 0.7
-"""Fraction of its bounding rectangle that a face fills at least: a disc has π/4."""
-SAME_PLANE = 1e-3
-"""Radians within which triangles face one way."""
 
 
 def flat_faces(shapes: Sequence[Shape]) -> Array:
@@ -44,8 +38,9 @@ def flat_faces(shapes: Sequence[Shape]) -> Array:
 def _own_faces(shape: Shape) -> Array:
     """Find the faces (k, 3, 3) of a shape in its own frame."""
     x, y, z = np.eye(3)
+    unbounded_m = 1e6  # half a side of a plane
     if shape.kind == "plane":
-        return np.array([[np.zeros(3), UNBOUNDED_M * x, UNBOUNDED_M * y]])
+        return np.array([[np.zeros(3), unbounded_m * x, unbounded_m * y]])
     if shape.kind == "box":
         a, b, c = shape.size_m / 2
         ends = [[c * z, a * x, b * y], [a * x, b * y, c * z], [b * y, c * z, a * x]]
@@ -68,7 +63,8 @@ def _mesh_faces(vertex_m: Array, face: Array) -> Array:
     order = np.lexsort(edge.T)
     same = np.flatnonzero((edge[order][1:] == edge[order][:-1]).all(axis=1))
     one, other = order[same] // 3, order[same + 1] // 3
-    level = 1 - SAME_PLANE**2 / 2
+    same_plane = 1e-3  # radians within which triangles face one way
+    level = 1 - same_plane**2 / 2
     flat = np.einsum("ei,ei->e", normal[one], normal[other]) > level
     pairs = coo_array((np.ones(flat.sum()), (one[flat], other[flat])), shape=(len(face), len(face)))
     _, label = connected_components(pairs, directed=False)
@@ -105,7 +101,8 @@ def _rectangle(point_m: Array, normal: Array, area_m2: float) -> Array | None:
     low, high = turned.min(axis=1), turned.max(axis=1)
     best = int(np.argmin((high - low).prod(axis=1)))
     filled = area_m2 / float((high - low)[best].prod())
-    if filled < FILLED:
+    filled_share = 0.7  # fraction of its bounding rectangle that a face fills at least: a disc has π/4
+    if filled < filled_share:
         return None
     middle = turn[best].T @ ((low + high)[best] / 2)
     half = (high - low)[best] / 2 * np.sqrt(min(filled, 1.0))

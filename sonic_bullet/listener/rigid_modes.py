@@ -16,9 +16,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-LEAST_MASS = 1e-12
-"""Fraction of the largest eigenvalue of M below which a motion moves no mass, as of a point mass that turns."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointedBody:
@@ -81,13 +78,15 @@ def rigid_modes(body: JointedBody) -> tuple[Array, Array, Array]:
     weight = np.concatenate([np.repeat(body.mass_kg[:, None], 3, axis=1), body.inertia_kg_m2], axis=1)
     mass = np.einsum("lxd,lx,lxe->de", j, weight, j)
     size, axes = np.linalg.eigh(mass)
-    axes, size = axes[:, size > LEAST_MASS * size.max(initial=0.0)], size[size > LEAST_MASS * size.max(initial=0.0)]
+    # fraction of the largest eigenvalue of M below which a motion moves no mass, as of a point mass that turns
+    least_mass = 1e-12
+    axes, size = axes[:, size > least_mass * size.max(initial=0.0)], size[size > least_mass * size.max(initial=0.0)]
     whitened = axes / np.sqrt(size)
     stiffness = np.zeros(mass.shape[0])
     stiffness[: len(body.stiffness)] = body.stiffness
     square, turned = np.linalg.eigh(whitened.T @ (stiffness[:, None] * whitened))
     rate = np.sqrt(np.maximum(square, 0.0))
-    rate[square <= LEAST_MASS * square.max(initial=0.0)] = 0.0
+    rate[square <= least_mass * square.max(initial=0.0)] = 0.0
     lost = np.zeros(mass.shape[0])
     lost[: len(body.stiffness)] = body.stiffness * body.loss_factor
     joints = whitened @ turned

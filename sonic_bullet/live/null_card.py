@@ -14,12 +14,13 @@ import numpy as np
 
 from sonic_bullet.live.playback import Fill
 
-CARD_BLOCK = 256  # samples: 5.3 ms at 48 kHz
-HELD_BLOCKS = 2  # blocks between the call and the sound
-
 
 class NullCard:
     """A sound card without a device; see the module."""
+
+    CARD_BLOCK = 256  # samples: 5.3 ms at 48 kHz
+
+    HELD_BLOCKS = 2  # blocks between the call and the sound
 
     name = "null"
 
@@ -34,10 +35,10 @@ class NullCard:
         self._thread.start()
 
     def _run(self, fill: Fill) -> None:
-        out, asked_s, late = np.zeros((CARD_BLOCK, self.channels), np.float32), time.perf_counter(), False
-        block_s = CARD_BLOCK / self.sr
+        out, asked_s, late = np.zeros((self.CARD_BLOCK, self.channels), np.float32), time.perf_counter(), False
+        block_s = self.CARD_BLOCK / self.sr
         while not self._stop.wait(max(asked_s - time.perf_counter(), 0.0)):
-            sounds_s = asked_s + HELD_BLOCKS * block_s
+            sounds_s = asked_s + self.HELD_BLOCKS * block_s
             fill(out, sounds_s, late)
             over_s = time.perf_counter() - sounds_s
             late = over_s > 0
@@ -47,6 +48,6 @@ class NullCard:
         """Call for no more; return when the blocks taken would have sounded, or at once."""
         self._stop.set()
         if not abort:
-            threading.Event().wait((HELD_BLOCKS + 1) * CARD_BLOCK / self.sr)
+            threading.Event().wait((self.HELD_BLOCKS + 1) * self.CARD_BLOCK / self.sr)
         if self._thread is not None:
             self._thread.join(1.0)

@@ -20,9 +20,6 @@ from typing import Any
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.runtime import rtsys
 
-IMPORT = re.compile(rb"^(?:from|import) +([\w.]+)(?: +import +(\([^)]*\)|[^\n]*))?", re.MULTILINE)
-WORD = re.compile(rb"\w+")
-
 
 class KeptFiles(IndexDataCacheFile):  # type: ignore[misc]
     """numba's files; an index that cannot be read is an empty one."""
@@ -56,9 +53,11 @@ def _read(source: Path) -> tuple[bytes, frozenset[Path]]:
     while (root / "__init__.py").exists():
         root = root.parent
     found = set()
-    for name, names in IMPORT.findall(content):
+    import_line = re.compile(rb"^(?:from|import) +([\w.]+)(?: +import +(\([^)]*\)|[^\n]*))?", re.MULTILINE)
+    word_pattern = re.compile(rb"\w+")
+    for name, names in import_line.findall(content):
         place = root.joinpath(*name.decode().split("."))
-        ends = [place, *(place / one.decode() for one in WORD.findall(names))]
+        ends = [place, *(place / one.decode() for one in word_pattern.findall(names))]
         found |= {path for end in ends for path in (end.with_suffix(".py"), end / "__init__.py") if path.exists()}
     return content, frozenset(found)
 

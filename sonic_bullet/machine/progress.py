@@ -26,16 +26,9 @@ Say = Callable[[str], None]
 P = ParamSpec("P")
 Made = TypeVar("Made")
 
-EVERY_S = 4.0
-"""Between lines of one stage: below the 5 s after which a user takes a program for dead."""
-BETWEEN_STAGES_S = 1.0
-"""Between lines of stages that follow each other fast."""
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 """A command, a call from Python that takes less shows nothing."""
 LONGEST = 300  # characters of a line
-NO_PRINT = re.compile(r"[\x00-\x1f\x7f-\x9f]")
-DETAIL = re.compile(r": |\d+ ?%")
-"""Where a stage's name ends and its progress begins."""
 
 _SHOWN: list[Say] = []
 
@@ -86,8 +79,11 @@ class ProgressLines:
 
     def due(self, now_s: float) -> str:
         """Return the line to be written now; "": none."""
-        stages = tuple(DETAIL.split(text)[0] for _, text in self._said.values())
-        pause_s = BETWEEN_STAGES_S if stages and stages != self._stages else EVERY_S
+        detail_start = re.compile(r": |\d+ ?%")  # where a stage's name ends and its progress begins
+        stages = tuple(detail_start.split(text)[0] for _, text in self._said.values())
+        every_s = 4.0  # between lines of one stage: below the 5 s after which a user takes a program for dead
+        between_stages_s = 1.0  # between lines of stages that follow each other fast
+        pause_s = between_stages_s if stages and stages != self._stages else every_s
         if not (self.command or self._said):
             return ""
         if now_s - self.begin_s < self.quiet_s or now_s - self._last_s < pause_s:
@@ -236,7 +232,8 @@ def write_line(line: str) -> None:
 
 
 def _send(process: int, label: str, text: str) -> None:
-    label, text = (NO_PRINT.sub("?", " ".join(part.split()))[:LONGEST] for part in (label, text))
+    no_print = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+    label, text = (no_print.sub("?", " ".join(part.split()))[:LONGEST] for part in (label, text))
     _write(f"stage {process}\t{label}\t{text}\n")
 
 

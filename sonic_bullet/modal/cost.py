@@ -1,6 +1,6 @@
 """Cost of a finite-element solution, predicted from counts of its mesh: no clock decides a result.
 
-    work = unknowns (unknowns / FULL + START_COST + modes)         factor; a Lanczos basis of START_COST + modes vectors
+    work = unknowns (unknowns / full + start + modes)         factor; a Lanczos basis of start + modes vectors
         [measured on a gong of 57 000 unknowns: 1.2 µs of processor a unit]
 
 `MOST_WORK` bounds the work over all element sizes that one body is solved with. With filling and radiation that is at
@@ -9,24 +9,51 @@ most 60 s of one core and 2 GB.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.modal.sectors import Wanted
 
 MOST_WORK = 30e6
-START_COST = 75.0
-FULL = {(2, True): 900.0, (3, True): 590.0, (2, False): 300.0, (3, False): 200.0}
-"""By degree, and by whether the body is thin or a lump, whose factor is fuller."""
+
+
+class _Cost(NamedTuple):
+    """What a solution costs."""
+
+    start: float = 75.0
+    # by degree, and by whether the body is thin or a lump, whose factor is fuller
+    full: Mapping[tuple[int, bool], float] = MappingProxyType(
+        {(2, True): 900.0, (3, True): 590.0, (2, False): 300.0, (3, False): 200.0}
+    )
+
+
+COST = _Cost()
+
+
+class _ElementLimits(NamedTuple):
+    """How many unknowns elements may have."""
+
+    finer_edge: float = 0.7  # from one edge to the next: half the elements of a wall
+    # Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more.
+    most_unknowns: Mapping[bool, int] = MappingProxyType({True: 70_000, False: 30_000})
+    cubic_unknowns: int = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
+    per_tet: Mapping[int, float] = MappingProxyType({2: 6.0, 3: 18.0})  # by degree, of thin walls; less of lumps
+
+
+ELEMENT_LIMITS = _ElementLimits()
 
 
 def work(unknowns: float, modes: int, degree: int, thin: bool) -> float:
     """Predict the work of one solution."""
-    return unknowns * (unknowns / FULL[degree, thin] + START_COST + modes)
+    return unknowns * (unknowns / COST.full[degree, thin] + COST.start + modes)
 
 
 def most_unknowns(spare: float, modes: int, degree: int, thin: bool, coarser: float = 0.0) -> float:
     """Return how many unknowns the work ``spare`` allows, a coarser body of ``coarser`` times as many included."""
-    square, line = (1 + coarser**2) / FULL[degree, thin], (1 + coarser) * (START_COST + modes)
+    square, line = (1 + coarser**2) / COST.full[degree, thin], (1 + coarser) * (COST.start + modes)
     return float((np.sqrt(line**2 + 4 * square * max(spare, 0.0)) - line) / (2 * square))
 
 

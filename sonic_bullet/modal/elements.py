@@ -19,26 +19,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.modal import cost, eigen, fem, lagrange
-from sonic_bullet.modal.meshing.filling import LATTICE_NOTE, Filler
+from sonic_bullet.modal.cost import ELEMENT_LIMITS
+from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, SHIFT, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Sector, Shown, Wanted
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
 
 if TYPE_CHECKING:
     from sonic_bullet.modal.meshing.shape_meshes import Filled
-
-FINER_EDGE = 0.7  # from one edge to the next: half the elements of a wall
-ALIKE_EDGES = 1.2  # ratio of a coarser body's edge to a finer one's below which the two are too similar to compare
-LARGER = 3  # how often a coarser body is tried: creases keep elements small
-MOST_UNKNOWNS = {True: 70_000, False: 30_000}
-"""Of thin bodies and of lumps, whose factor is full: 10 s of processor and 1.4 GB at most. An edge_m allows more."""
-CUBIC_UNKNOWNS = 100_000  # unknowns that degree 3 may take; degree 2 has a third of them on the same elements
-WITH_LESS: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
-OVER = 1.4  # × MOST_UNKNOWNS: a surface with more detail than its volume and area predict takes larger elements
-UNKNOWNS_PER_TET = {2: 6.0, 3: 18.0}  # by degree, of thin walls; less of lumps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +51,9 @@ class Elements:
     known : λ (m,) found, by tensor
     """
 
+    ALIKE_EDGES = 1.2  # ratio of a coarser body's edge to a finer one's below which the two are too similar to compare
+    OVER = 1.4  # × most_unknowns: a surface with more detail than its volume and area predict takes larger elements
+
     body: Filled
     length_m: float
     clamp: Array
@@ -67,7 +61,7 @@ class Elements:
     thin: bool
     edge_m: float
     at_size: Callable[[float, Filler], Filled] | None
-    modes: int = MOST_SECTOR_MODES
+    modes: int = SECTORS.most_modes
     spare: float = cost.MOST_WORK
     simple: bool = False
     coarser: Elements | None = None
@@ -163,7 +157,7 @@ class Elements:
         free = np.flatnonzero(np.repeat(~held, 3))
         corner = solid.node_m[self.body.skin.node][self.body.skin.face]
         area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
-        shift = -SHIFT * (2 * self.volume / float(area)) ** 2
+        shift = -SECTORS.shift * (2 * self.volume / float(area)) ** 2
         say(f"assembling {len(free)} unknowns")
         rigid = 6
         if held.any():
@@ -202,11 +196,11 @@ class Elements:
         return float(sectors[0].place[2][: top[1] + 1].max())
 
     def within(self, most: float) -> Elements:
-        """Return the body with larger elements where unknowns are far over ``MOST_UNKNOWNS``, or over ``most``."""
+        """Return the body with larger elements where unknowns are far over what is allowed, or over ``most``."""
         coarser_tries = 2
-        made, aim = self, min(MOST_UNKNOWNS[self.thin], most)
+        made, aim = self, min(ELEMENT_LIMITS.most_unknowns[self.thin], most)
         for _ in range(coarser_tries):
-            if made._unknowns < min(OVER * MOST_UNKNOWNS[self.thin], most):
+            if made._unknowns < min(self.OVER * ELEMENT_LIMITS.most_unknowns[self.thin], most):
                 break
             larger = made._refilled(made.edge_m * (made._unknowns / aim) ** (1 / made._growth))
             if larger is None:
@@ -224,7 +218,8 @@ class Elements:
             return cost.most_unknowns(self.spare, self.modes, degree, self.thin, coarse(self.thin))
 
         made = self.within(most(3))
-        for filler in WITH_LESS:  # its surface has so much detail
+        with_less: tuple[Filler, ...] = ("simple", "lattice")  # fillers tried where a surface has too much detail
+        for filler in with_less:  # its surface has so much detail
             if made._lattice or self.at_size is None or (filler == "simple" and self.simple):
                 continue
             if made._unknowns <= most(3) or (filler == "lattice" and made._with_degree(2)._unknowns <= most(2)):
@@ -233,7 +228,7 @@ class Elements:
             if other is not None:
                 other = replace(other, simple=filler == "simple").within(most(3))
                 made = min(made, other, key=lambda one: one._unknowns)
-        if made._unknowns > min(CUBIC_UNKNOWNS, most(3)):
+        if made._unknowns > min(ELEMENT_LIMITS.cubic_unknowns, most(3)):
             made = made._with_degree(2)
         if made._unknowns > most(2):
             raise MeshError(
@@ -245,7 +240,7 @@ class Elements:
     def finer(self) -> Elements | None:
         """Return the body with smaller elements, None where they would be too similar or a clamp holds other nodes.
 
-        Edges are `FINER_EDGE` times as long, or what `MOST_UNKNOWNS` and the work left allow.
+        Edges are 0.7 times as long, or what the most unknowns and the work left allow.
         """
         if self.at_size is None or len(self.clamp):
             return None
@@ -257,10 +252,13 @@ class Elements:
         if spare <= 0:
             return None
         most = cost.most_unknowns(spare, modes, self.degree, self.thin)
-        least = (self._unknowns / min(MOST_UNKNOWNS[self.thin], most)) ** (1 / self._growth)
-        if least * ALIKE_EDGES <= 1:
-            made = self._of_size(self.edge_m * max(FINER_EDGE, least), self._filler("any")).within(most)
-            if made._unknowns <= min(OVER * MOST_UNKNOWNS[self.thin], most) and made._smaller_than(self) >= ALIKE_EDGES:
+        least = (self._unknowns / min(ELEMENT_LIMITS.most_unknowns[self.thin], most)) ** (1 / self._growth)
+        if least * self.ALIKE_EDGES <= 1:
+            made = self._of_size(self.edge_m * max(ELEMENT_LIMITS.finer_edge, least), self._filler("any")).within(most)
+            if (
+                made._unknowns <= min(self.OVER * ELEMENT_LIMITS.most_unknowns[self.thin], most)
+                and made._smaller_than(self) >= self.ALIKE_EDGES
+            ):
                 return replace(made, coarser=self, spare=spare)
         return None
 
@@ -273,15 +271,16 @@ class Elements:
 
         None where no coarser body can be made.
         """
-        times = 1 / FINER_EDGE
-        for _ in range(LARGER):
+        times = 1 / ELEMENT_LIMITS.finer_edge
+        most_tries = 3  # how often a coarser body is tried: creases keep elements small
+        for _ in range(most_tries):
             made = self.coarser or self._refilled(self.edge_m * times)
             if made is None or made._lattice != self._lattice:  # cached by a fill with filler "any"
                 break
             larger = self._smaller_than(made)
-            if larger > ALIKE_EDGES:
+            if larger > self.ALIKE_EDGES:
                 return made, larger
-            times /= FINER_EDGE
+            times /= ELEMENT_LIMITS.finer_edge
         return None, np.nan
 
     @property
@@ -299,11 +298,11 @@ class Elements:
 
     @property
     def _lattice(self) -> bool:
-        return self.body.solid.note.startswith(LATTICE_NOTE)
+        return self.body.solid.note.startswith(LATTICE.note)
 
     @property
     def _unknowns(self) -> float:
-        return UNKNOWNS_PER_TET[self.degree] * len(self.body.solid.tet)
+        return ELEMENT_LIMITS.per_tet[self.degree] * len(self.body.solid.tet)
 
     def _with_degree(self, degree: int) -> Elements:
         return replace(self, degree=degree, known={})
@@ -337,7 +336,7 @@ class Elements:
 
 def coarse(thin: bool) -> float:
     """Return about what fraction of its unknowns a coarser body has."""
-    return float(FINER_EDGE ** (2 if thin else 3))
+    return float(ELEMENT_LIMITS.finer_edge ** (2 if thin else 3))
 
 
 def _as_long(values: Array, count: int) -> Array:

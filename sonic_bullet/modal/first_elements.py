@@ -13,14 +13,15 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal import cost, lagrange, polynomials
-from sonic_bullet.modal.elements import CUBIC_UNKNOWNS, MOST_UNKNOWNS, UNKNOWNS_PER_TET, Elements, coarse
+from sonic_bullet.modal.cost import ELEMENT_LIMITS
+from sonic_bullet.modal.elements import Elements, coarse
 from sonic_bullet.modal.kept_solids import kept_or_filled
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.filling import Filler, has_detail
 from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.sizes import edge_within_m
 from sonic_bullet.modal.meshing.surfaces import prepared
-from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.storage import cache as store
 
@@ -60,7 +61,7 @@ def filled(
         return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, filler=filler)
 
     # the nodes that a clamp reaches depend on the size, which moves modes by up to 1 %: one size, whatever is wanted
-    first = Wanted(np.inf, MOST_SECTOR_MODES) if len(clamp) else wanted
+    first = Wanted(np.inf, SECTORS.most_modes) if len(clamp) else wanted
     wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first, say)
     edge = given or edge_m
     thin = edge > wall_m
@@ -69,7 +70,7 @@ def filled(
     made = Elements(at_size(edge, "any"), length_m, clamp, degree, thin, edge, anew, modes, simple=simple)
     if given is None:
         made = made.bounded()
-    elif made.degree == 3 and made._unknowns > CUBIC_UNKNOWNS:
+    elif made.degree == 3 and made._unknowns > ELEMENT_LIMITS.cubic_unknowns:
         made = replace(made, degree=2)
     made.held(lagrange.field(made.solid, 2))
     return made
@@ -99,8 +100,10 @@ def _first(
     modes = cost.modes_below(number, area, wall, wanted)
     edge = min(per_wave * 2 * np.pi / min(number, max(flat, bulk)), largest)
     thin = edge > wall
-    most = min(MOST_UNKNOWNS[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin))))
-    least = edge_within_m(area * wall / 2, wall, most / UNKNOWNS_PER_TET[3])
+    most = min(
+        ELEMENT_LIMITS.most_unknowns[thin], int(cost.most_unknowns(cost.MOST_WORK, modes, 3, thin, coarse(thin)))
+    )
+    least = edge_within_m(area * wall / 2, wall, most / ELEMENT_LIMITS.per_tet[3])
     if edge < least:
         say(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "

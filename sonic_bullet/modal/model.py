@@ -19,7 +19,7 @@ from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
-from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Wanted
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Material, ModalModel, Shape
 from sonic_bullet.records.counts import format_count
@@ -118,8 +118,8 @@ def analyse(
     lam = unit.value * of.per_s2
     freq, decay, alive = damped(lam, material)
     note = unit.note
-    if count is None and len(lam) == MOST_SECTOR_MODES and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
-        note += f"; cut at {MOST_SECTOR_MODES} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
+    if count is None and len(lam) == SECTORS.most_modes and lam[-1] * 1.01 < (2 * np.pi * to_hz) ** 2:
+        note += f"; cut at {SECTORS.most_modes} modes, {np.sqrt(lam[-1]) / (2 * np.pi):.0f} Hz"
     dropped = len(lam) - len(alive)
     if dropped:
         note += f"; {format_count(dropped, 'overdamped mode')} dropped"
@@ -233,7 +233,7 @@ def _solve(
     say: Callable[[str], None],
 ) -> _Unit:
     """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
-    wanted = Wanted(of.limit, MOST_SECTOR_MODES) if asked.count is None else Wanted(np.inf, asked.count)
+    wanted = Wanted(of.limit, SECTORS.most_modes) if asked.count is None else Wanted(np.inf, asked.count)
     method = chosen(
         shapes,
         of.length_m,

@@ -26,7 +26,6 @@ from sonic_bullet.records import Array, Shape
 
 MOST_UNKNOWNS = 2200
 """Of one parity: a dense problem of that size takes seconds. 200 modes of a square plate are no more."""
-SKIN_CELLS = 64  # along an axis of the skin, at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -333,5 +332,6 @@ def shapes_at(point: Array, size: Array, parity: Parity, vector: Array) -> Array
 def skin_cells(size: Array, wave: float) -> tuple[int, int, int]:
     """Return the cells of the skin along each axis, so that a parabola in each follows the shortest wave."""
     per_wave = 7.0  # cells of the skin to the shortest wave
-    x, y, z = np.clip(np.ceil(np.asarray(size) * wave * per_wave / (2 * np.pi)), 1, SKIN_CELLS).astype(int)
+    most_skin_cells = 64  # along an axis of the skin, at most
+    x, y, z = np.clip(np.ceil(np.asarray(size) * wave * per_wave / (2 * np.pi)), 1, most_skin_cells).astype(int)
     return int(x), int(y), int(z)

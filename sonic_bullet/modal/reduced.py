@@ -18,7 +18,7 @@ from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.model import diagonal_m, solid_key
-from sonic_bullet.modal.sectors import MOST_SECTOR_MODES, ModalMethod, Wanted
+from sonic_bullet.modal.sectors import SECTORS, ModalMethod, Wanted
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
@@ -67,7 +67,7 @@ def family(
         )
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
-    wanted = Wanted(limit, MOST_SECTOR_MODES, beyond)
+    wanted = Wanted(limit, SECTORS.most_modes, beyond)
     method = chosen(
         (shape,),
         length,
@@ -159,7 +159,7 @@ def _reduced(
         shown.face,
         length,
         method.volume * length**3,
-        min(MOST_SECTOR_MODES, *counts),
+        min(SECTORS.most_modes, *counts),
         f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
         method.meshed,
         error,

@@ -12,8 +12,15 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-MOST_SECTOR_MODES = 200
-SHIFT = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
+
+class _Sectors(NamedTuple):
+    """Of a sector."""
+
+    most_modes: int = 200
+    shift: float = 20.0  # × (2V/A)²/L²: a third of the first elastic λ' of plates and bars, less of chunky bodies
+
+
+SECTORS = _Sectors()
 
 
 class Sector(NamedTuple):

@@ -54,7 +54,6 @@ class SurfaceTerms(NamedTuple):
     turn: Array
 
 
-EVEN = 0.01  # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
 UNEVEN_AXIS = np.array(
     [0.8, 0.6, 0.4]
 )  # a: along no axis and in no plane between axes, so even bodies' modes do not cancel
@@ -192,7 +191,7 @@ def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
     """Rotate corners about the surface's centroid to its principal axes, longest first; also return the frame (3, 3).
 
     Axes point to where there is more motion (f,), summed over modes. Where there is as much on both sides, within
-    `EVEN`, their sense does not matter, and is that of the surface's moments alone.
+    `even_share`, their sense does not matter, and is that of the surface's moments alone.
     """
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     centre = corner.mean(axis=1)
@@ -201,7 +200,9 @@ def _principal(corner: Array, motion: Array) -> tuple[Array, Array]:
     # rounded: equal moments leave the body's own axes
     turn = np.linalg.eigh(np.round(spread * (1e6 / np.trace(spread))))[1][:, ::-1].T
     skew = (area * motion) @ (centre - middle) @ turn.T
-    even = EVEN * ((area * motion) @ np.abs((centre - middle) @ turn.T))
+    # of motion and its lever: less is a mesh's own, 1e-6 … 3e-3 on even bodies; rounding moves it by 5e-5
+    even_share = 0.01
+    even = even_share * ((area * motion) @ np.abs((centre - middle) @ turn.T))
     turn[skew < -even] *= -1
     turn[2] *= np.sign(np.linalg.det(turn))
     return (corner - middle) @ turn.T, turn

@@ -19,8 +19,6 @@ from sonic_bullet.records import Air, Array, ModalModel
 
 PATTERN_RINGS, PATTERN_TURNS = 24, 48
 PATTERN_ROWS = PATTERN_RINGS + 2
-CHECKED = 512
-"""Directions, and their negatives, that the mean is taken over."""
 
 
 def radiation_pattern(model: ModalModel, air: Air) -> Array | None:
@@ -48,7 +46,8 @@ def radiation_pattern(model: ModalModel, air: Air) -> Array | None:
         grid[half + 1 : -1, :, now] = np.roll(behind[::-1], PATTERN_TURNS // 2, axis=1)  # -r̂: π - θ, φ + π
     grid[0], grid[-1] = grid[1].mean(axis=0), grid[-2].mean(axis=0)
     flat = grid.reshape(PATTERN_ROWS * PATTERN_TURNS, m)
-    every = spread_directions(CHECKED)[0]
+    checked_directions = 512  # Directions, and their negatives, that the mean is taken over
+    every = spread_directions(checked_directions)[0]
     mean = (np.abs(between(flat, np.concatenate([every, -every]))) ** 2).mean(axis=0)
     flat[:, mean == 0] = 1.0
     return np.asarray(flat / np.sqrt(np.where(mean > 0, mean, 1.0)))

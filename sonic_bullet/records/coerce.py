@@ -29,8 +29,6 @@ Error = type[SonicBulletError]
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
 _SHORT.maxlevel = 3
-LONGEST_NAME = 255
-"""Most bytes of a file's name in file systems."""
 LISTED = 8
 """Most names that a message lists."""
 
@@ -116,11 +114,12 @@ def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) 
     if not isinstance(text, str):
         raise error(f"{name} is {shown(value)}", remedy)
     reason = "no name that a file can have"
+    longest_name = 255  # most bytes of a file's name in file systems
     with suppress(UnicodeEncodeError):
         if "\0" not in text:
-            if all(len(os.fsencode(part)) <= LONGEST_NAME for part in text.split(os.sep)):
+            if all(len(os.fsencode(part)) <= longest_name for part in text.split(os.sep)):
                 return text
-            reason = f"too long: a file's name has at most {LONGEST_NAME} bytes"
+            reason = f"too long: a file's name has at most {longest_name} bytes"
     raise error(f"cannot read or write {shown(text)}: {name} is {reason}", remedy)
 
 

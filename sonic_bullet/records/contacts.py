@@ -306,9 +306,6 @@ class Step:
 
 
 STEP_FIELDS = tuple(one.name for one in fields(Step))
-EVENT_KINDS = ("quench", "reset", "moved")
-OF_ONE_BODY = ("moved",)
-"""Kinds of event that concern one body; the others concern all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,11 +336,13 @@ class Event:
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        if self.kind not in EVENT_KINDS:
+        event_kinds = ("quench", "reset", "moved")
+        if self.kind not in event_kinds:
             raise LogError(f"an event of the unknown kind '{self.kind[:40]}'", "use the version that wrote the log")
         if self.step < 0:
             raise LogError(f"an event before step {self.step}", "use an unbroken contact log")
-        if (self.body is None) == (self.kind in OF_ONE_BODY):
+        of_one_body = ("moved",)  # kinds of event that concern one body; the others concern all
+        if (self.body is None) == (self.kind in of_one_body):
             who = "of no body" if self.body is None else f"of body {self.body} alone"
             raise LogError(f"an event '{self.kind}' {who}", "use the version that wrote the log")
         if self.body is not None and self.body < 0:

@@ -9,22 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-MESSAGE_BYTES = 990  # of a whole message: names and files may hold megabytes, a terminal does not
-
 
 class SonicBulletError(Exception):
     """Base of all errors raised on purpose: ``what`` is wrong, and the ``remedy``.
 
-    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most `MESSAGE_BYTES` in UTF-8: a longer text
+    Both are single lines; ``str(error)`` is ``"what; remedy"``, at most 990 bytes in UTF-8: a longer text
     loses its middle.
     """
 
     def __init__(self, what: str, remedy: str = "") -> None:
         remedy_bytes = 350  # of those, where both parts are long
         what, remedy = " ".join(what.split()), " ".join(remedy.split())
-        spare = MESSAGE_BYTES - 2 - len(_encoded(what))
+        message_bytes = 990  # of a whole message: names and files may hold megabytes, a terminal does not
+        spare = message_bytes - 2 - len(_encoded(what))
         self.remedy = _within(remedy, max(spare, remedy_bytes))
-        self.what = _within(what, MESSAGE_BYTES - 2 - len(_encoded(self.remedy)))
+        self.what = _within(what, message_bytes - 2 - len(_encoded(self.remedy)))
         super().__init__(f"{self.what}; {self.remedy}" if self.remedy else self.what)
 
 

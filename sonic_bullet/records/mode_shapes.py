@@ -4,7 +4,7 @@
 
 |q| <= 2^B is a whole number, and q·2^e a float32, to the last bit. The error is at most half a multiple: 2^−B of the
 mode's largest component. Modes are rounded once, when they are computed: all that is derived from them later, live or
-from a file, has the same numbers. `SHAPE_BITS` keeps the sound of every scene within −60 dB of its peak, with a margin:
+from a file, has the same numbers. Eleven bits keep the sound of every scene within −60 dB of its peak, with a margin:
 studies/shape_rounding.py.
 
 A file holds differences, which are smaller: of each vertex from the first of its neighbours that precedes it,
@@ -17,11 +17,10 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array
 
-SHAPE_BITS = 11  # B; 10 would do for three of the six scenes
 TINIEST = -126  # exponent of the smallest normal float32
 
 
-def rounded(shape: Array, bits: int = SHAPE_BITS) -> Array:
+def rounded(shape: Array, bits: int = 11) -> Array:  # B; 10 would do for three of the six scenes
     """Round shapes (v, 3, m) to whole multiples of each mode's power of two, as float32."""
     exponent = np.maximum(_exponent(shape) - bits, TINIEST)
     whole = np.rint(np.ldexp(shape.astype(np.float32), -exponent))

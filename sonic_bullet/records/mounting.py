@@ -1,9 +1,9 @@
 """Mounting of a body, as it affects its modes; clamped points are `fixed=` of its modes.
 
     "free"      not held: its material and the air take its energy. The default of moving bodies
-    "placed"    set down in a building: its own modes, η = IN_PLACE more, both sides radiate. The default of mass 0
+    "placed"    set down in a building: its own modes, η = 0.03 more, both sides radiate. The default of mass 0
     "on floor"  the same, with one side against a body that neither moves nor radiates: half the power
-    a number    a loss factor η in place of IN_PLACE, both sides radiate
+    a number    a loss factor η in place of 0.03, both sides radiate
 
     d += η ω/2    [Cremer, Heckl, Petersson 2005, eq. 3.6: decay of a mode by a loss factor]
 
@@ -16,9 +16,6 @@ from __future__ import annotations
 from sonic_bullet.records.coerce import as_number, shown
 from sonic_bullet.records.errors import RecordError, SonicBulletError
 
-IN_PLACE = 0.03
-"""Loss factor of a placed body, in addition to its material's own."""
-MOUNTINGS = ("free", "placed", "on floor")
 MOST_LOSS = 1.0
 """Largest loss factor of a mode."""
 Mounting = str | float
@@ -26,9 +23,10 @@ MOUNTING_REMEDY = f"give 'free', 'placed', 'on floor' or a loss factor, 0 … {M
 
 
 def as_mounting(value: object, name: str = "mounting", error: type[SonicBulletError] = RecordError) -> Mounting:
-    """Return one of MOUNTINGS, or a loss factor, or raise ``error``."""
+    """Return one of mountings, or a loss factor, or raise ``error``."""
+    mountings = ("free", "placed", "on floor")
     if isinstance(value, str):
-        if value not in MOUNTINGS:
+        if value not in mountings:
             raise error(f"{name} is {shown(value)}", MOUNTING_REMEDY)
         return value
     return as_number(value, name, MOUNTING_REMEDY, least=0, most=MOST_LOSS, error=error)
@@ -41,8 +39,9 @@ def usual_mounting(mass_kg: float) -> Mounting:
 
 def loss_factor(mounting: Mounting) -> float:
     """Return η that the mounting adds to a body's own losses."""
+    in_place = 0.03  # loss factor of a placed body, in addition to its material's own
     if isinstance(mounting, str):
-        return 0.0 if mounting == "free" else IN_PLACE
+        return 0.0 if mounting == "free" else in_place
     return mounting
 
 

@@ -8,10 +8,6 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 
-SLOWEST_LINE_HZ = 0.01
-LOUDER = 1.1
-"""A preset's levels are kept to a quarter of a decibel."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Residual:
@@ -87,7 +83,8 @@ class Residual:
         low = min(float(getattr(self, name).min(initial=0.0)) for name in shapes)
         slow = min(float(self.mode_freq_hz[0]), float(self.line_freq_hz.min(initial=1.0)))
         require(low >= 0 and slow > 0, "a residual with numbers below zero", "take it anew")
-        require(slow >= SLOWEST_LINE_HZ, f"a residual's line at {slow:.3g} Hz", "take it anew: nothing rings there")
+        slowest_line_hz = 0.01
+        require(slow >= slowest_line_hz, f"a residual's line at {slow:.3g} Hz", "take it anew: nothing rings there")
         for name in shapes:
             value, most = (
                 float(getattr(self, name).max(initial=0.0)),
@@ -102,8 +99,9 @@ class Residual:
             self.energy,
             float((self.mode_amplitude**2 / (4 * np.maximum(self.mode_decay_per_s, 0.1))).sum()),
         )
+        level_margin = 1.1  # a preset's levels are kept to a quarter of a decibel
         require(
-            energy <= LOUDER * self.clip_energy < np.inf,
+            energy <= level_margin * self.clip_energy < np.inf,
             "a residual louder than the recordings it was taken from",
             "take it anew: what is left of a sound is less",
         )

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 OCTAVES = 14
 LONGEST_M = 0.1
 WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
-TRACK_HEIGHTS_MOST = 1 << 22
 _EDGE_PER_M = np.sqrt(2.0) ** np.array([-1.0, 1.0]) / WAVE_M[:, None]
 
 

@@ -14,7 +14,7 @@ import base64
 import hashlib
 import io
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,11 +23,16 @@ from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
-PEAK = 0.9
-PLAYED_S = 12.0
-"""Of each sound at most, so that twenty scenes stay below 5 MB."""
-LEFT, RIGHT = 0.09, 0.98
-"""Where a picture's axes begin and end, as fractions of its width, for the cursor."""
+
+class _Plot(NamedTuple):
+    """Edges of a plot."""
+
+    left: float = 0.09  # where a picture's axes begin and end, as fractions of its width, for the cursor
+    right: float = 0.98
+
+
+PLOT = _Plot()
+
 
 STYLE = """
 :root{color-scheme:light dark;--line:#8886}
@@ -123,18 +128,21 @@ def page_entry(found: Comparison) -> dict[str, Any]:
         "causes": len(found.causes),
         "audible": None if found.audible is None else found.audible.words,
         "notes": list(found.notes),
-        "left": LEFT,
-        "right": RIGHT,
+        "left": PLOT.left,
+        "right": PLOT.right,
         "sounds": [],
     }
     if found.same or not found.a.sound.shape[1] or not found.b.sound.shape[1]:
         return entry
     one, other, sr = at_common_rate(found.a.sound.samples(), found.b.sound.samples(), found.a.sr, found.b.sr)
-    n = min(max(one.shape[1], other.shape[1]), round(PLAYED_S * sr))
+    played_s = 12.0  # of each sound at most, so that twenty scenes stay below 5 MB
+    n = min(max(one.shape[1], other.shape[1]), round(played_s * sr))
     one, other = (np.pad(x[:2], ((0, 0), (0, max(0, n - x.shape[1]))))[:, :n] for x in (one, other))
     peak = max(float(np.abs(one).max()), float(np.abs(other).max())) or 1.0
+    played_peak = 0.9
     entry["sounds"] = [
-        {"name": name, "type": "audio/ogg", "data": _ogg(x / peak * PEAK, sr)} for name, x in (("A", one), ("B", other))
+        {"name": name, "type": "audio/ogg", "data": _ogg(x / peak * played_peak, sr)}
+        for name, x in (("A", one), ("B", other))
     ]
     entry["seconds"] = round(n / sr, 3)
     entry["picture"] = _picture(found, one, other, sr)
@@ -186,7 +194,7 @@ def _picture(found: Comparison, one: Array, other: Array, sr: int) -> str:
     top = max(float(t.max()) for t in tables)
     figure = Figure(figsize=(9, 6.4))
     axes = figure.subplots(4, 1, sharex=True, height_ratios=[3, 3, 3, 1.4])
-    figure.subplots_adjust(left=LEFT, right=RIGHT, top=0.99, bottom=0.08, hspace=0.1)
+    figure.subplots_adjust(left=PLOT.left, right=PLOT.right, top=0.99, bottom=0.08, hspace=0.1)
     extent = (0, one.shape[1] / sr, 0, sr / 2000)
     for axis, table, name in zip(axes, tables, "AB", strict=False):
         axis.imshow(np.maximum(table - top, -90), origin="lower", aspect="auto", extent=extent, vmin=-90, vmax=0)

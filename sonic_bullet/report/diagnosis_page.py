@@ -26,8 +26,6 @@ from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 
-PEAK = 0.9
-
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .8rem;border-bottom:1px solid #ddd;text-align:left}
 img{max-width:100%}.verdict{font-size:1.4rem}figure{margin:1.5rem 0}figcaption{color:#555}\
@@ -119,12 +117,13 @@ def _players(d: Diagnosis) -> str:
     parts, seen = [], dict.fromkeys(("fit", "holdout", "transfer"), 0)
     takes = [t for t in (*d.takes, *d.unfitted) if np.isfinite(t.sample).all()]
     both = [predict_takes(h, takes) for h in (d.closed.before, d.closed.after)]
+    played_peak = 0.9
     for take in takes:
         before, after = (take.played(made[take.body]) for made in both)
         peak = max(float(np.abs(x).max()) for x in (take.sample, before, after)) or 1.0
         sounds = (("recorded", take.sample), ("before", before), ("after", after))
         row = "".join(
-            f"{label} <audio controls preload=none src='{_wav(x / peak * PEAK, take.sr)}'></audio> "
+            f"{label} <audio controls preload=none src='{_wav(x / peak * played_peak, take.sr)}'></audio> "
             for label, x in sounds
         )
         split = take.body.recordings[take.strike].split

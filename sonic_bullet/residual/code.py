@@ -20,9 +20,8 @@ from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import MaterialError, RecordError
 
 CODE_STEP_DB = 0.5
-MOST_NUMBERS = 4096
 
-Numbers = Annotated[tuple[float, ...], msgspec.Meta(max_length=MOST_NUMBERS)]
+Numbers = Annotated[tuple[float, ...], msgspec.Meta(max_length=4096)]
 
 
 class ResidualForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):

@@ -23,16 +23,6 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
 from sonic_bullet.residual.transfer import StruckModes
 
-FINE_WINDOW = 4096
-LINE_FLOOR = 1e-4
-"""Lines with less than this fraction of the loudest line's energy (40 dB) and of the clip's are left out."""
-BAND_OCTAVES = 1 / 6
-ABOVE_FLOOR = 2.0
-"""Cells whose mean is less than this times the floor are the floor."""
-LINE_WIDTHS = 6.0
-LINE_ROOM = 1.25
-"""Six half widths hold nine tenths of a damped sinusoid's energy."""
-
 
 def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:
     """Compute Re Σ a e^{(-d + iω)t} (n,) of lines (l,), a complex; each until it has fallen by `nepers`."""
@@ -86,8 +76,9 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     longest_s = 1.0
     width = left.freq_hz[1]
     edge = [0.0]
+    band_octaves = 1 / 6
     while edge[-1] < left.freq_hz[-1]:
-        edge.append(max(edge[-1] + width, edge[-1] * 2**BAND_OCTAVES))
+        edge.append(max(edge[-1] + width, edge[-1] * 2**band_octaves))
     band = np.searchsorted(edge[1:-1], left.freq_hz, "right")
     last = int(np.searchsorted(left.time_s, min(longest_s, left.time_s[-1]), "right"))
     ends: list[int] = []
@@ -102,7 +93,8 @@ def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
     np.add.at(total, (band[:, None], frame[None]), left.per_hz[:, :last])
     np.add.at(quiet, band, floor_per_hz)
     mean, quiet = total / np.maximum(count, 1), quiet / np.maximum(np.bincount(band), 1)
-    observed = mean > quiet[:, None] * (ABOVE_FLOOR + 3 / np.sqrt(count + 1e-9))
+    above_floor = 2.0  # cells whose mean is less than this times the floor are the floor
+    observed = mean > quiet[:, None] * (above_floor + 3 / np.sqrt(count + 1e-9))
     centre_hz = np.bincount(band, left.freq_hz) / np.maximum(np.bincount(band), 1)
     centre_s = np.bincount(frame, left.time_s[:last]) / np.bincount(frame)
     return centre_hz[kept], centre_s, np.where(observed, mean - quiet[:, None], 0.0)[kept]
@@ -143,11 +135,12 @@ def line_room(
 
     All lines in a band together have no more than the recordings have there beyond what is played, or than recorded -
     played has, if that is more (a line missing beside a mode that is played too loud). Energies are means over strikes.
-    A line's band: `LINE_WIDTHS` of its half width either way, and three bins at least.
+    A line's band: `line_widths` of its half width either way, and three bins at least.
     """
     freq_hz, decay_per_s, amplitude = lines
     step = float(rest[0].freq_hz[1])
-    half = np.maximum(3 * step, LINE_WIDTHS * decay_per_s / (2 * np.pi))
+    line_widths = 6.0
+    half = np.maximum(3 * step, line_widths * decay_per_s / (2 * np.pi))
     edge = np.append(rest[0].freq_hz - step / 2, rest[0].freq_hz[-1] + step / 2)
 
     def within(sounds: list[Power]) -> Array:
@@ -161,7 +154,8 @@ def line_room(
     decay = np.maximum(decay_per_s, 1e-3)
     energy = amplitude**2 / (4 * decay) * -np.expm1(-2 * decay * seconds)
     wanted = (np.abs(freq_hz[:, None] - freq_hz[None]) <= half[:, None]) @ energy
-    return np.asarray(np.minimum(1.0, LINE_ROOM * room / np.maximum(wanted, 1e-300)))
+    width_room = 1.25  # six half widths hold nine tenths of a damped sinusoid's energy
+    return np.asarray(np.minimum(1.0, width_room * room / np.maximum(wanted, 1e-300)))
 
 
 def residual_record(
@@ -191,18 +185,21 @@ def residual_record(
         )
     freq, time, per_hz = shared_cells([power(x, sr) for x in left])
     per_hz = np.minimum(per_hz, shared_cells([power(x, sr) for x in rest])[2])
-    per_hz = per_hz * np.mean([noisiness(power(x, sr, FINE_WINDOW), freq, time) for x in left], axis=0)
+    fine_window = 4096
+    per_hz = per_hz * np.mean([noisiness(power(x, sr, fine_window), freq, time) for x in left], axis=0)
     unit = float(modes.amplitude.max())
     if not unit > 0:
         raise AudioError("modes that the strikes do not excite", "strike where the body moves")
     clip = float((recorded**2).sum(axis=1).mean() / sr)
     line_hz, line_decay, line_amplitude = lines
     if len(line_hz):
-        fine = [[power(x, sr, FINE_WINDOW) for x in sounds] for sounds in (recorded, rest, recorded - rest)]
+        fine = [[power(x, sr, fine_window) for x in sounds] for sounds in (recorded, rest, recorded - rest)]
         line_amplitude = line_amplitude * np.sqrt(line_room(fine[0], fine[1], fine[2], lines, recorded.shape[1] / sr))
     energy = line_amplitude**2 / (4 * np.maximum(line_decay, 0.1))
     order = np.argsort(-energy, kind="stable")[:lines_most]
-    order = np.sort(order[energy[order] > LINE_FLOOR * min(float(energy.max(initial=0.0)), clip)])
+    # lines with less than this fraction of the loudest line's energy (40 dB) and of the clip's are left out
+    line_floor = 1e-4
+    order = np.sort(order[energy[order] > line_floor * min(float(energy.max(initial=0.0)), clip)])
     whole = float(energy[order].sum()) + 2 * float(np.trapezoid(np.trapezoid(per_hz, time, axis=1), freq))
     if whole < 1e-8 * clip:
         order, per_hz = order[:0], np.zeros_like(per_hz)  # 80 dB below the clip: rounding, no residual

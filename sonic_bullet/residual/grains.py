@@ -22,7 +22,7 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
-from sonic_bullet.residual.invert import OVERLAP, invert, magnitude_of, noise_phases
+from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, axes
 from sonic_bullet.residual.transfer import (
     ModePairs,
@@ -38,9 +38,7 @@ from sonic_bullet.residual.transfer import (
     transfer_lines,
 )
 
-LONGEST_GRAIN_S = 0.5
 GRAIN_STEP_DB = 2.0
-SEEDS = (0x5EED, 0xF00D)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,19 +66,20 @@ class Voice:
     cache: dict[bytes, Array] = field(default_factory=dict)
 
 
-def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: float = LONGEST_GRAIN_S) -> Voice:
+def make_voice(residual: Residual, target: StruckModes, sr: int, longest_s: float = 0.5) -> Voice:
     """Make a body's voice: ``target`` are its modes at a typical strike, which decide the pairs."""
     source = source_modes(residual)
     pairs = pair(source, target)
     joined, _ = merged(source)
     n = duration(residual, pairs, sr, longest_s)
-    freq, time = axes(n, sr, overlap=OVERLAP)
+    freq, time = axes(n, sr, overlap=INVERSION.overlap)
     here, slope, rate = come_from(pairs, freq)
     magnitude = magnitude_of(moved(source_power(residual), here, slope, rate, time), sr)
     size = 1 << int(np.ceil(np.log2(n + 4 * RESIDUAL_WINDOW)))
     shape = faded(n, sr)
+    seeds = (0x5EED, 0xF00D)
     base = (
-        [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in SEEDS]
+        [np.fft.rfft(shape * invert(magnitude, noise_phases(n, seed), n), size) for seed in seeds]
         if magnitude.any()
         else [np.zeros(size // 2 + 1)] * 2
     )

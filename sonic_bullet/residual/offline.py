@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.grains import filtered, make_voice, mixed_number, response, varied
-from sonic_bullet.residual.invert import MOST_ITERATIONS, invert, magnitude_of
+from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of
 from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, axes
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
 
@@ -48,7 +48,7 @@ def transferred_clip(
     flip = 1 - 2 * ((column + np.arange(len(freq))) % 2)
     turned = np.exp(2j * np.pi * (freq * time[:, None] - here * there_s)) * flip
     magnitude = magnitude_of(transfer(left, source, target, freq, time, pairs=pairs), sr)
-    return invert(magnitude, start[row, column] * turned, n, iterations=MOST_ITERATIONS, overlap=looking)
+    return invert(magnitude, start[row, column] * turned, n, iterations=INVERSION.most_iterations, overlap=looking)
 
 
 def residual_sound(

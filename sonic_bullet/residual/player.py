@@ -20,8 +20,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.residual.grains import Voice, angles, response, shape
 
 SECTION = 512
-LEAST_LEVEL = 2e-6
-"""Sections that could reach no more than this, -20 dB SPL at 1 m, are skipped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +93,8 @@ def section_grain(voice: Voice, force_n: Array, struck_power: Array, number: int
     struck_power (p,): a² of the pairs per N·s.
     """
     level = float(np.sqrt(struck_power.max(initial=0.0))) * float(np.abs(force_n).sum()) / voice.sr
-    if voice.silent or level < LEAST_LEVEL:
+    least_level = 2e-6  # sections that could reach no more than this, -20 dB SPL at 1 m, are skipped
+    if voice.silent or level < least_level:
         return np.zeros(0, np.float32)
     from scipy.fft import irfft, rfft
 

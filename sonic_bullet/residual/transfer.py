@@ -19,6 +19,7 @@ lowest and above the highest pair frequencies keep their ratio to that pair's. m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,11 +28,17 @@ from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.spectrogram import Power
 
-DOMINANT = 24
-"""Most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1."""
-FAINT_POWER = 1e-6
-LEAST_DECAY_PER_S = 0.1
-TINY = 1e-300
+
+class _Transfer(NamedTuple):
+    """Limits of a residual carried to another body."""
+
+    dominant: int = 24  # most pairs where the shapes differ: the N_dominant of the paper's section 6.2.1
+    faint_power: float = 1e-6
+    least_decay_per_s: float = 0.1
+    tiny: float = 1e-300
+
+
+TRANSFER = _Transfer()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +72,7 @@ class StruckModes:
     @property
     def energy(self) -> Array:
         """Energy (m,) a²/4d that each mode emits in all."""
-        return np.asarray(self.amplitude**2 / (4 * np.maximum(self.decay_per_s, LEAST_DECAY_PER_S)))
+        return np.asarray(self.amplitude**2 / (4 * np.maximum(self.decay_per_s, TRANSFER.least_decay_per_s)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,13 +114,13 @@ def merged(modes: StruckModes) -> tuple[StruckModes, Array]:
     """
     one_mode = 1e-3  # Modes closer than this, relative, count as one: an analysis finds one line
     group = np.concatenate([[0], np.cumsum(np.diff(modes.freq_hz) > one_mode * modes.freq_hz[1:])]).astype(np.int64)
-    weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TINY
+    weight = modes.amplitude**2 + 1e-12 * float((modes.amplitude**2).max()) + TRANSFER.tiny
     total = np.bincount(group, weight)
     freq, decay = (np.bincount(group, weight * value) / total for value in (modes.freq_hz, modes.decay_per_s))
     return StruckModes(freq, decay, np.sqrt(np.bincount(group, modes.amplitude**2))), group
 
 
-def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> ModePairs:
+def pair(source: StruckModes, target: StruckModes, dominant: int = TRANSFER.dominant) -> ModePairs:
     """Pair the modes of source and target.
 
     Natural pairs where the target is the source's shape at some scale, else the ``dominant`` strongest of both sides,
@@ -128,7 +135,8 @@ def pair(source: StruckModes, target: StruckModes, dominant: int = DOMINANT) -> 
         count = min(dominant, int((a.amplitude > 0).sum()), max(int((b.amplitude > 0).sum()), 1))
         i, j = (np.sort(np.argsort(-x.energy, kind="stable")[: max(count, 1)]) for x in (a, b))
     rate = np.clip(
-        np.maximum(b.decay_per_s[j], LEAST_DECAY_PER_S) / np.maximum(a.decay_per_s[i], LEAST_DECAY_PER_S),
+        np.maximum(b.decay_per_s[j], TRANSFER.least_decay_per_s)
+        / np.maximum(a.decay_per_s[i], TRANSFER.least_decay_per_s),
         1 / fastest_time,
         fastest_time,
     )
@@ -200,10 +208,10 @@ def scale(pairs: ModePairs, source_power: Array, target_power: Array, freq_hz: A
     width = np.append(np.diff(edge), 2 * max(float(pairs.source_hz[-1] - edge[-1]), 1.0))
     out = np.empty(len(freq_hz))
     _scale(
-        np.asarray(freq_hz, float),
+        np.array(freq_hz, float),  # a copy: a read-only array has machine code of its own
         pairs.source_hz,
         skirt * width,
-        source_power + FAINT_POWER * float(source_power.max()) + TINY,
+        source_power + TRANSFER.faint_power * float(source_power.max()) + TRANSFER.tiny,
         target_power,
         out,
     )
@@ -302,7 +310,7 @@ def transfer_lines(residual: Residual, pairs: ModePairs) -> ResidualLines:
     below = scale(
         pairs,
         np.ones(len(pairs.source)),
-        source.amplitude[pairs.source] ** 2 + FAINT_POWER * float((source.amplitude**2).max()),
+        source.amplitude[pairs.source] ** 2 + TRANSFER.faint_power * float((source.amplitude**2).max()),
         residual.line_freq_hz,
     )
     decay = residual.line_decay_per_s * pairs.rate[follows]

@@ -31,9 +31,6 @@ from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 from sonic_bullet.session.arguments import as_material
 
-FREQUENCY_MARGIN = 1.02
-"""Of to_hz: a mode above it at one of the family's Poisson's ratios may lie below it at another."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownShape:
@@ -127,11 +124,13 @@ def known_shape(
         raise ModalError("materials are none", "name those that the shape will be made of")
     gamma = min(one.youngs_pa / one.density_kg_m3 for one in made)
     shape = mesh if isinstance(mesh, Shape) else read_mesh(mesh)
+    # of to_hz: a mode above it at one of the family's Poisson's ratios may lie below it at another
+    frequency_margin = 1.02
     found = family(
         shape,
         gamma_m2_s2=gamma,
         poisson=poisson,
-        to_hz=to_hz * largest * FREQUENCY_MARGIN,
+        to_hz=to_hz * largest * frequency_margin,
         progress=progress or (lambda _: None),
     )
     return KnownShape(found, largest, gamma, to_hz)

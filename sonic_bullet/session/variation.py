@@ -37,8 +37,6 @@ from sonic_bullet.records.roughness import with_roughness as with_roughness_of
 from sonic_bullet.session.material_choice import as_choice
 
 SURFACES, PLACE_VARIATION, MATERIAL_VARIATION = VARIED = ("surfaces", "places", "materials")
-FOOTPRINT = 0.02
-"""Radius within which a pair's points are one contact, over the smaller body's bounding radius: Bullet's own."""
 AS_SIMULATED = "motion, masses and contact forces of every take are those of the log"
 
 
@@ -97,7 +95,9 @@ def _identity(body: Body) -> tuple[int, int, int]:
 def footprints_m(bodies: Collection[Body]) -> Array:
     """Return Bullet's radius (b,) for each body; infinite for planes and bodies of unknown size."""
     radius = [_radius_m(body) for body in bodies]
-    return np.array([FOOTPRINT * r if r > 0 else np.inf for r in radius])
+    # radius within which a pair's points are one contact, over the smaller body's bounding radius: Bullet's own
+    footprint = 0.02
+    return np.array([footprint * r if r > 0 else np.inf for r in radius])
 
 
 def _radius_m(body: Body) -> float:

@@ -39,10 +39,6 @@ from sonic_bullet.soundtrack.frame_rates import fraction_of
 from sonic_bullet.storage.atomic import PartialFile, cannot, kept_name
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-SIDE_MOST = 8192
-SOUND_BLOCK_S = 0.5
-"""How far sound is ahead of the pictures in the file, at most: players read both without jumping."""
-
 
 def as_fps(text: object) -> Fraction:
     """Parse pictures a second, as a fraction: 30, "30000/1001", "29.97". Raises FileError."""
@@ -180,11 +176,13 @@ class FilmWriter:
         av = pyav()
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
         frame.pts, frame.time_base = self.pictures, 1 / self.fps
+        # how far sound is ahead of the pictures in the file, at most: players read both without jumping
+        sound_block_s = 0.5
         with self._disk():
             self._container.mux(self._video.encode(frame))
             self.pictures += 1
             due = samples_of(self.pictures, self.fps, self.sr)
-            if due - self.samples >= SOUND_BLOCK_S * self.sr:
+            if due - self.samples >= sound_block_s * self.sr:
                 self._hear(due)
 
     def _hear(self, stop: int, end: int | None = None) -> None:
@@ -295,6 +293,7 @@ def _nothing() -> Any:
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
     """Check width and height of a picture, even numbers. Raises FileError."""
     width, height = (int(side) for side in size)
-    if not all(16 <= side <= SIDE_MOST and side % 2 == 0 for side in (width, height)):
-        raise FileError(f"pictures of {width}x{height}", f"give even numbers from 16 to {SIDE_MOST}, 1280x720 say")
+    side_most = 8192
+    if not all(16 <= side <= side_most and side % 2 == 0 for side in (width, height)):
+        raise FileError(f"pictures of {width}x{height}", f"give even numbers from 16 to {side_most}, 1280x720 say")
     return width, height

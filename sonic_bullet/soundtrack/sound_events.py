@@ -36,12 +36,6 @@ from sonic_bullet.soundtrack.own_sound import OwnSound
 
 IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED = "impact", "roll", "slide", "support", "uncaused strike"
 SOUNDING = (IMPACT, ROLL, SLIDE)
-LEVEL_S = 0.05
-"""Time after an impact's arrival in which its peak is searched: the ear's integration time for loudness is of that
-order, and the latest mode's first swing is over."""
-CARRIES_WEIGHT = "it carries weight: nothing strikes, and no surface sweeps past"
-NO_CAUSE = "nothing approached faster than gravity brings it while it rests"
-NO_VOICE = "neither body has modes, nor moves freely"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +50,7 @@ class SoundEvent:
     speed_m_s : of an impact the approach, of a slide the slip, of a roll the sweep, means by load
     arrival_s : when its first sound is at the first microphone
     level_db : re 20 µPa there, of this event alone (`own_sound`), without what else its bodies ring with
-        The peak within `LEVEL_S` of an impact, the rms of a roll or slide; None where it is silent, or no pressure.
+        The peak within 50 ms of an impact, the rms of a roll or slide; None where it is silent, or no pressure.
     reason : why it is silent, empty where it sounds
     """
 
@@ -168,6 +162,9 @@ class EventWitness:
         rubs = {} if self._own is None else self._own.friction_pa2(state, number, drives, frames)
         mute = (table["modes"] + table["rigid"] == 0)[pair["body"]].all(axis=1)
         bodies = state.body[pair["body"]].tolist()
+        carries_weight = "it carries weight: nothing strikes, and no surface sweeps past"
+        no_cause = "nothing approached faster than gravity brings it while it rests"
+        no_voice = "neither body has modes, nor moves freely"
         for i in np.flatnonzero(driven | leaps | carries).tolist():
             who = bodies[i][0], bodies[i][1]
             touch = there.get(who) or here.get(who) or _NO_TOUCH
@@ -176,12 +173,12 @@ class EventWitness:
                 slides = touch.slip_m_s > max(SWEEP_FLOOR_M_S, 0.5 * speed)
                 kind, speed, reason = (SLIDE, touch.slip_m_s, "") if slides else (ROLL, speed, "")
             elif leaps[i] and number - self._struck.get(who, -SPAN) >= SPAN:
-                kind, speed, reason = UNCAUSED, max(touch.approach_m_s, 0), NO_CAUSE
+                kind, speed, reason = UNCAUSED, max(touch.approach_m_s, 0), no_cause
             elif carries[i]:
-                kind, reason = SUPPORT, CARRIES_WEIGHT
+                kind, reason = SUPPORT, carries_weight
             else:
                 continue
-            reason = NO_VOICE if mute[i] else reason
+            reason = no_voice if mute[i] else reason
             own = rubs.get(int(active[i]), 0.0)
             moment = _Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason, own)
             if kind == UNCAUSED:
@@ -198,7 +195,10 @@ class EventWitness:
         if self._own is None:
             return 0.0
         sr = state.bank.sr
-        sound = self._own.strike_pa(state, number, at, max(round(LEVEL_S * sr), 1))
+        # time after an impact's arrival in which its peak is searched: the ear's integration time for loudness is of
+        # that order, and the latest mode's first swing is over
+        level_s = 0.05
+        sound = self._own.strike_pa(state, number, at, max(round(level_s * sr), 1))
         step, first_s, before = self._strike.get(who, (-SPAN, 0.0, sound))
         if 0 <= number - step <= 1:
             late = min(max(round((start_s - first_s) * sr), 0), len(sound))

@@ -24,13 +24,6 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.runtime.clock import Clock
 
-HOW_IT_IS_DRAWN = "film the scene, or, of an animation that was scored, give it a material in the table of score"
-WIDE_M = 20.0
-"""A figure wider than this is ground, which need not be in view."""
-ELEVATION_RAD = np.radians(30)
-CLOSER = 0.8
-"""Fraction of the sphere around all that moves that the picture's height shows at least: its ends are air."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Staging:
@@ -76,11 +69,12 @@ def staged(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Sta
     figures: list[Figure] = []
     index: list[int] = []
     notes: list[str] = []
+    how_it_is_drawn = "film the scene, or, of an animation that was scored, give it a material in the table of score"
     for i, body in enumerate(log.bodies):
         known = places.get((body.body_id, body.link))
         figure = _figure(body) or (known.figure if known is not None else None)
         if figure is None:
-            notes.append(f"{body.name} is not drawn: the log has no shape of it; {HOW_IT_IS_DRAWN}")
+            notes.append(f"{body.name} is not drawn: the log has no shape of it; {how_it_is_drawn}")
             continue
         figures.append(figure)
         index.append(i)
@@ -172,7 +166,8 @@ def chosen_camera(
     """Return the camera asked for, or one that shows what moves, from the first microphone's side, seen from above."""
     radius = np.array([_radius_m(figure) for figure in staging.figures])
     moves = np.ptp(staging.position_m, axis=0).max(axis=1) > 1e-3
-    small = radius < WIDE_M
+    wide_m = 20.0  # a figure wider than this is ground, which need not be in view
+    small = radius < wide_m
     seen = moves & small if (moves & small).any() else small if small.any() else np.ones(len(radius), bool)
     # percentiles, so that a body that falls for ever is not followed
     low, high = np.percentile(staging.position_m[:, seen].reshape(-1, 3), [5, 95], axis=0)
@@ -185,8 +180,11 @@ def chosen_camera(
     side[2] = 0
     length = float(np.linalg.norm(side))
     side = side / length if length > 1e-6 else np.array([0.0, -1.0, 0.0])
-    away = CLOSER * reach / np.sin(np.radians(VIEW_DEG) / 2)
-    return Camera(target + away * (np.cos(ELEVATION_RAD) * side + np.sin(ELEVATION_RAD) * np.array([0, 0, 1])), target)
+    # fraction of the sphere around all that moves that the picture's height shows at least: its ends are air
+    view_share = 0.8
+    away = view_share * reach / np.sin(np.radians(VIEW_DEG) / 2)
+    elevation_rad = np.radians(30)
+    return Camera(target + away * (np.cos(elevation_rad) * side + np.sin(elevation_rad) * np.array([0, 0, 1])), target)
 
 
 def _radius_m(figure: Figure) -> float:

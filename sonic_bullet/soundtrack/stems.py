@@ -29,9 +29,6 @@ from sonic_bullet.runtime.body_stems import render_apart
 from sonic_bullet.runtime.synthesis_state import Witness
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
-NAME_LENGTH = 60
-"""Characters of a body's name that its file keeps: 255 bytes hold them in any script, with number and ending."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stem:
@@ -78,7 +75,9 @@ def render_stems(
 def stem_name(index: int, name: str) -> str:
     """Make a file's name, without ending, of a body's: its number in the log, and letters that file systems take."""
     plain = re.sub(r"[^\w-]+", "_", name.encode("utf-8", "replace").decode()).strip("_")
-    return f"{index:02d}-{plain[:NAME_LENGTH] or 'body'}"
+    # characters of a body's name that its file keeps: 255 bytes hold them in any script, with number and ending
+    name_length = 60
+    return f"{index:02d}-{plain[:name_length] or 'body'}"
 
 
 def write_stems(

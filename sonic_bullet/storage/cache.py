@@ -31,9 +31,6 @@ CACHE_FORMAT = "sonic-bullet-cache/2"
 
 
 LIMIT_VARIABLE = "SONIC_BULLET_CACHE_LIMIT"
-ENTRY_NAME = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
-CODE = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
-SIZE = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
 OF_LOGS, CODE_KIND = "models of logs", "machine code"
 ENTRY_KINDS = {"radiation": "radiation", "model": OF_LOGS}
 """Kind of an entry by the first word of its name; all others are modes, and what they are made of."""
@@ -113,7 +110,8 @@ class KeptFile(NamedTuple):
 
 def as_bytes(size: str, name: str) -> int:
     """Parse a size, such as 500MB, 1.5GiB or 0. Raises FileError."""
-    found = SIZE.fullmatch(size.strip())
+    size_pattern = re.compile(r"(\d+(?:\.\d+)?) *([kMGT]?)(i?)B?", re.IGNORECASE)
+    found = size_pattern.fullmatch(size.strip())
     if found is None:
         raise FileError(f"{name} is '{size}', which is no size", "give one such as 500MB, 2GB or 0")
     number, letter, binary = found.groups()
@@ -129,21 +127,23 @@ def limit_bytes() -> int:
 
 def computed(folder: Path) -> list[KeptFile]:
     """List the computed models in a folder."""
+    entry_name = re.compile(r"([a-z]+)-[0-9a-f]{64}\.npz")
     return [
         KeptFile(path, ENTRY_KINDS.get(found[1], "modes"), size, used)
         for path, size, used in _files(folder)
-        if (found := ENTRY_NAME.fullmatch(path.name))
+        if (found := entry_name.fullmatch(path.name))
     ]
 
 
 def compiled(folder: Path) -> list[KeptFile]:
     """List the machine code in the folders of a folder."""
+    code_file = re.compile(r".*\.nb[ic](\.tmp\..*)?")  # numba's, and what a killed run left of one
     with suppress(OSError):
         return [
             KeptFile(path, CODE_KIND, size, used)
             for inner in folder.iterdir()
             for path, size, used in _files(inner)
-            if CODE.fullmatch(path.name)
+            if code_file.fullmatch(path.name)
         ]
     return []
 

@@ -17,8 +17,11 @@ from typing import Any
 import pytest
 import trimesh
 
-from sonic_bullet.machine.progress import BETWEEN_STAGES_S, CALL_QUIET_S, EVERY_S, ProgressLines, status
+from sonic_bullet.machine.progress import CALL_QUIET_S, ProgressLines, status
 from tests.few_cases import parametrize_few
+
+EVERY_S = 4.0
+BETWEEN_STAGES_S = 1.0
 
 REPO = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "sonic_bullet"]

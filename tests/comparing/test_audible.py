@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.comparing.ensemble import RUNS, SHIFT_M, SIGNIFICANCE, Ensemble, Shifted, judged
+from sonic_bullet.comparing.ensemble import RUNS, Ensemble, Shifted, judged
 from sonic_bullet.listener.calls import Call, Who
+
+SIGNIFICANCE = 0.01
+SHIFT_M = 1e-4
 
 
 def known(rng: np.random.Generator) -> Ensemble:

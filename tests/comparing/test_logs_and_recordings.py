@@ -19,6 +19,8 @@ from sonic_bullet.records.errors import CompareError
 from tests.comparing.made import scene
 from tests.few_cases import parametrize_few
 
+NO_INPUT = ("body_id", "link", "epoch", "name", "since_step", "until_step", "model")
+
 SR = 48_000
 
 
@@ -61,7 +63,7 @@ def test_where_contacts_differ_a_log_says_that_no_share_is_known(tmp_path: Path,
 
 
 def test_a_new_field_of_a_record_is_an_input_by_itself(log: ContactLog) -> None:
-    from sonic_bullet.comparing.inputs.matched_logs import NO_INPUT, body_leaves
+    from sonic_bullet.comparing.inputs.matched_logs import body_leaves
 
     body = log.bodies[0]
     known = {path[0] for path in body_leaves(body)}

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from sonic_bullet.comparing.revision_tree import MOST_NAMED, RevisionTree, unpinned, unpinned_words
+from sonic_bullet.comparing.revision_tree import RevisionTree, unpinned, unpinned_words
 from sonic_bullet.comparing.revisions import at_revision
 from tests.comparing.made import SCENE, scene
 from tests.comparing.test_compare_command import shell
+
+MOST_NAMED = 8
 
 REPO = Path(__file__).resolve().parents[2]
 MASS = "        0.004, client"

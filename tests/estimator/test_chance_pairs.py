@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.chance_pairs import CLUSTER, MOVED_MOST, _moved
+from sonic_bullet.estimator.fit.chance_pairs import _moved
 from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.plots.fit_plot import _played
 from sonic_bullet.records import Material
 from tests.made.case import make, write_box
+
+MOVED_MOST = 0.06
+CLUSTER = 0.02
 
 BRASS = Material.isotropic("made", youngs_pa=1.0e11, poisson=0.36, density_kg_m3=8400, alpha_per_s=8.0, beta_s=4e-8)
 SIZE_M = (0.12, 0.025, 0.006)

@@ -12,11 +12,13 @@ import pytest
 import soundfile
 
 from sonic_bullet.files import read_audio, read_log
-from sonic_bullet.session.variation import FOOTPRINT, Variation, make_take
+from sonic_bullet.session.variation import Variation, make_take
 from tests.cli.test_commands import error_of, run
 from tests.few_cases import parametrize_few
 from tests.journeys.test_scene_log_film import SCENE
 from tests.made.disks import full_disk
+
+FOOTPRINT = 0.02
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from sonic_bullet.live.latencies import BIN_S, Latencies
+from sonic_bullet.live.latencies import Latencies
+
+BIN_S = 1e-4
 
 
 def test_median_and_worst_are_those_of_all() -> None:

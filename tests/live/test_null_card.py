@@ -7,7 +7,10 @@ import time
 import numpy as np
 import pytest
 
-from sonic_bullet.live.null_card import CARD_BLOCK, HELD_BLOCKS, NullCard
+from sonic_bullet.live.null_card import NullCard
+
+CARD_BLOCK = 256
+HELD_BLOCKS = 2
 
 SR = 48_000
 

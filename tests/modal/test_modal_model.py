@@ -13,8 +13,10 @@ from sonic_bullet.modal import analyse, eigen, fem
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.records import Material, Shape, isotropic_stiffness_pa
 from sonic_bullet.records.errors import MeshError, ModalError
-from sonic_bullet.records.mode_shapes import SHAPE_BITS, whole_multiples
+from sonic_bullet.records.mode_shapes import whole_multiples
 from sonic_bullet.storage import cache as store
+
+SHAPE_BITS = 11
 
 BAR = Shape("box", [0.2, 0.02, 0.02])
 

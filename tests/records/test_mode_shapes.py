@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.records.mode_shapes import SHAPE_BITS, differences, from_multiples, rounded, summed, whole_multiples
+from sonic_bullet.records.mode_shapes import differences, from_multiples, rounded, summed, whole_multiples
+
+SHAPE_BITS = 11
 
 
 def shapes(seed: int = 0, v: int = 50, m: int = 6) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import clip_residual, damped
-from sonic_bullet.residual.invert import ITERATIONS, OVERLAP, RESIDUAL_WINDOW, invert, magnitude_of, noise_phases
+from sonic_bullet.residual.invert import INVERSION, RESIDUAL_WINDOW, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.offline import transferred_clip
 from sonic_bullet.residual.spectrogram import Power, inverse, power, transform
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, shifted_hz, transfer
@@ -282,11 +282,11 @@ def test_inversion_settles_and_keeps_seeds_apart() -> None:
     per_hz = np.exp(-20 * np.arange(95) * 256 / SR)[None] * np.exp(-np.arange(257) / 60)[:, None] * 1e-6
     magnitude = magnitude_of(per_hz, SR)
     sounds = [invert(magnitude, noise_phases(n, 1), n, iterations=turns) for turns in range(5)]
-    off = [np.abs(transform(x, RESIDUAL_WINDOW, OVERLAP)) - magnitude for x in sounds]
+    off = [np.abs(transform(x, RESIDUAL_WINDOW, INVERSION.overlap)) - magnitude for x in sounds]
     apart = [np.linalg.norm(one) / np.linalg.norm(magnitude) for one in off]
     assert (np.diff(apart) < 0).all()
-    assert apart[ITERATIONS] < 0.15
-    assert (invert(magnitude, noise_phases(n, 1), n) == sounds[ITERATIONS]).all()
+    assert apart[INVERSION.iterations] < 0.15
+    assert (invert(magnitude, noise_phases(n, 1), n) == sounds[INVERSION.iterations]).all()
     other = invert(magnitude, noise_phases(n, 2), n)
     assert abs(np.corrcoef(other, sounds[-1])[0, 1]) < 0.1
     level = [20 * np.log10(np.sqrt((x[time < 0.1] ** 2).mean())) for x in (other, sounds[-1])]

@@ -14,10 +14,11 @@ from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.files import read_log
 from sonic_bullet.records import Air, Body
 from sonic_bullet.records.errors import RecordError, SceneError
-from sonic_bullet.records.mounting import IN_PLACE
 from sonic_bullet.runtime.replay import render_log
 from tests.made.models import STEEL
 from tests.made.worlds import box, floor, plate_model
+
+IN_PLACE = 0.03
 
 MODEL = plate_model()
 

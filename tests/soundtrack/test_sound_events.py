@@ -18,10 +18,7 @@ from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.soundtrack.event_tables import EVENT_COLUMNS, write_events
 from sonic_bullet.soundtrack.sound_events import (
-    CARRIES_WEIGHT,
     IMPACT,
-    NO_CAUSE,
-    NO_VOICE,
     ROLL,
     SLIDE,
     SUPPORT,
@@ -34,6 +31,10 @@ from sonic_bullet.soundtrack.stems import Stem, render_stems
 from tests.made.models import GLASS, STEEL, WOOD, ball_body, box_model
 from tests.made.soundtracks import MICROPHONES, table_log
 from tests.made.worlds import ball, box, floor, plate_model
+
+CARRIES_WEIGHT = "it carries weight: nothing strikes, and no surface sweeps past"
+NO_CAUSE = "nothing approached faster than gravity brings it while it rests"
+NO_VOICE = "neither body has modes, nor moves freely"
 
 RADIUS_M, MASS_KG, HEIGHT_M = 0.02, 0.1, 0.3
 

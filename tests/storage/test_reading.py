@@ -12,16 +12,10 @@ import pytest
 from sonic_bullet import files, presets
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.modal import read_mesh
-from sonic_bullet.records.errors import (
-    MESSAGE_BYTES,
-    FileError,
-    LogError,
-    MaterialError,
-    MeshError,
-    SonicBulletError,
-    excerpt,
-)
+from sonic_bullet.records.errors import FileError, LogError, MaterialError, MeshError, SonicBulletError, excerpt
 from sonic_bullet.storage.reading import QUOTED, reading
+
+MESSAGE_BYTES = 990
 
 LONG = "Q" * 185_000
 WORDS = "Q QQ " * 40_000

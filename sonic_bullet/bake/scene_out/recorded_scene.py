@@ -16,9 +16,6 @@ from sonic_bullet.records import Array, Body, Shape
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.rigid_scene import BodyPath, PhysicsMaterial, RigidBody, RigidScene
 
-KEYS_PER_S = 1000.0
-POSES_MOST = 2_000_000
-"""Of all bodies: half a gigabyte as JSON, 56 MB as .glb."""
 Link = tuple[int, int]
 
 
@@ -89,7 +86,9 @@ def _poses(log: ContactLog, who: Sequence[Sequence[int]]) -> _Poses:
     """Read poses of links, each with the indices of its records."""
     start_s, count = log.start_s, len(log.steps)
     rate = count / log.duration_s if count else 0.0
-    stride = max(1, round(rate / KEYS_PER_S), -(-count * len(who) // POSES_MOST))
+    keys_per_s = 1000.0
+    most_poses = 2_000_000  # of all bodies: half a gigabyte as JSON, 56 MB as .glb
+    stride = max(1, round(rate / keys_per_s), -(-count * len(who) // most_poses))
     taken = np.arange(0, count, stride)
     column = np.full(max(len(log.bodies), 1), -1)
     for number, indices in enumerate(who):

@@ -6,8 +6,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-ROOT_HALF = np.sqrt(0.5)
-
 
 def place_y_up(position_m: Array) -> Array:
     """Turn vectors (…, 3) of the world."""
@@ -17,5 +15,6 @@ def place_y_up(position_m: Array) -> Array:
 def turn_y_up(quaternion_xyzw: Array) -> Array:
     """Turn orientations (…, 4): a quarter turn back about x after them, of unit length."""
     x, y, z, w = np.moveaxis(np.asarray(quaternion_xyzw, float), -1, 0)
-    made = ROOT_HALF * np.stack([x - w, y + z, z - y, w + x], axis=-1)
+    root_half = np.sqrt(0.5)
+    made = root_half * np.stack([x - w, y + z, z - y, w + x], axis=-1)
     return np.asarray(made / np.linalg.norm(made, axis=-1, keepdims=True))

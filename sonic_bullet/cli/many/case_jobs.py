@@ -13,7 +13,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
@@ -22,7 +22,16 @@ from sonic_bullet.jobs.job_processes import Failed
 from sonic_bullet.machine.progress import shown_by
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
-PRESET, VALUES, WORDS_FILE = "preset.json", "result.json", "summary.txt"
+
+class _CaseFiles(NamedTuple):
+    """Names of the files of one case in the folder of many."""
+
+    preset: str = "preset.json"
+    values: str = "result.json"
+    words: str = "summary.txt"
+
+
+CASE_FILES = _CaseFiles()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +136,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
         except SonicBulletError as error:
             return Failed(str(error).replace(place + os.sep, ""))
         words = (said.getvalue() + warned.getvalue()).replace(place + os.sep, "")
-        (out / WORDS_FILE).write_text(words, encoding="utf-8")
+        (out / CASE_FILES.words).write_text(words, encoding="utf-8")
         made = {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
     return CaseResult(made, digest(files))
 
@@ -138,7 +147,7 @@ def _fit(source: str, out: Path, options: Mapping[str, Any]) -> None:
     given = {name: _inside(out, options[name]) for name in ("picture", "csv_to", "uff_to")}
     tolerance = options["tolerance_percent"]
     run_fit(
-        source, output=str(out / PRESET), json_to=str(out / VALUES), tolerance_percent=tolerance,
+        source, output=str(out / CASE_FILES.preset), json_to=str(out / CASE_FILES.values), tolerance_percent=tolerance,
         **given, **dict.fromkeys(OF_ONE_TAKE),
     )  # fmt: skip
 
@@ -148,8 +157,8 @@ def _diagnose(source: str, out: Path, options: Mapping[str, Any]) -> None:
 
     predict, report = (_inside(out, options[name]) for name in ("predict", "report"))
     run_diagnose(
-        source, output=str(out / PRESET), json_to=str(out / VALUES), predict=predict, report=report,
-        seed=options["seed"], propose=options["propose"],
+        source, output=str(out / CASE_FILES.preset), json_to=str(out / CASE_FILES.values),
+        predict=predict, report=report, seed=options["seed"], propose=options["propose"],
     )  # fmt: skip
 
 

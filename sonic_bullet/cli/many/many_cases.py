@@ -20,7 +20,7 @@ import click
 import msgspec
 
 from sonic_bullet.cli.line_table import finite, write_csv
-from sonic_bullet.cli.many.case_jobs import PRESET, VALUES, WORDS_FILE, CaseFolder, CaseResult, digest, run_case
+from sonic_bullet.cli.many.case_jobs import CASE_FILES, CaseFolder, CaseResult, digest, run_case
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, write_json
 from sonic_bullet.cli.parameters import ManyOptions, cores
 from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
@@ -31,8 +31,6 @@ from sonic_bullet.storage.atomic import replacing, write_errors
 from sonic_bullet.storage.json_text import json_bytes
 
 DONE_FILE = "done.json"
-OUTPUTS = {"picture": "--picture", "csv_to": "--csv", "uff_to": "--uff", "predict": "--predict", "report": "--report"}
-"""Options that name an output, which here is one of each case's."""
 SPLITS = ("fit", "holdout", "transfer")
 
 
@@ -80,8 +78,16 @@ def _check_options(output: str | None, options: Mapping[str, Any]) -> None:
     if of_one := [name for name in OF_ONE_TAKE if options.get(name) not in (None, ())]:
         given = " and ".join(f"--{name.replace('_s', '').replace('_', '-')}" for name in of_one)
         raise FileError(f"{given} given beside cases", "a case says that itself; leave it out")
-    taken = {PRESET, VALUES, WORDS_FILE, DONE_FILE}
-    for name, option in OUTPUTS.items():
+    taken = {CASE_FILES.preset, CASE_FILES.values, CASE_FILES.words, DONE_FILE}
+    # options that name an output, which here is one of each case's
+    outputs = {
+        "picture": "--picture",
+        "csv_to": "--csv",
+        "uff_to": "--uff",
+        "predict": "--predict",
+        "report": "--report",
+    }
+    for name, option in outputs.items():
         value = options.get(name)
         if value is None:
             continue
@@ -146,7 +152,7 @@ def _rows(command: str, place: Path, cases: Iterable[CaseFolder]) -> list[dict[s
     rows = []
     for case in cases:
         if (place / case.name / DONE_FILE).is_file():
-            found = msgspec.json.decode((place / case.name / VALUES).read_bytes())
+            found = msgspec.json.decode((place / case.name / CASE_FILES.values).read_bytes())
             rows.append({"case": case.name, "verdict": found["verdict"], **VALUES_OF[command](found)})
     return rows
 

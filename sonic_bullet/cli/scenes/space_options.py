@@ -23,8 +23,6 @@ OPTIONS = (
     "ambisonics", "head", "facing", "directivity", "microphone_path", "microphone_on", "contact_microphone",
     "vibrometer", "contact_response", "contact_noise",
 )  # fmt: skip
-PATH_COLUMNS = (4, 8)
-"""Of a path's table: time and place, and, it may be, the quaternion."""
 
 
 def space_options(command: Any) -> Any:
@@ -281,6 +279,7 @@ def read_path(path: str) -> Microphone:
         why = getattr(error, "strerror", None) or "no text"
         raise FileError(f"cannot read {path}: {why}", "give a table: time in s, x, y, z in m") from None
     rows: list[list[float]] = []
+    path_columns = (4, 8)  # of a path's table: time and place, and, it may be, the quaternion
     for number, line in enumerate(lines, 1):
         parts = line.replace(";", ",").split(",")
         try:
@@ -289,7 +288,7 @@ def read_path(path: str) -> Microphone:
             if line.strip() and rows:
                 raise FileError(f"{path}:{number}: no row of numbers", "give time in s, x, y, z in m") from None
             continue  # a heading, an empty line
-        if len(row) not in PATH_COLUMNS or (rows and len(row) != len(rows[0])):
+        if len(row) not in path_columns or (rows and len(row) != len(rows[0])):
             raise FileError(
                 f"{path}:{number}: {len(row)} numbers", "give time in s, x, y, z in m, and x, y, z, w of it"
             )

@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog
     from sonic_bullet.session import Listener
 
-MESH_MATERIAL = "steel"
-PROGRAMS, FEW_POINTS = (".dsp", ".h"), 64
-"""Default number of points of programs, whose tables a compiler reads."""
-
 
 @dataclass(frozen=True, slots=True)
 class _StrikeWish:
@@ -47,15 +43,15 @@ class _StrikeWish:
         import numpy as np
 
         from sonic_bullet.bake import choose_strike, render_strike
-        from sonic_bullet.bake.strike_playback import CONTACT_S, IMPULSE_N_S
+        from sonic_bullet.bake.strike_playback import TAP
         from sonic_bullet.files import write_audio
 
         strike = choose_strike(
             model,
             point_m=None if self.strike is None else np.array(self.strike),
             direction=None if self.direction is None else np.array(self.direction),
-            impulse_n_s=self.impulse or IMPULSE_N_S,
-            contact_s=CONTACT_S if self.contact_ms is None else self.contact_ms / 1000,
+            impulse_n_s=self.impulse or TAP.impulse_n_s,
+            contact_s=TAP.contact_s if self.contact_ms is None else self.contact_ms / 1000,
         )
         slowest = float(model.decay_per_s[model.freq_hz < strike_rate_hz / 2].min(initial=np.inf))
         seconds = min(longest_strike_s, strike.contact_s + strike_fall / max(slowest, 1e-3)) or longest_strike_s
@@ -101,10 +97,11 @@ def run_bake(
     if seconds is not None and not whole:
         raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
     notes: tuple[str, ...] = ()
+    programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
     with clean_stdout(json_to) as say:
         from sonic_bullet.bake import PruningOptions, write_baked
 
-        pruning = PruningOptions(modes, below_db, points or (FEW_POINTS if end in PROGRAMS else None))
+        pruning = PruningOptions(modes, below_db, points or (few_points if end in programs else None))
         if whole:
             from sonic_bullet.cli.solids.scene_outputs import write_whole_scene
 
@@ -137,7 +134,8 @@ def _mesh_model(
 
     if len(material) > 1 or (material and "=" in material[0] and not Path(material[0]).is_file()):
         raise MaterialError("a mesh is of one material", "give --material M once")
-    made = load_material(material[0] if material else MESH_MATERIAL)
+    mesh_material = "steel"
+    made = load_material(material[0] if material else mesh_material)
     with status(mesh) as progress:
         return bake_mesh(
             mesh,

@@ -17,6 +17,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,15 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-LEVEL_WINDOW, FLOOR_DB = 1024, -100.0
-"""Log spectra: samples of a frame, and floor re the loudest value of A."""
+
+class _Levels(NamedTuple):
+    """How levels of two logs are compared."""
+
+    window: int = 1024  # log spectra: samples of a frame, and floor re the loudest value of A
+    floor_db: float = -100.0
+
+
+LEVELS = _Levels()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,12 +123,12 @@ def shapley_shares(
 def log_distance(a: Array, b: Array) -> float:
     """Compute the rms difference of levels in dB, over windows and frequencies, of sounds (channels, n)."""
     one, other = _levels(a), _levels(b)
-    floor = float(one.max(initial=-300.0)) + FLOOR_DB
+    floor = float(one.max(initial=-300.0)) + LEVELS.floor_db
     change = np.maximum(one, floor) - np.maximum(other, floor)
     return float(np.sqrt(np.square(change).mean())) if change.size else 0.0
 
 
 def _levels(x: Array) -> Array:
-    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % LEVEL_WINDOW)))
-    frames = padded.reshape(len(x), -1, LEVEL_WINDOW) * np.hanning(LEVEL_WINDOW)
+    padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % LEVELS.window)))
+    frames = padded.reshape(len(x), -1, LEVELS.window) * np.hanning(LEVELS.window)
     return np.asarray(10 * np.log10(np.abs(np.fft.rfft(frames, axis=2)) ** 2 + 1e-300))

@@ -19,16 +19,6 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
 from sonic_bullet.records import Array, Body
 
-ONE_BODY = {
-    ("mass_kg",): "mass",
-    ("dynamics", "mass"): "mass",
-    ("inertia_kg_m2",): "inertia",
-    ("volume_m3",): "shape",
-    ("curvature_per_m",): "shape",
-}
-SHAPE_SHARE = 2e-3
-"""Relative tolerance of a volume: two meshes of one shape differ by less at this project's element sizes."""
-
 Exchange = Callable[[ContactLog, ContactLog], ContactLog]
 
 
@@ -138,8 +128,15 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
 
 def _quantity(path: Path) -> tuple[str, str]:
     """Name the quantity of a leaf, and whether it acts on contacts or on sound alone."""
-    if path in ONE_BODY:
-        return ONE_BODY[path], "contacts"
+    one_body = {
+        ("mass_kg",): "mass",
+        ("dynamics", "mass"): "mass",
+        ("inertia_kg_m2",): "inertia",
+        ("volume_m3",): "shape",
+        ("curvature_per_m",): "shape",
+    }
+    if path in one_body:
+        return one_body[path], "contacts"
     acts = "sound" if path[0] in ("material", "options", "mounting") else "contacts"
     return ONE_QUANTITY.get(path[-1], path[-1]), acts
 
@@ -150,9 +147,11 @@ def _without_what_follows(found: dict[str, Logged], one: Body, other: Body) -> N
         grown = one.inertia_kg_m2 * (other.mass_kg / one.mass_kg)
         if np.allclose(grown, other.inertia_kg_m2, rtol=1e-6, atol=1e-18):
             found.pop("inertia")
+    # relative tolerance of a volume: two meshes of one shape differ by less at this project's element sizes
+    shape_share = 2e-3
     if "mesh" in found:
         collides_alike = "inertia" not in found and one.mass_kg > 0  # then the surface that sounds alone is another
-        large = abs(one.volume_m3 - other.volume_m3) > SHAPE_SHARE * max(one.volume_m3, other.volume_m3)
+        large = abs(one.volume_m3 - other.volume_m3) > shape_share * max(one.volume_m3, other.volume_m3)
         found.pop("mesh" if large and "shape" in found and not collides_alike else "shape", None)
     if "shape" in found:
         found.pop("inertia", None)

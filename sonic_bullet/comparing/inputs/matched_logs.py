@@ -20,8 +20,6 @@ from sonic_bullet.records.errors import CompareError
 
 NO_NAME = re.compile(r"^(body \d+|link\d+|baseLink)( #?\d+)?$")
 """Names that a simulator gives to bodies without one."""
-NO_INPUT = ("body_id", "link", "epoch", "name", "since_step", "until_step", "model")
-"""Fields of a body that identify it and its lifetime; its modes follow from the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +34,10 @@ class FirstDifference:
 def body_leaves(body: Body) -> dict[tuple[str, ...], Any]:
     """Return all inputs of a body, by path."""
     found: dict[tuple[str, ...], Any] = {}
+    # fields of a body that identify it and its lifetime; its modes follow from the rest
+    no_input = ("body_id", "link", "epoch", "name", "since_step", "until_step", "model")
     for one in fields(body):
-        if one.name not in NO_INPUT:
+        if one.name not in no_input:
             found |= dict(leaves(getattr(body, one.name), (one.name,)))
     return found
 

@@ -7,7 +7,7 @@ T60: the slope of the backward integral of p² between −5 and −25 dB [Schroe
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,10 +16,18 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
 AUDIBLE_OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
-QUIET_DB = -80.0
-"""Level re the loudest band below which bands are not compared."""
-ONSET_FRAME_S, ONSET_RISE_DB, BEFORE_S = 0.004, 10.0, 0.03
-"""Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one."""
+
+
+class _Onset(NamedTuple):
+    """Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one."""
+
+    # Onset: an envelope of 4 ms that rises by 10 dB above the 30 ms before; closer onsets are one
+    frame_s: float = 0.004
+    rise_db: float = 10.0
+    before_s: float = 0.03
+
+
+ONSET = _Onset()
 
 
 def at_common_rate(a: Array, b: Array, sr_a: int, sr_b: int) -> tuple[Array, Array, int]:
@@ -76,7 +84,8 @@ def _levels(a: Array, b: Array, sr: int) -> Consequence | None:
     top = max(one.max(initial=-np.inf), other.max(initial=-np.inf))
     if not math.isfinite(top):
         return None
-    loud = np.maximum(one, other) > top + QUIET_DB
+    quiet_db = -80.0  # level re the loudest band below which bands are not compared
+    loud = np.maximum(one, other) > top + quiet_db
     if not (np.isfinite(one[loud]).all() and np.isfinite(other[loud]).all()):
         which = "A" if not np.isfinite(one[loud]).all() else "B"
         return Consequence("level", f"{which} is silent in some bands where the other is not")
@@ -101,19 +110,19 @@ def level_words(change_db: float, unit: str = "dB", digits: int = 2) -> str:
 def onsets_s(x: Array, sr: int) -> list[float]:
     """Return the times of onsets, in s."""
     floor_db = -50.0  # Lowest level of an onset re the loudest moment
-    hop = max(1, round(ONSET_FRAME_S * sr / 2))
+    hop = max(1, round(ONSET.frame_s * sr / 2))
     square = np.square(x).sum(axis=0)
     count = len(square) // hop
     if count < 4:
         return []
     envelope = square[: count * hop].reshape(count, hop).mean(axis=1)
     level = 10 * np.log10(envelope + 1e-300)
-    back = max(2, round(BEFORE_S * sr / hop))
+    back = max(2, round(ONSET.before_s * sr / hop))
     found: list[float] = []
     last = -back
     for i in range(count):
         before = level[max(0, i - back) : i].max(initial=-3000.0)
-        if level[i] > level.max() + floor_db and level[i] > before + ONSET_RISE_DB and i - last >= back:
+        if level[i] > level.max() + floor_db and level[i] > before + ONSET.rise_db and i - last >= back:
             found.append(i * hop / sr)
             last = i
     return found
@@ -123,12 +132,12 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
     one, other = onsets_s(a, sr), onsets_s(b, sr)
     if len(one) != len(other):
         shared = min(len(one), len(other))
-        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > ONSET_FRAME_S), None)
+        at = next((min(x, y) for x, y in zip(one, other, strict=False) if abs(x - y) > ONSET.frame_s), None)
         longer = one if len(one) > len(other) else other
         at = longer[shared] if at is None else at
         words = f"{format_count(len(one), 'onset')} in A, {len(other)} in B"
         return Consequence("onset", words, at, {"a_s": one, "b_s": other})
-    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > ONSET_FRAME_S / 2]
+    moved = [(y - x, x) for x, y in zip(one, other, strict=True) if abs(y - x) > ONSET.frame_s / 2]
     if not moved:
         return None
     most = max(moved, key=lambda pair: abs(pair[0]))

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet.effects.protocol import Elastic, Poisson
-from sonic_bullet.estimator.fit.case_fit import POISSON_SD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.case_fit import POISSON, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.radiation_share import into_air
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.recorded import body_family, guess_of
@@ -176,7 +176,7 @@ def _placed(found: CaseFit, name: str, family: Family, density: float, o: Object
         lam, turned = lowest(poisson)
         return np.sqrt(lam) / (2 * np.pi), vector.T @ turned
 
-    nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON_SD, sums)
+    nu = Poisson(found.fit.poisson_ratio, guess_of(case.objects[name]).poisson, POISSON.sd, sums)
     recorded = o.evidence if o is not None else None
     return Struck(
         name,

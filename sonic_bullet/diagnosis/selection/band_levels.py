@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.selection.thresholds import RULES
-from sonic_bullet.estimator.lines.log_spectral import ABOVE_NOISE, Floor
+from sonic_bullet.estimator.lines.log_spectral import SPECTRAL, Floor
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 
@@ -120,7 +120,9 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
         n = _within(floor.at(w // 2 + 1) * (np.hanning(w) ** 2).sum() * _frames(len(recorded), w), *mine, cell)
         more, less = 10 * np.log10(np.maximum(a, n) / (near_b + n)), 10 * np.log10(np.maximum(near_a, n) / (b + n))
         found[who] = np.where(
-            (a > ABOVE_NOISE * n) | (b > ABOVE_NOISE * n), np.maximum(more, 0) + np.minimum(less, 0), np.nan
+            (a > SPECTRAL.above_noise * n) | (b > SPECTRAL.above_noise * n),
+            np.maximum(more, 0) + np.minimum(less, 0),
+            np.nan,
         )
     return found
 

@@ -7,7 +7,7 @@ them; none of those knows another.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,21 @@ from sonic_bullet.estimator.lines.line_values import MaterialFit
 from sonic_bullet.files.cases import Case
 from sonic_bullet.records import Array
 
-POISSON_SD = 0.04  # of a guess
+
+class _Poisson(NamedTuple):
+    """What is known of Poisson's ratio."""
+
+    sd: float = 0.04  # of a guess
+    identified: float = 0.03  # a spread of ν above this says nothing that the guess did not
+
+
+POISSON = _Poisson()
+
 RadiationIn = Literal["nothing", "apart", "damping"]
 """Where a fit has what the air takes: nowhere, as nothing is lost to a medium; apart from the material's α and β; or in
 them, where the two cannot be separated.
 """
 NO_GAIN = "no gain makes it nearer than silence"
-POISSON_IDENTIFIED = 0.03  # a spread of ν above this says nothing that the guess did not
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,7 @@
 """How many strong lines pair with a mesh's modes, and how many would by chance.
 
     lines (f_k) of recordings, modes (γ, ν) -> pairs (material_fit.py)          n strong lines paired of N
-    lines (f_k e^{δ_c}), clusters c moved at random -> pairs, `DRAWS` times     n_1 … n_D
+    lines (f_k e^{δ_c}), clusters c moved at random -> pairs, eight times       n_1 … n_D
     by chance: n ≤ max n_i
 
 The moved lines are searched through the same γ and ν as those recorded, so that the freedom of the search is in n_i. No
@@ -22,9 +22,6 @@ from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.records import Array
 
 PAIRED = 0.6  # share of the strong lines that are to be modes
-DRAWS = 8
-MOVED_MOST = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
-CLUSTER = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
 
 Placing = Callable[[tuple[RecordedObject, ...]], tuple[Pairs, ...]]
 
@@ -42,7 +39,8 @@ def paired_by_chance(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...
     if found >= PAIRED * strong or strong <= unknowns:
         return False
     random = np.random.default_rng(0)
-    for _ in range(DRAWS):
+    draws = 8
+    for _ in range(draws):
         moved = tuple(replace(e, lines=_moved(e.lines, random)) for e in shaped)
         if _strong_paired(moved, place(moved)) >= found:
             return True
@@ -56,8 +54,10 @@ def _strong_paired(shaped: tuple[RecordedObject, ...], pairs: tuple[Pairs, ...])
 def _moved(lines: Lines, random: np.random.Generator) -> Lines:
     """Lines whose clusters stand elsewhere, as loud and as long as they were."""
     order = np.argsort(lines.freq_hz)
-    cluster = np.cumsum(np.diff(np.log(lines.freq_hz[order]), prepend=0.0) > CLUSTER)
-    off = random.uniform(-MOVED_MOST, MOVED_MOST, len(order) + 1)[cluster]
+    cluster_width = 0.02  # of ln f: lines nearer than this move together, as a body's close modes stay close
+    cluster = np.cumsum(np.diff(np.log(lines.freq_hz[order]), prepend=0.0) > cluster_width)
+    most_moved = 0.06  # of ln f, at most: ten times the widest that a pair may be apart
+    off = random.uniform(-most_moved, most_moved, len(order) + 1)[cluster]
     freq = lines.freq_hz.copy()
     freq[order] *= np.exp(off)
     return replace(lines, freq_hz=freq)

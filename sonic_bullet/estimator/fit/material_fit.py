@@ -18,17 +18,17 @@ from dataclasses import replace
 import numpy as np
 
 from sonic_bullet.effects.common.hum import without_hum
-from sonic_bullet.estimator.fit.case_fit import POISSON_IDENTIFIED, POISSON_SD, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.case_fit import POISSON, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.chance_pairs import paired_by_chance
 from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.held_out_takes import judged_by_takes
-from sonic_bullet.estimator.fit.object_fit import SHAPE_CORRECTION, fitted_object, gain_of, object_of
-from sonic_bullet.estimator.fit.pairing import GAMMA_REACH, MESH_SD, Pairs, assign, best_pairs, grouped, paired, solve
-from sonic_bullet.estimator.fit.radiation_share import KNOWN, Radiated, in_air, radiation_in
+from sonic_bullet.estimator.fit.object_fit import fitted_object, gain_of, object_of
+from sonic_bullet.estimator.fit.pairing import PAIRING, Pairs, assign, best_pairs, grouped, paired, solve
+from sonic_bullet.estimator.fit.radiation_share import Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
-from sonic_bullet.estimator.lines.joint_lines import HIGHEST_OF_RATE, RINGING_LINES, Lines, noise_rms
+from sonic_bullet.estimator.lines.joint_lines import JOINT, Lines, noise_rms
 from sonic_bullet.files.cases import Case
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import one_thread
@@ -37,9 +37,7 @@ from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.storage.cache import Place
 
 __all__ = [
-    "POISSON_IDENTIFIED",
-    "POISSON_SD",
-    "SHAPE_CORRECTION",
+    "POISSON",
     "CaseFit",
     "ObjectFit",
     "choose_lines",
@@ -74,7 +72,7 @@ def choose_lines(case: Case, evidence: tuple[RecordedObject, ...]) -> tuple[Reco
     if not shaped or not _by_chance(case, shaped, _placed(shaped, case.band_hz)[0]):
         return evidence
     after = tuple(replace(e, lines=_lines_after_attack(case, e), ringing=True) for e in shaped)
-    if any(len(e.lines.freq_hz) < RINGING_LINES for e in after):
+    if any(len(e.lines.freq_hz) < JOINT.ringing_lines for e in after):
         return evidence
     if _by_chance(case, after, _placed(after, case.band_hz)[0]):
         return evidence
@@ -86,7 +84,7 @@ def _lines_after_attack(case: Case, e: RecordedObject) -> Lines:
     assert e.signals is not None
     still = without_hum(e.signals, noise_rms(e.signals, e.sr), e.sr)
     return ringing_lines(
-        still, e.sr, (case.band_hz[0], min(case.band_hz[1], HIGHEST_OF_RATE * e.sr)), signed=e.lines.signed
+        still, e.sr, (case.band_hz[0], min(case.band_hz[1], JOINT.highest_of_rate * e.sr)), signed=e.lines.signed
     )
 
 
@@ -127,7 +125,8 @@ def fit_evidence(
     air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart) for e in shaped)
     lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))
-    damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, KNOWN * extra), start, decay)
+    known_share = 0.02  # relative: what radiation theory and mesh leave open of a mode's Δd
+    damping = rayleigh(lam, decay - extra, np.hypot(decay_sd, known_share * extra), start, decay)
     objects = tuple(
         fitted_object(e, p, a, damping, case.band_hz, taken_off=apart)
         for e, p, a in zip(shaped, pairs, air, strict=True)
@@ -150,16 +149,17 @@ def _placed(shaped: tuple[RecordedObject, ...], band_hz: tuple[float, float]) ->
     guess = shaped[0].guess
     centre = float(np.log(guess.youngs_pa / guess.density_kg_m3))
     starts = []
+    gamma_reach = 0.65  # of ln γ: E and ρ both wrong by 30 %
     for e in shaped:
         if e.family is not None and e.seen is not None and len(e.lines.freq_hz):
-            starts += best_pairs(e.family, e.lines, e.seen, centre, guess.poisson, band_hz, GAMMA_REACH)
+            starts += best_pairs(e.family, e.lines, e.seen, centre, guess.poisson, band_hz, gamma_reach)
     starts = starts or [(centre, guess.poisson)]
     ends = []
     for start in starts:
         common, best = start, None
         for e in shaped:  # one object after another leads to the common place, then all from there
             if e.family is not None and e.seen is not None and len(e.lines.freq_hz):
-                p = paired(e.family, e.lines, e.seen, common, guess.poisson, POISSON_SD)
+                p = paired(e.family, e.lines, e.seen, common, guess.poisson, POISSON.sd)
                 common = (p.log_gamma, p.poisson)
         best = _together(shaped, common, guess.poisson)
         ends.append((sum(p.cost for p in best[0]), best))
@@ -171,10 +171,10 @@ def _together(
 ) -> tuple[tuple[Pairs, ...], Array, float]:
     """Assign and solve for all objects at once until nothing moves.
 
-    What the modes scatter is then learnt, in place of `MESH_SD`.
+    What the modes scatter is then learnt, in place of `PAIRING.mesh_sd`.
     """
     log_gamma, poisson = start
-    information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, MESH_SD
+    information, scatter, mesh_sd = np.zeros((2, 2)), np.nan, PAIRING.mesh_sd
     pairs: list[Pairs] = []
     for turn in range(12):
         pairs, information, pull, offs = [], np.zeros((2, 2)), np.zeros(2), []
@@ -182,7 +182,7 @@ def _together(
             if e.family is None or e.seen is None:
                 continue
             group = grouped(e.family, e.seen, log_gamma, poisson)
-            line, mode, cost = assign(group, e.lines, e.seen, MESH_SD)
+            line, mode, cost = assign(group, e.lines, e.seen, PAIRING.mesh_sd)
             pairs.append(Pairs(log_gamma, poisson, line, mode, cost))
             if len(line) == 0:
                 continue
@@ -194,14 +194,14 @@ def _together(
             break
         weight, off = np.concatenate(offs, axis=1)
         scatter = float(np.sqrt((weight * off**2).sum() / max(weight.sum() - 2, 1)))
-        poisson_identified = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON_IDENTIFIED**2
-        prior = np.diag([1e-12, 0.0 if poisson_identified else POISSON_SD**-2])
+        poisson_identified = np.linalg.det(information) > 0 and np.linalg.inv(information)[1, 1] < POISSON.identified**2
+        prior = np.diag([1e-12, 0.0 if poisson_identified else POISSON.sd**-2])
         step = np.linalg.solve(information + prior, pull - prior @ (0.0, poisson - guess_poisson))
         log_gamma += float(np.clip(step[0], -0.05, 0.05))
         poisson = float(np.clip(poisson + np.clip(step[1], -0.02, 0.02), -0.45, 0.48))
         pairs = [replace(p, log_gamma=log_gamma, poisson=poisson) for p in pairs]
         if turn >= 3:
-            mesh_sd = float(np.clip(scatter, 1e-7, 4 * MESH_SD)) if len(off) > 3 else MESH_SD
+            mesh_sd = float(np.clip(scatter, 1e-7, 4 * PAIRING.mesh_sd)) if len(off) > 3 else PAIRING.mesh_sd
             if np.abs(step).max() < 1e-9:
                 break
     return tuple(pairs), information, scatter

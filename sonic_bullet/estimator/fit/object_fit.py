@@ -20,8 +20,6 @@ from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Material
 
-SHAPE_CORRECTION = 0.01
-
 
 def fitted_object(
     e: RecordedObject,
@@ -50,7 +48,8 @@ def fitted_object(
     )
     undamped = np.sqrt((2 * np.pi * measured) ** 2 + np.nan_to_num(measured_decay) ** 2) / (2 * np.pi)
     good = np.isfinite(undamped)
-    ratio[good] = np.clip(undamped[good] / group.freq_hz[good], 1 - SHAPE_CORRECTION, 1 + SHAPE_CORRECTION)
+    shape_correction = 0.01
+    ratio[good] = np.clip(undamped[good] / group.freq_hz[good], 1 - shape_correction, 1 + shape_correction)
     true_lam = lam * ratio**2
     decay = (damping.alpha_per_s + damping.beta_s * true_lam) / 2 + extra
     alive = decay**2 < 0.98 * np.minimum(lam, true_lam)

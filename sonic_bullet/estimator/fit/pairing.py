@@ -8,12 +8,14 @@
     solve    ln γ and ν by least squares on ln λ, outliers down-weighted
         [Cauchy's weight: Holland & Welsch 1977]
 
-Modes closer than DEGENERATE_SPLIT are one: their shapes within the pair are anyone's, the sum over the pair is not.
+Modes closer than `PAIRING.degenerate_split` are one: their shapes within the pair are anyone's, the sum over the pair
+is not.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,14 +25,16 @@ from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 
-DEGENERATE_SPLIT = 6e-4
-MESHED = 2.5  # times as far apart where elements have split them
-MESH_SD = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
-GAMMA_REACH = 0.65  # of ln γ: E and ρ both wrong by 30 %
-HEAPED = 10.0  # times the energy of all lines: what none can hold that is not cancelled
-# times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first
-# milliseconds are made of such lines, bodies' modes seldom
-BRIEF_RATIO = 25.0
+
+class _Pairing(NamedTuple):
+    """How lines and modes are paired."""
+
+    degenerate_split: float = 6e-4
+    meshed: float = 2.5  # times as far apart where elements have split them
+    mesh_sd: float = 2.5e-3  # of a mode's frequency, the mesh's and the shape's own error
+
+
+PAIRING = _Pairing()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +65,10 @@ def grouped(family: Family, seen: Observation, log_gamma: float, poisson: float)
     """Return the family's modes as lines at (γ, ν)."""
     value, vector = family.modes(1.0, poisson)
     freq = np.sqrt(value) / (2 * np.pi)
-    cut = np.flatnonzero(np.diff(np.log(freq)) > DEGENERATE_SPLIT * (MESHED if family.meshed else 1.0)) + 1
+    cut = (
+        np.flatnonzero(np.diff(np.log(freq)) > PAIRING.degenerate_split * (PAIRING.meshed if family.meshed else 1.0))
+        + 1
+    )
     member = tuple(np.split(np.arange(len(freq)), cut))
     sums = np.zeros((len(freq), len(member)))
     for g, who in enumerate(member):
@@ -127,12 +134,15 @@ def _rings(lines: Lines) -> Array:
     middle = order[np.searchsorted(share, share[-1] / 2)]
     # what loses as much a cycle ends sooner
     typical = max(float(decay[middle]), 1.0) * np.maximum(lines.freq_hz / lines.freq_hz[middle], 1.0)
-    rings = np.clip(BRIEF_RATIO * typical / np.maximum(decay, 1e-9), never, 1.0)
+    # times the decay that holds half of the energy, higher up times its loss factor: clicks, filters' and rooms' first
+    # milliseconds are made of such lines, bodies' modes seldom
+    brief_ratio = 25.0
+    rings = np.clip(brief_ratio * typical / np.maximum(decay, 1e-9), never, 1.0)
     return np.asarray(np.where(piled, 0.0, np.where(decay > PINNED * FASTEST_PER_S, np.minimum(rings, never), rings)))
 
 
 def heaped(lines: Lines) -> Array:
-    """Say which lines (k,) are mostly cancelled by others: alone they would hold HEAPED times the energy of all.
+    """Say which lines (k,) are mostly cancelled by others: alone they would hold ten times the energy of all.
 
     ∫ |Σ A e^{pt}|² dt = −Σ_jk A_j Ā_k/(p_j + p̄_k)
     """
@@ -142,7 +152,8 @@ def heaped(lines: Lines) -> Array:
     shared = -1 / (pole[:, None] + pole.conj())
     together = np.maximum(np.einsum("sj,jk,sk->s", a, shared, a.conj()).real, 0)
     alone = np.abs(a) ** 2 / (2 * lines.decay_per_s)
-    return np.asarray((alone > HEAPED * together[:, None]).any(axis=0))
+    cancelled_ratio = 10.0  # times the energy of all lines: what none can hold that is not cancelled
+    return np.asarray((alone > cancelled_ratio * together[:, None]).any(axis=0))
 
 
 def _overlap(a: Array, b: Array, width: float) -> Array:
@@ -241,7 +252,7 @@ def solve(
     mode: Array,
     poisson_off: float,
     poisson_sd: float,
-    mesh_sd: float = MESH_SD,
+    mesh_sd: float = PAIRING.mesh_sd,
 ) -> tuple[Array, Array, Array]:
     """Step (2,) of ln γ and ν, information (2, 2) of the lines alone, and the weights (p,) left by outliers.
 

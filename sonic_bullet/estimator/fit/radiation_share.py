@@ -22,8 +22,6 @@ from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.records import Air, Array, ModalModel
 
-KNOWN = 0.02  # relative: what radiation theory and mesh leave open of a mode's Δd
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Radiated:

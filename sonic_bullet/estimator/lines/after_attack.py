@@ -2,10 +2,10 @@
 
 The first milliseconds of a real take hold the striker, slaps and a room, and its modes are not exactly exponential.
 
-    signals (s, n) -> bands of BAND_HZ about their centre, decimated, once the band's filter is full: after the attack
+    signals (s, n) -> bands of 400 Hz about their centre, decimated, once the band's filter is full: after the attack
     -> poles of a band, of all recordings at once (ESPRIT)           [Roy & Kailath 1989, eq. 3.12-3.17]
     -> the one that takes most, of what is left the next           [Pati, Rezaiifar & Krishnaprasad 1993], while it
-         has OWN_SHARE of its energy apart from those chosen: what cancels is no line
+         has half of its energy apart from those chosen: what cancels is no line
          stands out of what is left about it while it rings:
              T = Σ_s |<q, r_s>|²/D_s > chance,  D = Σ |r|²|e|²/Σ |e|²             [Kay 1998, ch. 7.6]
     -> poles at the least sum of squares, amplitudes projected out             [Golub & Pereyra 1973; Kaufman 1975]
@@ -25,13 +25,6 @@ from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-BAND_HZ, PASS_WIDTHS, STOP_WIDTHS, OVERSAMPLED = (
-    400.0,
-    0.5,
-    1.5,
-    2.0,
-)  # of a band's width from its centre; rate over width
-OWN_SHARE = 0.5
 WIDTHS_AROUND = 7  # widths, from two on, above and below a line
 
 
@@ -86,8 +79,10 @@ def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]
     stop_db = 100.0
     from scipy.fft import fft, ifft, next_fast_len
 
-    step = max(1, int(sr / (OVERSAMPLED * BAND_HZ)))
-    taps = low_pass(PASS_WIDTHS * BAND_HZ / sr, STOP_WIDTHS * BAND_HZ / sr, stop_db)
+    # of a band's width from its centre; rate over width
+    width_hz, pass_widths, stop_widths, oversampled = 400.0, 0.5, 1.5, 2.0
+    step = max(1, int(sr / (oversampled * width_hz)))
+    taps = low_pass(pass_widths * width_hz / sr, stop_widths * width_hz / sr, stop_db)
     count = max(0, -(-(signals.shape[1] - len(taps) + 1) // step))
     points = next_fast_len(-(-(signals.shape[1] + len(taps)) // step))
     whole = points * step
@@ -95,14 +90,14 @@ def _bands(signals: Array, sr: int, band_hz: tuple[float, float]) -> list[_Band]
     weight = fft(np.roll(np.pad(taps, (0, whole - len(taps))), 1 - len(taps))) / step  # its first sample is a full one
     floors = [floor_between([signal]).variance for signal in signals]
     made = []
-    for low in np.arange(band_hz[0], band_hz[1], BAND_HZ):
-        at = round((low + BAND_HZ / 2) / sr * whole)
+    for low in np.arange(band_hz[0], band_hz[1], width_hz):
+        at = round((low + width_hz / 2) / sr * whole)
         band = np.roll(spectrum, -at, axis=1) * weight  # every step-th sample: what lies a rate apart adds up
         series = ifft(band.reshape(len(band), step, points).sum(axis=1), axis=1)[:, :count]
-        place = np.linspace(low, low + BAND_HZ, 16) / (sr / 2)
+        place = np.linspace(low, low + width_hz, 16) / (sr / 2)
         noise = np.array([np.interp(place, np.linspace(0, 1, len(floor)), floor).mean() for floor in floors])
         noise = np.sqrt(noise * (taps**2).sum())
-        high = min(low + BAND_HZ, band_hz[1])
+        high = min(low + width_hz, band_hz[1])
         made.append(_Band(low, high, at * sr / whole, step, taps, series / noise[:, None], noise))
     return made
 
@@ -174,11 +169,13 @@ def _selected(y: Array, pole: Array, least: float) -> Array:
     own = np.diag(whole).real
     free, found = np.ones(len(pole), bool), list[int]()
 
+    own_share = 0.5
+
     def strongest(gram: Array, seen: Array, among: Array) -> tuple[int, Array, Array, Array]:
         """Its number or -1, what it takes (s,); Gram matrix and moments without it. All are apart from those chosen."""
         new = np.diag(gram).real
         taken = np.abs(seen) ** 2 / np.maximum(new, 1e-300)
-        worth = np.where(among & (new > OWN_SHARE * own), taken.sum(axis=0), -1.0)
+        worth = np.where(among & (new > own_share * own), taken.sum(axis=0), -1.0)
         k = int(worth.argmax())
         if worth[k] < least:
             return -1, taken[:, k], gram, seen

@@ -15,14 +15,24 @@ whether they are its modes.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.estimator.lines import likelihood
 from sonic_bullet.estimator.lines.likelihood import Sinusoids
 from sonic_bullet.records import Array
 
-EDGE, FALL = 1e-7, 5.0
-POLISHED, POLISHED_ROUNDED, POLISH_STEPS = 3000, 10_000, 5
+
+class _Polish(NamedTuple):
+    """Samples up to which exact modes are polished, and its steps."""
+
+    samples: int = 3000
+    samples_rounded: int = 10_000
+    steps: int = 5
+
+
+POLISH = _Polish()
 
 
 def modes(signal: Array, sr: int) -> Sinusoids | None:
@@ -35,12 +45,12 @@ def modes(signal: Array, sr: int) -> Sinusoids | None:
         if rows + columns - 1 > len(signal):
             break
         pole = _poles(signal[: rows + columns - 1], rows)
-        if pole is None or not len(pole) or (pole.real * POLISHED_ROUNDED > 1).any():
+        if pole is None or not len(pole) or (pole.real * POLISH.samples_rounded > 1).any():
             continue
-        sound = signal[:POLISHED]
+        sound = signal[: POLISH.samples]
         found = _polished(sound, _amplitudes(sound, pole * sr, sr), sr)
         if rounded * rms < _left(signal, found, sr) < 100 * left_most * rms:
-            found = _polished(signal[:POLISHED_ROUNDED], found, sr)
+            found = _polished(signal[: POLISH.samples_rounded], found, sr)
         if _left(signal, found, sr) < left_most * rms:
             return found
     return None
@@ -57,10 +67,11 @@ def _poles(signal: Array, rows: int) -> Array | None:
     """Poles per sample (k,) of the upper half plane, or None where the singular values do not fall to rounding."""
     hankel = np.lib.stride_tricks.sliding_window_view(signal, len(signal) - rows + 1)
     power = np.linalg.eigvalsh(hankel @ hankel.T)
-    if power[0] > EDGE**2 * power[-1]:  # quickly: noise fills it
+    edge, least_fall = 1e-7, 5.0
+    if power[0] > edge**2 * power[-1]:  # quickly: noise fills it
         return None
     left, size, _ = np.linalg.svd(hankel, full_matrices=False)
-    fall = (size[:-1] > FALL * size[1:]) & (size[1:] < EDGE * size[0]) & (size[:-1] > 1e-15 * size[0])
+    fall = (size[:-1] > least_fall * size[1:]) & (size[1:] < edge * size[0]) & (size[:-1] > 1e-15 * size[0])
     if not fall.any():
         return None
     order = int(np.flatnonzero(fall)[-1]) + 1
@@ -96,7 +107,7 @@ def _polished(signal: Array, start: Sinusoids, sr: int) -> Sinusoids:
     """Down to rounding: a step that does not lower the residual is the last."""
     k = len(start.pole)
     left = likelihood.residual(signal, start, sr)
-    for _ in range(POLISH_STEPS):
+    for _ in range(POLISH.steps):
         step = _solved(_jacobian(start.pole, start.amplitude, sr, len(signal)), left)
         if (np.abs(step[: 2 * k]).reshape(2, k) > 1e3 + np.abs(start.pole)).any():
             break

@@ -11,18 +11,25 @@ distance.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
 
-DISTANCE_WINDOWS = (512, 2048, 8192)
-ABOVE_NOISE = 10.0  # m: cells 10 dB above the noise count
-FEWEST_CELLS = 20  # cells of a window that may speak for itself
-FLOOR_WINDOW = 1024
-HIDING = 1e30  # variance over which nothing stands
-QUARTILE = float(np.log(4 / 3))  # of an exponential law over its mean
+
+class _SpectralDistance(NamedTuple):
+    """Numbers of the distance between spectra above a noise."""
+
+    windows: tuple[int, int, int] = (512, 2048, 8192)
+    above_noise: float = 10.0  # m: cells 10 dB above the noise count
+    fewest_cells: int = 20  # cells of a window that may speak for itself
+    floor_window: int = 1024
+    hiding: float = 1e30  # variance over which nothing stands
+
+
+SPECTRAL = _SpectralDistance()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +58,7 @@ class Floor:
     def within(self, sr: int, band_hz: tuple[float, float]) -> Floor:
         """Limit it to a band: outside it no sound stands above the noise."""
         freq = np.linspace(0, sr / 2, len(self.variance))
-        return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), HIDING, self.variance))
+        return Floor(np.where((freq < band_hz[0]) | (freq > band_hz[1]), SPECTRAL.hiding, self.variance))
 
 
 def _taken_in(variance: Array, wide: float) -> Array:
@@ -67,7 +74,7 @@ def floor_of(residual: Array) -> Floor:
 
     Medians over time, so that what still rings does not count.
     """
-    window = min(FLOOR_WINDOW, len(residual) // 4)
+    window = min(SPECTRAL.floor_window, len(residual) // 4)
     shape = np.hanning(window)
     frames = np.lib.stride_tricks.sliding_window_view(residual, window)[:: window // 2]
     power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum()
@@ -84,7 +91,7 @@ def floor_between(signals: list[Array]) -> Floor:
     most = 8192  # of its window, where recordings are long: low noise needs narrow bins
     side = 8  # bins of the short window to each side
     length = min(len(signal) for signal in signals)
-    window = max(FLOOR_WINDOW, 1 << int(np.log2(max(min(length // 6, most), 1))))
+    window = max(SPECTRAL.floor_window, 1 << int(np.log2(max(min(length // 6, most), 1))))
     rows = []
     shape = np.hanning(window)
     for signal in signals:
@@ -93,8 +100,9 @@ def floor_between(signals: list[Array]) -> Floor:
             tail = np.pad(tail, (0, window - len(tail)))
         frames = np.lib.stride_tricks.sliding_window_view(tail, window)[:: window // 2]
         rows.append(np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum())
-    level = np.quantile(np.concatenate(rows), 0.25, axis=0) / QUARTILE
-    return Floor(np.maximum(_broad(level, side * window // FLOOR_WINDOW), 1e-24))
+    quartile = float(np.log(4 / 3))  # of an exponential law over its mean
+    level = np.quantile(np.concatenate(rows), 0.25, axis=0) / quartile
+    return Floor(np.maximum(_broad(level, side * window // SPECTRAL.floor_window), 1e-24))
 
 
 def _broad(level: Array, side: int) -> Array:
@@ -123,18 +131,23 @@ def white(rms: float) -> Floor:
 
 
 def log_spectral_db(
-    a: Array, b: Array, floor: Floor, *, windows: tuple[int, ...] = DISTANCE_WINDOWS, above: float = ABOVE_NOISE
+    a: Array,
+    b: Array,
+    floor: Floor,
+    *,
+    windows: tuple[int, ...] = SPECTRAL.windows,
+    above: float = SPECTRAL.above_noise,
 ) -> float:
     """Distance D of two sounds (n,), each with a noise like ``floor`` in it; NaN where no cell stands above it.
 
     A sound without noise (a prediction) must be given some, or its silence counts: see `with_noise`. Windows with
-    FEWEST_CELLS cells speak, or, where none has so many, all: of fewer, one in which noise happens to cancel a sound
+    20 cells speak, or, where none has so many, all: of fewer, one in which noise happens to cancel a sound
     says more than all others.
     """
     return spectra_distance_db(power_spectra(a, windows), power_spectra(b, windows), floor, above=above)
 
 
-def power_spectra(sound: Array, windows: tuple[int, ...] = DISTANCE_WINDOWS) -> tuple[Array, ...]:
+def power_spectra(sound: Array, windows: tuple[int, ...] = SPECTRAL.windows) -> tuple[Array, ...]:
     """Powers (frames, bins) of a sound (n,) under each window that fits into it."""
     return tuple(_power(sound, window) for window in windows if window <= len(sound))
 
@@ -145,7 +158,7 @@ def noise_spectra(floor: Floor, like: tuple[Array, ...]) -> tuple[Array, ...]:
 
 
 def spectra_distance_db(
-    a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = ABOVE_NOISE
+    a: tuple[Array, ...], b: tuple[Array, ...], floor: Floor, *, above: float = SPECTRAL.above_noise
 ) -> float:
     """Distance D of two sounds by their powers, as `log_spectral_db`."""
     found: list[float] = []
@@ -155,7 +168,7 @@ def spectra_distance_db(
         if observed.any():
             tiny = np.broadcast_to(1e-3 * cell, observed.shape)[observed]
             off = float(np.sqrt(((10 * np.log10((power_a[observed] + tiny) / (power_b[observed] + tiny))) ** 2).mean()))
-            (found if observed.sum() >= FEWEST_CELLS else few).append(off)
+            (found if observed.sum() >= SPECTRAL.fewest_cells else few).append(off)
     return float(np.mean(found or few)) if found or few else float("nan")
 
 
@@ -170,8 +183,8 @@ def noise_floor_db(
     floor: Floor,
     *,
     seeds: tuple[int, int] = (1, 2),
-    windows: tuple[int, ...] = DISTANCE_WINDOWS,
-    above: float = ABOVE_NOISE,
+    windows: tuple[int, ...] = SPECTRAL.windows,
+    above: float = SPECTRAL.above_noise,
 ) -> float:
     """D of two noisy takes of one clean sound (n,)."""
     return log_spectral_db(

@@ -17,7 +17,6 @@ from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, loudnes
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
 
-IMAGE_WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 OUTSIDE = -2  # in Level.band: a bin that feeds no triangle
 
 
@@ -42,7 +41,8 @@ def band_middles(bark_step: float) -> Array:
 def window(length: int) -> Array:
     """(length,) Nuttall's window, periodic."""
     phase = 2 * np.pi * np.arange(length) / length
-    a0, a1, a2, a3 = IMAGE_WINDOW
+    image_window = (0.355768, 0.487396, 0.144232, 0.012604)
+    a0, a1, a2, a3 = image_window
     return np.asarray(a0 - a1 * np.cos(phase) + a2 * np.cos(2 * phase) - a3 * np.cos(3 * phase))
 
 

@@ -29,10 +29,6 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import damped, residual_record
 from sonic_bullet.residual.transfer import StruckModes
 
-POWER = 0.3
-UNREPRESENTED = 0.02
-"""A feature whose power is represented but for less than this, a tenth of a decibel, leaves nothing."""
-
 
 def match_ratios(
     freq_hz: Array, decay_per_s: Array, mode_hz: Array, mode_decay_per_s: Array, mode_amplitude: Array
@@ -50,7 +46,8 @@ def match_ratios(
         per_s / np.maximum(decay_per_s, 1e-3)[:, None] - per_s / np.maximum(mode_decay_per_s, 1e-3)[None], 0.0
     )
     apart = across**2 + along**2
-    score, near = 1 / (1 + apart), (loud**POWER) / (apart + nearby**2) ** 2
+    loudness_power = 0.3
+    score, near = 1 / (1 + apart), (loud**loudness_power) / (apart + nearby**2) ** 2
     ratio = (near * score).sum(axis=1) / np.maximum(near.sum(axis=1), 1e-300)
     return ratio, np.sqrt(((score * mode_amplitude) ** 2).sum(axis=1))
 
@@ -107,7 +104,9 @@ def strikes_of(
     order = order[np.append(True, np.diff(modes[0][order]) > 0)] if len(order) else order
     hz, mode_decay, played = modes[0][order], modes[1][order], modes[2][:, order]
     share = represented_share(freq, decay, amplitude, hz, mode_decay, played)
-    loud = np.sqrt(np.where(1 - share**2 > UNREPRESENTED, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
+    # a feature whose power is represented but for less than this, a tenth of a decibel, leaves nothing
+    unrepresented = 0.02
+    loud = np.sqrt(np.where(1 - share**2 > unrepresented, 1 - share**2, 0.0) * (np.abs(amplitude) ** 2).mean(axis=0))
     mean = np.sqrt((np.abs(played) ** 2).mean(axis=0))
     rest = np.stack([x - damped(hz, mode_decay, a, signals.shape[1], sr) for x, a in zip(signals, played, strict=True)])
     residual = residual_record(signals, left, rest, sr, StruckModes(hz, mode_decay, mean), (freq, decay, loud), source)

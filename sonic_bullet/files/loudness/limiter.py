@@ -17,12 +17,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-RELEASES_DB_S = (100.0, 400.0, 1600.0, 6400.0)
-"""6 dB in 60 ms, longer than a period of 20 Hz: low tones are not distorted. Struck bodies decay faster;
-where their loudness asks for it, the next is taken."""
-MARGIN_DB = 0.25
-"""Margin below the ceiling: excess that meters of other interpolations read, of noise up to half the rate."""
-
 
 def limiter_factor(peak_db: Array, sr: int, ceiling_db: float, release_db_s: float) -> Array:
     """Return factors (n,) that bring true peaks (n,) in dB down to at most ``ceiling_db``."""

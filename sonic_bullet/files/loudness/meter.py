@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +23,20 @@ from sonic_bullet.storage.spooled_sound import KeptSound
 
 CHANNEL_WEIGHT = (1.0, 1.0, 1.0, 1.41, 1.41)
 """L, R, C, Ls, Rs [ITU-R BS.1770-5, table 3]."""
-BLOCKS_PER_S, MOMENTARY, SHORT_TERM = 10, 4, 30
-ABSOLUTE_GATE_LUFS, RELATIVE_GATE_LU, RANGE_GATE_LU = -70.0, -10.0, -20.0
+
+
+class _Meter(NamedTuple):
+    """Blocks, windows and gates of a loudness meter [ITU-R BS.1770-5; EBU Tech 3342]."""
+
+    blocks_per_s: int = 10
+    momentary: int = 4
+    short_term: int = 30
+    absolute_gate_lufs: float = -70.0
+    relative_gate_lu: float = -10.0
+    range_gate_lu: float = -20.0
+
+
+METER = _Meter()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +73,9 @@ def measure_loudness(sound: KeptSound, sr: int, gain: float = 1.0) -> Loudness:
     """Measure the loudness of a sound whose samples are multiplied by ``gain`` in its file."""
     energy = _block_energy(sound, sr) if 0 < sound.shape[0] <= len(CHANNEL_WEIGHT) else np.zeros(0)
     peak = gain * find_true_peak(sound)
-    short = _windows(energy * gain**2, SHORT_TERM)
+    short = _windows(energy * gain**2, METER.short_term)
     return Loudness(
-        _gated_lufs(_windows(energy * gain**2, MOMENTARY)),
+        _gated_lufs(_windows(energy * gain**2, METER.momentary)),
         float(_lufs(short.max())) if len(short) and short.max() > 0 else None,
         _range_lu(short),
         20 * math.log10(peak) if peak > 0 else None,
@@ -71,7 +84,7 @@ def measure_loudness(sound: KeptSound, sr: int, gain: float = 1.0) -> Loudness:
 
 def integrated_lufs(sound: KeptSound, sr: int) -> float | None:
     """Measure the programme loudness alone, of up to 5 channels."""
-    return _gated_lufs(_windows(_block_energy(sound, sr), MOMENTARY))
+    return _gated_lufs(_windows(_block_energy(sound, sr), METER.momentary))
 
 
 def _block_energy(sound: KeptSound, sr: int) -> Array:
@@ -81,14 +94,14 @@ def _block_energy(sound: KeptSound, sr: int) -> Array:
     channels, frames = sound.shape
     sections = k_weighting(sr)
     state = np.zeros((len(sections), channels, 2))
-    energy = np.zeros(frames * BLOCKS_PER_S // sr + 1)
+    energy = np.zeros(frames * METER.blocks_per_s // sr + 1)
     start, weight = 0, np.array(CHANNEL_WEIGHT[:channels])
     for block in sound.blocks():
         weighted, state = sosfilt(sections, block, axis=1, zi=state)
-        at = np.arange(start, start + block.shape[1]) * BLOCKS_PER_S // sr
+        at = np.arange(start, start + block.shape[1]) * METER.blocks_per_s // sr
         energy += np.bincount(at, weight @ weighted**2, minlength=len(energy))
         start += block.shape[1]
-    return energy[:-1] * BLOCKS_PER_S / sr
+    return energy[:-1] * METER.blocks_per_s / sr
 
 
 def k_weighting(sr: int) -> Array:
@@ -115,17 +128,17 @@ def _above(energy: Array, gate_lufs: float) -> Array:
 
 def _gated(energy: Array, relative_lu: float) -> Array:
     """Select blocks above the absolute gate and above the relative one, which is below the mean of the former."""
-    loud = _above(energy, ABSOLUTE_GATE_LUFS)
+    loud = _above(energy, METER.absolute_gate_lufs)
     return _above(loud, float(_lufs(loud.mean())) + relative_lu) if len(loud) else loud
 
 
 def _gated_lufs(energy: Array) -> float | None:
-    loud = _gated(energy, RELATIVE_GATE_LU)
+    loud = _gated(energy, METER.relative_gate_lu)
     return float(_lufs(loud.mean())) if len(loud) else None
 
 
 def _range_lu(short: Array) -> float | None:
-    loud = _gated(short, RANGE_GATE_LU)
+    loud = _gated(short, METER.range_gate_lu)
     if not len(loud):
         return None
     low, high = np.percentile(_lufs(loud), (10, 95))

@@ -17,8 +17,6 @@ from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage.reading import reading
 
 RESPONSE_REMEDY = "give rows of a frequency in Hz and a factor, or a FIR filter as a sound file"
-LEAST_TAPS = 1024
-"""A short filter's spectrum is taken at as many points as of one so long."""
 
 
 def read_response(path: str | os.PathLike[str]) -> SensorResponse:
@@ -38,7 +36,8 @@ def read_response(path: str | os.PathLike[str]) -> SensorResponse:
     taps, sr = read_audio(name)
     if len(taps) != 1:
         raise FileError(f"{name} has {len(taps)} channels, and a filter has one", RESPONSE_REMEDY)
-    size = max(LEAST_TAPS, taps.shape[1])
+    least_taps = 1024  # a short filter's spectrum is taken at as many points as of one so long
+    size = max(least_taps, taps.shape[1])
     return _response(np.fft.rfftfreq(size, 1 / sr)[1:], np.abs(np.fft.rfft(taps[0], size))[1:], name)
 
 

@@ -18,7 +18,6 @@ import struct
 from collections.abc import Iterator
 
 MOST_CHUNKS, MOST_BYTES = 1000, 1 << 16
-NUMBER = re.compile(rb"full_scale_pa=([0-9.]{1,25}(?:e[+-]?[0-9]{1,3})?)(?![0-9.e])")
 
 
 def scale_text(full_scale_pa: float) -> str:
@@ -28,7 +27,8 @@ def scale_text(full_scale_pa: float) -> str:
 
 def scale_in(text: bytes) -> float | None:
     """Find the full scale in Pa in a text; None where there is no valid one."""
-    found = NUMBER.search(text)
+    scale_pattern = re.compile(rb"full_scale_pa=([0-9.]{1,25}(?:e[+-]?[0-9]{1,3})?)(?![0-9.e])")
+    found = scale_pattern.search(text)
     try:
         number = float(found[1]) if found else math.nan
     except ValueError:

@@ -18,10 +18,6 @@ from dataclasses import dataclass
 from sonic_bullet.records.coerce import as_items, as_text, as_whole, shown
 from sonic_bullet.records.errors import RecordError
 
-LAST_SAMPLE = 2**32 - 1
-"""Last sample of a cue, which has 32 bits: a day at 48 kHz."""
-CHUNK_TEXT_BYTES = 200
-
 
 @dataclass(frozen=True, slots=True)
 class Cue:
@@ -39,7 +35,7 @@ class Cue:
 
 
 def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: int = 0) -> bytes:
-    """Make the chunks `bext`, `cue ` and `LIST adtl` of a file. Cues beyond `LAST_SAMPLE` are left out.
+    """Make the chunks `bext`, `cue ` and `LIST adtl` of a file. Cues beyond `last_sample` are left out.
 
     time_reference: first sample of the file, counted from the start of its timeline.
 
@@ -53,7 +49,8 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
     for cue in listed:
         if not isinstance(cue, Cue):
             raise RecordError(f"a cue is {shown(cue)}", remedy)
-    kept = [cue for cue in listed if cue.sample <= LAST_SAMPLE]
+    last_sample = 2**32 - 1  # last sample of a cue, which has 32 bits: a day at 48 kHz
+    kept = [cue for cue in listed if cue.sample <= last_sample]
     points = [
         struct.pack("<II4sIII", number, cue.sample, b"data", 0, 0, cue.sample) for number, cue in enumerate(kept, 1)
     ]
@@ -61,7 +58,7 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
     for number, cue in enumerate(kept, 1):
         notes.append(_chunk(b"labl", struct.pack("<I", number) + _text(cue.label) + b"\0"))
         if cue.samples:
-            length = min(cue.samples, LAST_SAMPLE)
+            length = min(cue.samples, last_sample)
             notes.append(_chunk(b"ltxt", struct.pack("<II4sHHHH", number, length, b"rgn ", 0, 0, 0, 0)))
     places = _chunk(b"cue ", struct.pack("<I", len(points)) + b"".join(points)) + _chunk(
         b"LIST", b"adtl" + b"".join(notes)
@@ -82,7 +79,7 @@ def _chunk(name: bytes, body: bytes) -> bytes:
     return name + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
 
 
-def _text(text: str, most: int = CHUNK_TEXT_BYTES) -> bytes:
+def _text(text: str, most: int = 200) -> bytes:
     """Encode a text for a chunk: UTF-8, without NUL."""
     return text.replace("\0", " ").encode("utf-8", "replace")[:most].decode("utf-8", "ignore").encode()
 

@@ -38,8 +38,6 @@ POSE_FIELDS: dict[str, tuple[type, tuple[int, ...]]] = {
 LAZY = (*(f"pose_{name}" for name in POSE_FIELDS), *(f"contact_{name}" for name in ROW_FIELDS))
 """Entries that may stay in the file."""
 Fieldwise = Mapping[str, tuple[type, tuple[int, ...]]]
-ROWS_MOST = 2**40
-"""Most poses or contacts of one step; that all their sums fit into 64 bits is checked too."""
 
 
 class Fields:
@@ -110,12 +108,13 @@ def read_steps(arrays: Mapping[str, Array], bodies: int, path: object) -> LogSte
     """
     dt = take(arrays, "step_dt_s", float, (None,), path)
     step = np.zeros(len(dt), LOGGED_STEP)
+    most_rows = 2**40  # most poses or contacts of one step; that all their sums fit into 64 bits is checked too
     for kind, what in zip(ROW_KINDS, ("body", "contact", "motion"), strict=True):
         name, field = f"step_{what}_count", f"{kind}_end"
         if kind == "motion" and name not in arrays:  # nothing jointed is listened to
             continue
         count = take(arrays, name, np.int64, (len(dt),), path)
-        if (count < 0).any() or (count > ROWS_MOST).any() or count.sum(dtype=float) > 2**62:
+        if (count < 0).any() or (count > most_rows).any() or count.sum(dtype=float) > 2**62:
             raise LogError(f"{path}: {name} is negative or absurd", REMEDY)
         step[field] = np.cumsum(count)
     p, k, m = (int(step[f"{kind}_end"][-1]) if len(dt) else 0 for kind in ROW_KINDS)

@@ -15,20 +15,26 @@ it. Those samples are predicted from later ones, x_n = Σ a_k x_{n+k}.        [l
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.files.recordings import MOST_SAMPLES, READ_MIN_HZ
+from sonic_bullet.files.recordings import MOST_SAMPLES, RECORDING_LIMITS
 from sonic_bullet.files.uff.reader import Response
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 
-LOWEST_MEASURED_HZ = 20.0
-BAND = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
-BETA = 10.0  # of the Kaiser window: side lobes of 1e-5
-OFF_RATE = 5e-5  # relative: six figures of a step, and their last
-MOTION_ORDER = {"acceleration": -1, "velocity": 0, "displacement": 1}
-"""Powers of iω from a quantity to velocity."""
+
+class _UffBand(NamedTuple):
+    """Numbers that decide which band of a response is heard."""
+
+    lowest_hz: float = 20.0
+    band: float = 0.8  # of the highest frequency measured: where W begins to fall and the band ends
+    beta: float = 10.0  # of the Kaiser window: side lobes of 1e-5
+    off_rate: float = 5e-5  # relative: six figures of a step, and their last
+
+
+UFF_BAND = _UffBand()
 
 
 def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
@@ -54,7 +60,8 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
         Its rate is not a whole number of Hz, or it unpacks to too many samples.
     """
     off_grid = 0.01  # of a step
-    power = MOTION_ORDER.get(response.quantity, 0)
+    motion_order = {"acceleration": -1, "velocity": 0, "displacement": 1}  # powers of iω from a quantity to velocity
+    power = motion_order.get(response.quantity, 0)
     if not response.spectral:
         return _from_time(response, power)
     step, first = response.step, round(response.start / response.step)
@@ -63,14 +70,16 @@ def as_recording(response: Response) -> tuple[Array, int, tuple[float, float]]:
             f"a response starts at {response.start:g} Hz in steps of {step:g} Hz", "export it from a multiple of them"
         )
     last = first + len(response.value) - 1
-    count, sr = _length(max(2 * last, math.ceil(READ_MIN_HZ / step)), step)
+    count, sr = _length(max(2 * last, math.ceil(RECORDING_LIMITS.least_hz / step)), step)
     freq = sr / count * np.arange(first, last + 1)
-    low = max(LOWEST_MEASURED_HZ, 2 * step, response.start * 1.1)
+    low = max(UFF_BAND.lowest_hz, 2 * step, response.start * 1.1)
     spectrum = np.zeros(count // 2 + 1, complex)
-    spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, BAND * freq[-1])
+    spectrum[first : last + 1] = _derived(response.value, freq, power) * _weight(freq, low, UFF_BAND.band * freq[-1])
     sound = np.fft.irfft(spectrum, count) * sr
-    jump = math.ceil(math.hypot(math.pi, BETA) / (math.pi * (1 - BAND) * freq[-1]) * sr)  # W rings no longer
-    return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, BAND * float(freq[-1]))
+    jump = math.ceil(
+        math.hypot(math.pi, UFF_BAND.beta) / (math.pi * (1 - UFF_BAND.band) * freq[-1]) * sr
+    )  # W rings no longer
+    return _predicted_back(sound, jump) if response.per_force else sound, sr, (low, UFF_BAND.band * float(freq[-1]))
 
 
 def _predicted_back(sound: Array, jump: int) -> Array:
@@ -93,14 +102,14 @@ def _predicted_back(sound: Array, jump: int) -> Array:
 def _from_time(response: Response, power: int) -> tuple[Array, int, tuple[float, float]]:
     """Convert a time record to velocity or pressure."""
     sr = round(1 / response.step)
-    if not sr or abs(sr * response.step - 1) > OFF_RATE:
+    if not sr or abs(sr * response.step - 1) > UFF_BAND.off_rate:
         raise FileError(f"a time record has {1 / response.step:g} samples a second", "export it at a whole number")
     value = np.asarray(response.value, float)
     if power == 0:
-        return value, sr, (LOWEST_MEASURED_HZ, 0.45 * sr)
+        return value, sr, (UFF_BAND.lowest_hz, 0.45 * sr)
     freq = np.fft.rfftfreq(len(value), 1 / sr)
-    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, LOWEST_MEASURED_HZ, 0.45 * sr)
-    return np.fft.irfft(spectrum, len(value)), sr, (LOWEST_MEASURED_HZ, 0.45 * sr)
+    spectrum = _derived(np.fft.rfft(value), freq, power) * _weight(freq, UFF_BAND.lowest_hz, 0.45 * sr)
+    return np.fft.irfft(spectrum, len(value)), sr, (UFF_BAND.lowest_hz, 0.45 * sr)
 
 
 def _derived(value: Array, freq_hz: Array, power: int) -> Array:
@@ -114,7 +123,7 @@ def _weight(freq_hz: Array, low_hz: float, high_hz: float) -> Array:
     steps = 4001  # of an edge
     below = (freq_hz - low_hz / 2) / (low_hz / 2)
     above = (freq_hz[-1] - freq_hz) / max(freq_hz[-1] - high_hz, 1e-9)
-    step = np.cumsum(np.kaiser(steps, BETA))
+    step = np.cumsum(np.kaiser(steps, UFF_BAND.beta))
     at = np.linspace(0, 1, steps)
     return np.asarray(np.interp(below, at, step) * np.interp(above, at, step) / step[-1] ** 2)
 
@@ -131,6 +140,6 @@ def _length(least: int, step_hz: float) -> tuple[int, int]:
     rate = count * step_hz
     off = np.abs(np.rint(rate) / rate - 1)
     good = np.flatnonzero(off <= max(float(off.min()), 1e-9))[0]
-    if off[good] > OFF_RATE:
+    if off[good] > UFF_BAND.off_rate:
         raise FileError(f"steps of {step_hz:g} Hz give no whole rate", "export it in steps of a whole number of Hz")
     return int(count[good]), round(float(rate[good]))

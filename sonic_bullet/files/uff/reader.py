@@ -24,7 +24,6 @@ from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage.reading import reading
 
 READ_DATASETS = (15, 58, 164, 2411)
-QUANTITIES = {8: "displacement", 11: "velocity", 12: "acceleration", 15: "pressure"}
 FORCE_TYPES = (9, 13)
 Point = tuple[float, float, float]
 
@@ -62,7 +61,7 @@ class Response:
     Parameters
     ----------
     quantity
-        Of `QUANTITIES`, SI.
+        Displacement, velocity, acceleration or pressure, SI.
     per_force
         Divided by a force: per N over frequency, per N·s over time.
     """
@@ -208,7 +207,8 @@ def _response(
     uneven = 1e-4  # of the last abscissa: text has six figures of each
     least_step = 1e-7  # Hz or s: the highest rate that a recording has
     gravity_m_s2 = 9.80665  # standard, of accelerations in g
-    kind, quantity = int(one["func_type"]), QUANTITIES.get(int(one["ordinate_spec_data_type"]))
+    quantities = {8: "displacement", 11: "velocity", 12: "acceleration", 15: "pressure"}
+    kind, quantity = int(one["func_type"]), quantities.get(int(one["ordinate_spec_data_type"]))
     if kind not in (1, 4):
         return functions.get(kind, f"functions of type {kind}")
     below = int(one.get("orddenom_spec_data_type", 0))

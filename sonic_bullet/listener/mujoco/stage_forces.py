@@ -24,13 +24,12 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 
 RK4 = mujoco.mjtIntegrator.mjINT_RK4
-PULSE_NODES = (0.5, 0.5, 1.0)
-"""Times of the second to fourth stage, in steps; each goes on from the slope of the stage before."""
-WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 class StageForces:
     """Reads one MjData by its links."""
+
+    WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
     def __init__(self, model: Any, data: Any, links: ModelLinks) -> None:
         self._model, self._data, self._links = model, data, links
@@ -57,7 +56,7 @@ class StageForces:
         if self._before is None:
             return self.motion(self._data), self._touches(self._data, h, 0.0)[0]
         (motion, stages), self._before = self._before, None
-        return motion, _merged([*stages, self._touches(self._data, h * WEIGHTS[3], h)])
+        return motion, _merged([*stages, self._touches(self._data, h * self.WEIGHTS[3], h)])
 
     @property
     def was_prepared(self) -> bool:
@@ -113,15 +112,17 @@ class StageForces:
         mujoco.mj_forward(model, copy)
         motion = self.motion(copy)
         qpos, qvel, act, time_s = copy.qpos.copy(), copy.qvel.copy(), copy.act.copy(), copy.time
-        stages = [self._touches(copy, h * WEIGHTS[0], 0.0)]
+        stages = [self._touches(copy, h * self.WEIGHTS[0], 0.0)]
+        # times of the second to fourth stage, in steps; each goes on from the slope of the stage before
+        pulse_nodes = (0.5, 0.5, 1.0)
         for stage in (0, 1):
             speed, change, rate = copy.qvel.copy(), copy.qacc.copy(), copy.act_dot.copy()
             copy.qpos[:] = qpos
-            mujoco.mj_integratePos(model, copy.qpos, speed, h * PULSE_NODES[stage])
-            copy.qvel[:], copy.act[:] = qvel + h * PULSE_NODES[stage] * change, act + h * PULSE_NODES[stage] * rate
-            copy.time = time_s + h * PULSE_NODES[stage]
+            mujoco.mj_integratePos(model, copy.qpos, speed, h * pulse_nodes[stage])
+            copy.qvel[:], copy.act[:] = qvel + h * pulse_nodes[stage] * change, act + h * pulse_nodes[stage] * rate
+            copy.time = time_s + h * pulse_nodes[stage]
             mujoco.mj_forwardSkip(model, copy, mujoco.mjtStage.mjSTAGE_NONE, 1)
-            stages.append(self._touches(copy, h * WEIGHTS[stage + 1], h * PULSE_NODES[stage]))
+            stages.append(self._touches(copy, h * self.WEIGHTS[stage + 1], h * pulse_nodes[stage]))
         return motion, stages
 
 

@@ -28,23 +28,8 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.simulated import Values, finite, with_body_id
 
-HEAVIEST_KG = 1e12
-DYNAMICS = {
-    "mass": 0,
-    "lateralFriction": 1,
-    "restitution": 5,
-    "rollingFriction": 6,
-    "spinningFriction": 7,
-    "contactDamping": 8,
-    "contactStiffness": 9,
-    "collisionMargin": 11,
-}
-"""Indices into getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set."""
-
 FLAT_KINDS = (pybullet.GEOM_BOX, pybullet.GEOM_PLANE)
 """Shapes whose large faces are looked at where a body is not added: no file need be read for them."""
-PLACEHOLDER = "link0"
-"""Name that createMultiBody gives to the base of a body without a name."""
 
 
 def check_exists(client_id: int, body: int, link: int) -> None:
@@ -82,7 +67,8 @@ def check_usable(client_id: int, body: int) -> None:
 def link_name(client_id: int, body: int, link: int) -> str:
     """Return a name for messages: the body's, and the link's where it is not the base; "body 2" without any."""
     base, whole = (text.decode(errors="replace") for text in pybullet.getBodyInfo(body, physicsClientId=client_id))
-    name = whole or (base if base != PLACEHOLDER else "") or f"body {body}"
+    placeholder = "link0"  # name that createMultiBody gives to the base of a body without a name
+    name = whole or (base if base != placeholder else "") or f"body {body}"
     return (
         name
         if link < 0
@@ -117,7 +103,8 @@ def checked_mass_kg(info: tuple[Any, ...], body: int, link: int) -> float:
         It is negative, absurd or not a number, or the inertia is not a number.
     """
     mass, inertia = info[0], info[2]
-    if not (math.isfinite(mass) and 0 <= mass < HEAVIEST_KG):
+    heaviest_kg = 1e12
+    if not (math.isfinite(mass) and 0 <= mass < heaviest_kg):
         raise SceneError(
             f"body {body}{link_words(link)} has mass {mass} kg",
             "give it a finite mass of zero or more with changeDynamics or in its URDF",
@@ -168,7 +155,18 @@ def dynamics(client_id: int, body: int, link: int) -> Values:
 def dynamics_of(info: tuple[Any, ...]) -> Values:
     """Name the entries of getDynamicsInfo's answer as changeDynamics does."""
     inertia = {f"localInertiaDiagonal{axis}": x for axis, x in zip("XYZ", info[2], strict=True)}
-    return finite({**{name: info[place] for name, place in DYNAMICS.items()}, **inertia})
+    # indices into getDynamicsInfo's answer; contactDamping and contactStiffness are -1 where none was set
+    answer_places = {
+        "mass": 0,
+        "lateralFriction": 1,
+        "restitution": 5,
+        "rollingFriction": 6,
+        "spinningFriction": 7,
+        "contactDamping": 8,
+        "contactStiffness": 9,
+        "collisionMargin": 11,
+    }
+    return finite({**{name: info[place] for name, place in answer_places.items()}, **inertia})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,12 +29,6 @@ from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS
 from sonic_bullet.machine.worker import mark_step
 from sonic_bullet.records.errors import SceneError
 
-POSE_SETTERS = (
-    "resetBasePositionAndOrientation",
-    "resetJointState",
-    "resetJointStateMultiDof",
-    "resetJointStatesMultiDof",
-)
 DYNAMICS_IN_ORDER = (
     "bodyUniqueId",
     "linkIndex",
@@ -97,6 +91,13 @@ class Hooks:
     Without listeners, they only pass calls on.
     """
 
+    POSE_SETTERS = (
+        "resetBasePositionAndOrientation",
+        "resetJointState",
+        "resetJointStateMultiDof",
+        "resetJointStatesMultiDof",
+    )
+
     def __init__(self, client: Any, client_id: int) -> None:
         self._client = weakref.ref(client)
         self._client_id = client_id
@@ -110,7 +111,10 @@ class Hooks:
             "changeDynamics": self._setting_link(self._below(client, "changeDynamics")),
             "setPhysicsEngineParameter": self._setting_engine(self._below(client, "setPhysicsEngineParameter")),
             "setDefaultContactERP": self._setting_engine(self._below(client, "setDefaultContactERP"), "contactERP"),
-            **{name: self._telling(name, client, lambda world, body: world.mark_moved(body)) for name in POSE_SETTERS},
+            **{
+                name: self._telling(name, client, lambda world, body: world.mark_moved(body))
+                for name in self.POSE_SETTERS
+            },
             **{name: remembering(name, self._below(client, name), client_id, self._client) for name in MAKERS},
         }
         self._kept = {name: vars(client)[name] for name in self._ours if name in vars(client)}
@@ -164,7 +168,7 @@ class Hooks:
     def _telling(self, name: str, client: Any, tell: Callable[[Watcher, int], None]) -> Callable[..., Any]:
         below = self._below(client, name)
         below = remembering(name, below, self._client_id, self._client) if name in ENDERS else below
-        of_body = name == "removeBody" or name in POSE_SETTERS
+        of_body = name == "removeBody" or name in self.POSE_SETTERS
 
         def reporting(*args: Any, **kwargs: Any) -> Any:
             result = below(*args, **kwargs)

@@ -26,11 +26,6 @@ from pybullet_utils.bullet_client import BulletClient
 from sonic_bullet.listener.calls import FIRST_ABSENT, Call, InputFile, Plan, Who, mapped
 from sonic_bullet.listener.pybullet.hooks import DYNAMICS_IN_ORDER
 
-PREFIXES = ("create", "load", "change", "set", "reset", "apply", "remove", "enable", "restore")
-NO_INPUTS = re.compile(
-    "Visual|Texture|Debug|VR|AdditionalSearchPath|TimeOut|RealTime|Plugin|Flags|UserData|State$|SensorJoint|createSoft"
-)
-"""Functions that change a picture, a window, or what is queried; restoreState has no value to compare."""
 IN_ORDER: dict[str, tuple[str, ...]] = {
     "changeDynamics": DYNAMICS_IN_ORDER,
     "createCollisionShape": ("shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal"),
@@ -70,11 +65,17 @@ PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "spec
 
 def watched() -> list[str]:
     """List the names of the functions that are intercepted."""
+    prefixes = ("create", "load", "change", "set", "reset", "apply", "remove", "enable", "restore")
+    # functions that change a picture, a window, or what is queried; restoreState has no value to compare
+    no_inputs = re.compile(
+        "Visual|Texture|Debug|VR|AdditionalSearchPath|TimeOut|RealTime|Plugin|Flags|UserData"
+        "|State$|SensorJoint|createSoft"
+    )
     return [
         name
         for name in dir(pybullet)
-        if name.startswith(PREFIXES)
-        and (not NO_INPUTS.search(name) or name.startswith("resetJointState"))
+        if name.startswith(prefixes)
+        and (not no_inputs.search(name) or name.startswith("resetJointState"))
         and callable(getattr(pybullet, name))
     ]
 

@@ -16,7 +16,6 @@ from sonic_bullet.listener.pybullet.body_facts import describe_link
 from sonic_bullet.listener.pybullet.clients import client_id_of
 from sonic_bullet.listener.pybullet.findings import Finding, all_links, name_links
 
-THRESHOLD = "restitutionVelocityThreshold"
 THRESHOLD_DATA = "sonic_bullet.contactProcessingThreshold"
 
 
@@ -80,7 +79,8 @@ def endless_bounces(client_id: int, known: SetValues) -> list[Finding]:
 
     With restitution e, steps of dt bring nothing below g·dt·e/(1-e) to rest.
     """
-    threshold = known.engine.get(THRESHOLD)
+    parameter = "restitutionVelocityThreshold"
+    threshold = known.engine.get(parameter)
     if threshold is None:
         return []
     settings = pybullet.getPhysicsEngineParameters(physicsClientId=client_id)

@@ -30,8 +30,6 @@ from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_
 from sonic_bullet.storage.reading import refuse_lfs_pointer
 
 ClientHook = Callable[[int], None]
-MOST_CLIENTS = 1024
-"""Limit of PyBullet's clients (its MAX_PHYSICS_CLIENTS)."""
 
 
 class _TimeIsUp(BaseException):
@@ -62,7 +60,8 @@ def own_clients() -> Iterator[None]:
 
 
 def _open_clients() -> set[int]:
-    return {number for number in range(MOST_CLIENTS) if pybullet.isConnected(number)}
+    most_clients = 1024  # limit of PyBullet's clients (its MAX_PHYSICS_CLIENTS)
+    return {number for number in range(most_clients) if pybullet.isConnected(number)}
 
 
 def run_script(

@@ -29,10 +29,6 @@ from sonic_bullet.records.coerce import as_items, as_number, as_text, as_whole, 
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import MeshError, SceneError
 
-HEAVIEST_KG = 1e12
-UNIT = 1e-6
-"""How far from 1 the length of a quaternion or a normal may be."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DefinedBody:
@@ -94,7 +90,8 @@ class ArrayWorld(MotionWorld):
         if self.step_count:
             raise SceneError(f"{shown(name)} comes after a step", "add all bodies before the first step")
         who = as_text(name, "name", "give a text", error=SceneError)
-        mass = as_number(mass_kg, f"{who}: mass_kg", "give kilograms, 0 or more", least=0, below=HEAVIEST_KG)
+        heaviest_kg = 1e12
+        mass = as_number(mass_kg, f"{who}: mass_kg", "give kilograms, 0 or more", least=0, below=heaviest_kg)
         volume, middle, moment = solid_of(shapes)
         if mass and not volume and (inertia_kg_m2 is None or centre_m is None):
             raise SceneError(f"{who} moves and encloses no volume", "give inertia_kg_m2= and centre_m=, or mass_kg=0")
@@ -292,5 +289,6 @@ def _as_tensor(value: Any, name: str) -> Array:
 
 def _check_unit(rows: Array, name: str) -> None:
     length = np.linalg.norm(rows, axis=1)
-    if (np.abs(length - 1) > UNIT).any():
+    length_tolerance = 1e-6  # how far from 1 the length of a quaternion or a normal may be
+    if (np.abs(length - 1) > length_tolerance).any():
         raise SceneError(f"{name} holds a row of length {length[np.argmax(np.abs(length - 1))]:.6g}", "give unit rows")

@@ -9,14 +9,14 @@ one that is not closed, or that Netgen still refuses: it passes through itself  
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.modal.meshing import named_shapes, prisms
 from sonic_bullet.modal.meshing.on_surface import fitted
-from sonic_bullet.modal.meshing.sizes import DOF_PER_TET, chunkiness, curved_sizes, dof_budget, edge_within_m
+from sonic_bullet.modal.meshing.sizes import chunkiness, curved_sizes, dof_budget, edge_within_m
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, largest_component, quadratic
 from sonic_bullet.modal.meshing.stuffing import stuffed
 from sonic_bullet.modal.meshing.surfaces import Skin
@@ -27,24 +27,35 @@ from sonic_bullet.records.errors import MeshError
 Filler = Literal["any", "netgen", "simple", "lattice"]
 """How a surface that no rule fits is filled: by Netgen or a substitute, by Netgen or not at all, with its detail left
 out, by a lattice of this edge or not at all."""
-LATTICE_NOTE = "lattice"  # first word of the note of a solid filled by a lattice
-MOST_TETS = 60_000
-"""A third of a million unknowns, 1.5 GB."""
-FILLED = (0.6, 1.7)
-"""Volume of a fill over the enclosed one, least and most.
 
-Wide, for a surface that passes through itself encloses some of it twice.
-"""
-FINER_FILLING = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
-SIMPLER, SLIVER = 0.05, 0.01
-"""Of an edge: the detail left out where Netgen refuses the surface as it is, and the height of triangles that it would
-refuse: slivers of unions, on which it takes ten times as long.
-"""
-WHOLE_FACES = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
-LATTICE_VOLUME = 12.0  # elements in a cube of the lattice's edge
-LATTICE_WALL = 0.8  # of a wall's thickness: a larger edge may miss it
-LATTICE_TETS, LATTICE_MORE = 8000, 1.25
-"""Tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts."""
+
+class _Lattice(NamedTuple):
+    """Numbers of a lattice that fills what Netgen cannot."""
+
+    note: str = "lattice"  # first word of the note of a solid filled by a lattice
+    volume: float = 12.0  # elements in a cube of the lattice's edge
+    wall: float = 0.8  # of a wall's thickness: a larger edge may miss it
+    # tetrahedra that a lattice may have, or as many as are asked for; their number over what its volume predicts
+    tets: int = 8000
+    more: float = 1.25
+
+
+LATTICE = _Lattice()
+
+
+class _Filling(NamedTuple):
+    """Numbers that decide how a surface is filled."""
+
+    most_tets: int = 60_000  # a third of a million unknowns, 1.5 GB
+    finer: float = 0.6  # from one attempt to the next: both sides of a bent wall touch where elements are too large
+    # of an edge: the detail left out where Netgen refuses the surface as it is, and the height of triangles that it
+    # would refuse: slivers of unions, on which it takes ten times as long
+    simpler: float = 0.05
+    sliver: float = 0.01
+    whole_faces: int = 4000  # a lump of more is simplified first: Netgen takes over 20 s for 20 000, of thin bodies 2 s
+
+
+FILLING = _Filling()
 
 
 class TooThinError(MeshError):
@@ -76,19 +87,20 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
         return made
     thickness, diagonal = skin.thickness_m, _diagonal_m(skin.vertex_m)
     volume = abs(geometry.volume_m3(skin.vertex_m, skin.face))
-    tets = dof_budget(thickness, diagonal) / DOF_PER_TET
+    dof_per_tet = 5.6  # measured on meshes of bars, slabs and bowls
+    tets = dof_budget(thickness, diagonal) / dof_per_tet
     edge = edge_m or edge_within_m(volume, thickness, tets)
     if filler == "lattice":
         return _of_lattice(skin, edge, edge, say, "as before")
-    of_lattice = edge_m or min((LATTICE_VOLUME * volume / tets) ** (1 / 3), LATTICE_WALL * thickness)
+    of_lattice = edge_m or min((LATTICE.volume * volume / tets) ** (1 / 3), LATTICE.wall * thickness)
     finest = lattice_least * thickness
     if not geometry.is_closed(skin.face):
         return _of_lattice(skin, of_lattice, finest, say, "its surface is open")
-    whole, simple = skin, simplified(skin, SIMPLER * edge)
+    whole, simple = skin, simplified(skin, FILLING.simpler * edge)
     detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
     attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
-    for tried, size in [*attempts, (simple, edge), (simple, FINER_FILLING * edge)]:
+    for tried, size in [*attempts, (simple, edge), (simple, FILLING.finer * edge)]:
         try:
             return _by_netgen(skin, tried, size, say)
         except EndlessError:
@@ -119,13 +131,13 @@ def simplified(skin: Skin, tolerance_m: float) -> Skin:
 
 def has_detail(skin: Skin) -> bool:
     """Return whether a surface is simplified before anything else is tried."""
-    return len(skin.face) > WHOLE_FACES and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
+    return len(skin.face) > FILLING.whole_faces and chunkiness(skin.thickness_m, _diagonal_m(skin.vertex_m)) > 0
 
 
 def thick_enough_m(skin: Skin) -> float:
     """Compute the wall of an open surface that a lattice can fill."""
     wall_tets = 20.0  # elements in a square of a wall about an edge wide
-    return float(np.sqrt(wall_tets * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE_TETS))
+    return float(np.sqrt(wall_tets * geometry.face_areas_m2(skin.vertex_m, skin.face).sum() / 2 / LATTICE.tets))
 
 
 def _slivers(skin: Skin, edge_m: float) -> bool:
@@ -133,7 +145,7 @@ def _slivers(skin: Skin, edge_m: float) -> bool:
     corner = skin.vertex_m[skin.face]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     height = 2 * geometry.face_areas_m2(skin.vertex_m, skin.face) / longest
-    return bool(height.min() < SLIVER * edge_m)
+    return bool(height.min() < FILLING.sliver * edge_m)
 
 
 def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None]) -> Solid:
@@ -146,9 +158,12 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None
 
 
 def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str], None], why: str) -> Solid:
-    """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE_TETS`."""
-    filled_m3 = LATTICE_MORE * LATTICE_VOLUME * abs(geometry.volume_m3(skin.vertex_m, skin.face))
-    edge, least = max(edge_m, (filled_m3 / MOST_TETS) ** (1 / 3)), max(finest_m, (filled_m3 / LATTICE_TETS) ** (1 / 3))
+    """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE.tets`."""
+    filled_m3 = LATTICE.more * LATTICE.volume * abs(geometry.volume_m3(skin.vertex_m, skin.face))
+    edge, least = (
+        max(edge_m, (filled_m3 / FILLING.most_tets) ** (1 / 3)),
+        max(finest_m, (filled_m3 / LATTICE.tets) ** (1 / 3)),
+    )
     while True:
         say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
         try:
@@ -158,21 +173,21 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str],
         except MeshError as error:  # some walls are thinner than the mean, and than an edge
             if edge <= least:
                 raise TooThinError(
-                    f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE_TETS} tetrahedra for its walls"
+                    f"Netgen cannot fill the mesh, and a lattice needs over {LATTICE.tets} tetrahedra for its walls"
                     f" ({skin.thickness_m:.2g} m on the mean)",
                     "repair the mesh, or give thicker walls",
                 ) from error
-            edge = max(FINER_FILLING * edge, least)
+            edge = max(FILLING.finer * edge, least)
     tet, said = _largest(corner, tet)
-    note = f"{LATTICE_NOTE}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
+    note = f"{LATTICE.note}, {len(tet)} tetrahedra, edge {edge:.3g} m ({why}){skin.note}{said}"
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
 def _largest(corner_m: Array, tet: Array) -> tuple[Array, str]:
     """Return the tetrahedra of the largest piece, and what was left out. Raises MeshError where they are too many."""
     tet, pieces = largest_component(corner_m, tet)
-    if len(tet) > MOST_TETS:
-        raise MeshError(f"mesh needs {len(tet)} tetrahedra, more than {MOST_TETS}", "give a simpler mesh")
+    if len(tet) > FILLING.most_tets:
+        raise MeshError(f"mesh needs {len(tet)} tetrahedra, more than {FILLING.most_tets}", "give a simpler mesh")
     return tet, f"; largest of {pieces} separate pieces kept" if pieces > 1 else ""
 
 
@@ -181,7 +196,10 @@ def _check_filled(skin: Skin, node: Array, tet: Array) -> None:
     if not geometry.is_closed(skin.face):
         return
     kept = float(np.abs(corner_volume_m3(node, tet)).sum()) / geometry.volume_m3(skin.vertex_m, skin.face)
-    if not FILLED[0] < kept < FILLED[1]:
+    # Volume of a fill over the enclosed one, least and most. Wide, for a surface that passes through itself encloses
+    # some of it twice.
+    filled_range = (0.6, 1.7)
+    if not filled_range[0] < kept < filled_range[1]:
         raise MeshError(
             f"filling the mesh with tetrahedra turns its volume to {kept:.0%}",
             "give a mesh with thicker walls, or a simpler one",

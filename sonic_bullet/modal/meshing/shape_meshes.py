@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet import geometry
-from sonic_bullet.modal.meshing.filling import LATTICE_WALL, WHOLE_FACES, Filler, TooThinError, filled, thick_enough_m
+from sonic_bullet.modal.meshing.filling import FILLING, LATTICE, Filler, TooThinError, filled, thick_enough_m
 from sonic_bullet.modal.meshing.named_shapes import alone, box_cells, named, placed, rotation, soup
 from sonic_bullet.modal.meshing.solid import Solid, SolidSurface, surface
 from sonic_bullet.modal.meshing.surfaces import Skin, pieces_of_faces, prepared
@@ -70,11 +70,11 @@ def fill(
         try:
             made = filled(_united(skin_given), edge_m, say, filler=filler)
         except TooThinError:
-            if not skin_given.guessed or len(skin_given.face) > WHOLE_FACES:
+            if not skin_given.guessed or len(skin_given.face) > FILLING.whole_faces:
                 raise
             wall_m = thick_enough_m(skin_given)
             skin_given = prepared(*soup(shapes), wall_m)
-            first = min(edge_m or np.inf, LATTICE_WALL * wall_m)
+            first = min(edge_m or np.inf, LATTICE.wall * wall_m)
             made = filled(_united(skin_given), edge_m if filler == "lattice" else first, say, filler="lattice")
         vertex, face = skin_given.vertex_m, skin_given.face
     order = dissection(made.node_m, made.tet)

@@ -7,11 +7,6 @@ import numpy as np
 from sonic_bullet import geometry
 from sonic_bullet.records import Array
 
-DOF_PER_TET = 5.6  # measured on meshes of bars, slabs and bowls
-CURVED = 1.5
-"""Edge on a wall of thickness t and radius r, over √(r t): chords of both sides deviate by a quarter of the wall, and
-at twice this they touch."""
-
 
 def dof_budget(thickness_m: float, diagonal_m: float) -> int:
     """Return the unknowns spent by default on a body of thickness 2V/A: fewer the chunkier, more for very thin plates.
@@ -42,7 +37,10 @@ def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Ar
     least_edge = 0.25  # of the wanted edge: where the surface is bent as sharply as a crease
     curvature = np.abs(geometry.face_curvature(vertex_m, face))
     wall = wall_m(vertex_m, face)
-    size = np.maximum(CURVED * np.sqrt(wall / np.maximum(curvature, 1e-300)), least_edge * edge_m)
+    # edge on a wall of thickness t and radius r, over √(r t): chords of both sides deviate by a quarter of the wall,
+    # and at twice this they touch
+    curved_factor = 1.5
+    size = np.maximum(curved_factor * np.sqrt(wall / np.maximum(curvature, 1e-300)), least_edge * edge_m)
     bent = np.flatnonzero(size < edge_m)
     corner = vertex_m[face[bent]]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)

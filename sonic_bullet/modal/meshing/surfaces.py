@@ -3,8 +3,8 @@
 Choices, each given in the model's note:
     closed surface: the solid inside; turned inside out where it looks inward; with thickness_m a hollow body, its wall
         inward
-    small holes, seams that do not meet (from outside, `OPEN_PART` of a turn around a point): filled
-    open surface: a wall of thickness_m, half on either side, `SHEET_PART` of the diagonal by default; flat sheets need
+    small holes, seams that do not meet (from outside, 0.025 of a turn around a point): filled
+    open surface: a wall of thickness_m, half on either side, 0.02 of the diagonal by default; flat sheets need
         thickness_m
     open pieces beside a solid that is most of the area: left out
     loose pieces: they stay; the solid keeps its largest piece (solid.largest_component)
@@ -22,9 +22,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError
 
-OPEN_PART = 0.025
-"""Mean winding number just outside: a ball with a hole of 5 % of its area has it."""
-SHEET_PART = 0.02
 FLAT_THICKNESS = 1e-4  # thickness 2V/A under this part of the diagonal is no volume but noise
 BODY_SIZE_M = (1e-5, 1e4)
 
@@ -205,7 +202,8 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     total = float(area.sum())
     volume = geometry.volume_m3(vertex_m, face)
     closed = geometry.is_closed(face)
-    if 2 * volume / total > FLAT_THICKNESS * diagonal_m and (closed or _openness(vertex_m, face) < OPEN_PART):
+    open_part = 0.025  # mean winding number just outside: a ball with a hole of 5 % of its area has it
+    if 2 * volume / total > FLAT_THICKNESS * diagonal_m and (closed or _openness(vertex_m, face) < open_part):
         if not closed:
             note += "; holes filled"
         if thickness_m is None:
@@ -217,7 +215,8 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
             thickness_m,
             f"{note}; hollow, wall {thickness_m:.3g} m inward",
         )
-    wall_m = thickness_m if thickness_m is not None else SHEET_PART * diagonal_m
+    sheet_part = 0.02
+    wall_m = thickness_m if thickness_m is not None else sheet_part * diagonal_m
     flat = (
         float(np.linalg.svd(vertex_m - vertex_m.mean(axis=0), compute_uv=False)[-1])
         < 1e-9 * diagonal_m * len(vertex_m) ** 0.5

@@ -16,11 +16,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 from sonic_bullet.storage.leftovers import temporary_folder
 
-GUARD_S, GUARD_S_PER_TET = 20, 0.002
-"""Processor time after which a child counts as hung: ten times what meshes take. That is an error, and nothing else is
-tried: a clock decides no result.
-"""
-
 
 class EndlessError(MeshError):
     """A child that did not come to an end."""
@@ -65,7 +60,10 @@ def tetrahedra(
     }
     volume, area = geometry.volume_m3(vertex_m, face), geometry.face_areas_m2(vertex_m, face).sum()
     tets = float(9 * abs(volume) / edge_m**3 + 2 * area / edge_m**2)
-    result = in_child("_netgen.py", given, guard_s or int(GUARD_S + GUARD_S_PER_TET * min(tets, 1e4)))
+    # Processor time after which a child counts as hung: ten times what meshes take. That is an error, and nothing else
+    # is tried: a clock decides no result.
+    least_guard_s, guard_s_per_tet = 20, 0.002
+    result = in_child("_netgen.py", given, guard_s or int(least_guard_s + guard_s_per_tet * min(tets, 1e4)))
     if len(result["tet"]) == 0:
         raise MeshError("mesh encloses no volume", "give thickness_m to make a sheet solid, or close the surface")
     return result["node"] * unit_m + centre, result["tet"]

@@ -4,7 +4,7 @@ Simulators' meshes are often convex pieces side by side (V-HACD). They overlap, 
 matters for sound, and a solid of separate pieces would ring as its largest one alone.
 
     pieces, each closed and positive -> exact union (Manifold)  -> one piece?
-        else the pieces grown by `GROWTH` and united again
+        else the pieces grown a little and united again
 
 A piece with negative volume is a cavity: then nothing is united, and the filler's winding number decides.
 """
@@ -17,9 +17,6 @@ import numpy as np
 
 from sonic_bullet import geometry
 from sonic_bullet.records import Array
-
-GROWTH = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
-"""Of the diagonal: how far each piece's surface moves outward; the least that joins them is taken."""
 
 
 def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, str]:
@@ -37,7 +34,9 @@ def joined(vertex_m: Array, face: Array, piece: Array) -> tuple[Array, Array, st
         parts.append((vertex_m[used], mine))
     diagonal_m = float(np.linalg.norm(np.ptp(vertex_m[np.unique(face)], axis=0)))
     first: tuple[Array, Array, str] | None = None
-    for growth in GROWTH:
+    # of the diagonal: how far each piece's surface moves outward; the least that joins them is taken
+    growths = (0.0, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
+    for growth in growths:
         solids = [_solid(vertex + growth * diagonal_m * _outward(vertex, mine), mine) for vertex, mine in parts]
         if any(solid.status() != manifold3d.Error.NoError for solid in solids):
             return vertex_m, face, ""

@@ -13,11 +13,10 @@ from sonic_bullet.modal.revolution import rings, skin
 from sonic_bullet.modal.revolution.rings import Revolved
 from sonic_bullet.modal.revolution.section import Section, sectioned
 from sonic_bullet.modal.revolution.series import Series, series
-from sonic_bullet.modal.sectors import SHIFT, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Sector, Shown, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
-FINER_SIDES = 1.5  # sides shorter by this leave FINER_SIDES^-q of the error, q from 1.1 at notches to 6
 FEWEST_NODES = 120  # fewer save no time
 
 
@@ -101,7 +100,7 @@ class Fourier:
             modes = eigen.solve(
                 matrix,
                 mass,
-                -SHIFT * self.thickness**2,
+                -SECTORS.shift * self.thickness**2,
                 rigid=2 if m < 2 else 0,
                 enough=lambda value, bound=bound: bool(value[-1] > bound),  # type: ignore[misc]
                 most=-(-most // multiplicity),
@@ -128,7 +127,7 @@ class Fourier:
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Estimate the relative error of the frequency of mode top[1] of sector top[0] by a finer section."""
-        left = 1.75  # 1/(1 - FINER_SIDES^-q), which is 1.1 to 2.8
+        left = 1.75  # 1/(1 - 1.5^-q), which is 1.1 to 2.8
         finer = self.finer()
         if finer is None:
             return float("nan")
@@ -138,8 +137,9 @@ class Fourier:
         return left * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
 
     def finer(self) -> Fourier | None:
-        """Return the body on a section with sides `FINER_SIDES` times shorter, None where that takes too many nodes."""
-        by = self.finer_by * FINER_SIDES
+        """Return the body on a section with sides `finer_sides` times shorter, None where that takes too many nodes."""
+        finer_sides = 1.5  # sides shorter by this leave 1.5^-q of the error, q from 1.1 at notches to 6
+        by = self.finer_by * finer_sides
         section = sectioned(self.body, self.wave, by)
         return None if section is None else replace(self, section=section, finer_by=by)
 

@@ -16,8 +16,6 @@ from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.modal.revolution.meridian import ROUND, meridian
 from sonic_bullet.records import Array, Shape
 
-ARC = 256  # sides of a half circle: its area to 5e-5
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revolved:
@@ -112,12 +110,13 @@ def _named(shape: Shape) -> Array | None:
     if shape.kind not in ("sphere", "capsule"):
         return None
     half = half if shape.kind == "capsule" else 0.0
-    angle = np.linspace(-np.pi / 2, np.pi / 2, ARC + 1)
+    arc_sides = 256  # sides of a half circle: its area to 5e-5
+    angle = np.linspace(-np.pi / 2, np.pi / 2, arc_sides + 1)
     arc = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     arc[[0, -1], 0] = 0
     if half == 0:
         return arc
-    low, high = arc[: ARC // 2 + 1], arc[ARC // 2 :]
+    low, high = arc[: arc_sides // 2 + 1], arc[arc_sides // 2 :]
     end = np.array([0, half])
     return np.concatenate([low - end, high + end])
 

@@ -23,7 +23,6 @@ WALL, LONG_SIDE = 0.5, 3.0  # a triangle's side over the wall's thickness, at a 
 WAVE = 0.25  # a triangle's side over the shortest wave
 BENT = 0.3  # radians that a side may turn
 GROWTH = 0.5  # of size over distance
-MOST_NODES = 15_000  # three unknowns each: a second or two for each wave around
 
 
 WaveNumber = Callable[[Array], Array]
@@ -161,7 +160,7 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
 
     Returns
     -------
-    The section, None where the outline crosses itself or takes more than `MOST_NODES`.
+    The section, None where the outline crosses itself or takes more than 15,000 nodes.
     """
     outline = _measured(body, wave_number)
     for _ in range(4):
@@ -188,7 +187,8 @@ def _section(
     place = mesh.doflocs.copy()
     place[:, plain.p.shape[1] + facet] = middle.T
     basis = Basis(MeshTri2(place, mesh.t), ElementTriP3(), intorder=6)
-    if basis.N > MOST_NODES:
+    most_nodes = 15_000  # three unknowns each: a second or two for each wave around
+    if most_nodes < basis.N:
         return None
     inner = basis.facet_dofs[:, facet]
     backward = start > np.roll(start, -1)

@@ -1,7 +1,7 @@
 """Surface of a body of revolution and its displacements there: rows along the outline, times angles.
 
-Rows are the ends and the middles of parabolas, `PER_WAVE` to the shortest wave along the outline, `AROUND_WAVE` to a
-wave around; each turns `BENT` at most. So a model holds about (2 · PER_WAVE · outline/λ) x (2 · AROUND_WAVE · m)
+Rows are the ends and the middles of parabolas, five to the shortest wave along the outline, `AROUND_WAVE` to a
+wave around; each turns `BENT` at most. So a model holds about (2 · 5 · outline/λ) x (2 · AROUND_WAVE · m)
 points of 12 bytes a mode.
 A row on the axis is one point, with triangles about it.
 """
@@ -18,7 +18,6 @@ from sonic_bullet.modal.revolution.rings import turns
 from sonic_bullet.modal.revolution.section import BENT, Section, spread
 from sonic_bullet.records import Array
 
-PER_WAVE = 5.0  # parabolas to the shortest wave along the outline
 AROUND_WAVE = 5  # parabolas around to a wave
 AROUND_CELLS = (24, 96)  # parabolas around, least and most
 
@@ -55,7 +54,8 @@ def rows(section: Section, wave: float) -> Rows:
     sharp = (turn >= BENT) | on | np.roll(on, 1)
     sharp[0] = True
     smooth = np.where(sharp, 0, turn)
-    density = np.maximum(PER_WAVE / wave, (smooth + np.roll(smooth, -1)) / 2 / length / BENT)
+    per_wave = 5.0  # parabolas to the shortest wave along the outline
+    density = np.maximum(per_wave / wave, (smooth + np.roll(smooth, -1)) / 2 / length / BENT)
     side: list[Array] = []
     at: list[Array] = []
     start: list[Array] = []

@@ -12,7 +12,6 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.coerce import as_number
-from sonic_bullet.records.roughness import TRACK_HEIGHTS_MOST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,9 +43,10 @@ class SurfaceForm:
             waviness_length_m=as_number(self.waviness_length_m, "waviness_length_m", "give metres above 0", above=0),
             track_spacing_m=as_number(self.track_spacing_m, "track_spacing_m", "give metres above 0", above=0),
         )
+        track_heights_most = 1 << 22
         if self.track_m is not None:
             track = frozen_array(self.track_m, float, (None,), "track_m")
-            require(2 <= len(track) <= TRACK_HEIGHTS_MOST, f"a track of {len(track)} heights", "give 2 to 4 million")
+            require(2 <= len(track) <= track_heights_most, f"a track of {len(track)} heights", "give 2 to 4 million")
             store(self, track_m=track)
 
     @property

@@ -35,12 +35,12 @@ from sonic_bullet.session.gltf_in.own_words import (
     with_grain,
     without_mounting,
 )
-from sonic_bullet.session.gltf_in.physics import AUDIO, BodyFrame
+from sonic_bullet.session.gltf_in.physics import EXTENSION_NAMES, BodyFrame
 
 
 def audio_of(nodes: Nodes) -> Mapping[str, Any]:
     """Return the document's models, materials and surfaces."""
-    found: Mapping[str, Any] = nodes.tree.tree.get("extensions", {}).get(AUDIO, {})
+    found: Mapping[str, Any] = nodes.tree.tree.get("extensions", {}).get(EXTENSION_NAMES.audio, {})
     return found
 
 
@@ -49,7 +49,7 @@ def said_of(nodes: Nodes, index: int, colliders: list[int], notes: list[str]) ->
     found: dict[str, Any] = {}
     owner = index
     for one in (index, *colliders, *nodes.ancestors(index)):
-        own = nodes.extension(one, AUDIO)
+        own = nodes.extension(one, EXTENSION_NAMES.audio)
         for key in ("modalModel", "acousticSurface"):
             if key in own and key not in found:
                 found[key] = own[key]
@@ -103,7 +103,7 @@ def material_of(
         restitution=physics.restitution,
         octave_rms_m=octaves,
         form=surface_form(tree, surface, called),
-        source=f"{AUDIO} of a glTF",
+        source=f"{EXTENSION_NAMES.audio} of a glTF",
     )
     return (made if own is None else _as_ours(made, own)), bulk
 

@@ -27,10 +27,8 @@ from sonic_bullet.session.gltf_in.joints import joint_of
 from sonic_bullet.session.gltf_in.node_frames import Nodes
 from sonic_bullet.session.gltf_in.own_words import FREE, own_mounting
 from sonic_bullet.session.gltf_in.physics import (
-    AUDIO,
+    EXTENSION_NAMES,
     GRAVITY_M_S2,
-    PHYSICS_EXTENSION,
-    SHAPES_EXTENSION,
     body_frame,
     body_nodes,
     collider_shapes,
@@ -40,9 +38,13 @@ from sonic_bullet.session.gltf_in.physics import (
 from sonic_bullet.storage.reading import reading
 
 GLTF_REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
-READ_EXTENSIONS = {PHYSICS_EXTENSION, SHAPES_EXTENSION, AUDIO, "KHR_texture_transform", "KHR_mesh_quantization"}
-LOOKS_EXTENSIONS = ("KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "EXT_meshopt", "KHR_xmp")
-"""Beginnings of extensions that only change what is seen."""
+READ_EXTENSIONS = {
+    EXTENSION_NAMES.physics,
+    EXTENSION_NAMES.shapes,
+    EXTENSION_NAMES.audio,
+    "KHR_texture_transform",
+    "KHR_mesh_quantization",
+}
 
 
 def is_gltf(path: str | os.PathLike[str]) -> bool:
@@ -62,10 +64,12 @@ def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
 def _scene_of(tree: GltfTree, name: str) -> RigidScene:
     nodes, notes = Nodes(tree), list[str]()
     used = [str(x) for x in tree.tree.get("extensionsUsed", ())]
+    # beginnings of extensions that only change what is seen
+    looks_extensions = ("KHR_materials_", "KHR_lights_", "KHR_texture_", "EXT_texture_", "EXT_meshopt", "KHR_xmp")
     notes += [
         f"{name} uses {x}, which is not read"
         for x in used
-        if x not in READ_EXTENSIONS and not x.startswith(LOOKS_EXTENSIONS)
+        if x not in READ_EXTENSIONS and not x.startswith(looks_extensions)
     ]
     found = body_nodes(nodes)
     if not found:
@@ -109,7 +113,7 @@ def _body(nodes: Nodes, index: int, colliders: list[int], modelled: bool, notes:
     material, bulk = material_of(nodes, said, index, physics, notes)
     model, mounting = None, FREE
     if "modalModel" in said and material is not None:
-        mounting = own_mounting(nodes.extension(owner, AUDIO))
+        mounting = own_mounting(nodes.extension(owner, EXTENSION_NAMES.audio))
         model, residual = model_of(nodes, said["modalModel"], owner, frame, motion.mass_kg, bulk, mounting, notes)
         material = replace(material, includes_radiation=True, residual=residual)
     mass = motion.mass_kg

@@ -7,7 +7,7 @@
 D = Q h³/12, Q of a bending wave's direction in the wall's plane, its stress-free faces condensed; c_p² = Q/ρ, c_s² =
 5G/6ρ. Averages are over the wall and over directions. Shapes are waves of random direction and phase of that k
 [Berry 1977, J. Phys. A 10, 2083], along the wall's normal, seeded by the surface. So few resonators as tell
-the ear no more stand for all: `PER_THIRD` a third octave, each for several modes where these are denser. Their mean
+the ear no more stand for all: 20 a third octave, each for several modes where these are denser. Their mean
 square continues that of the upper half of the solved ones. Bulky bodies have no tail: where a wall is not thin by its
 extent, no wave of it is.
 """
@@ -29,14 +29,6 @@ from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
 
-PER_THIRD = 20
-"""Of 1/3 octave: twice as many as the ear has filters' widths there, 4 to a tone's own."""
-THIN_WALL = 5.0
-"""√area over thickness from which on a body is a plate or a shell."""
-FEWEST_SOLVED = 6
-"""Solved modes whose mean square is continued."""
-SUMMED_WAVES = 32
-"""In a shape: the sum is normal within 1 % of its fourth moment."""
 WALL_SAMPLES = 96
 """Places of the wall and directions at them that averages are over."""
 
@@ -47,7 +39,8 @@ def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMI
     The note says how many, and for how many modes they stand.
     """
     top_hz = min(to_hz, HEARING_LIMIT_HZ)
-    alive = model.mode_count >= FEWEST_SOLVED and len(model.face) > 0 and material.alpha_per_s is not None
+    fewest_solved = 6  # solved modes whose mean square is continued
+    alive = model.mode_count >= fewest_solved and len(model.face) > 0 and material.alpha_per_s is not None
     if not alive or model.freq_hz[-1] >= 0.95 * top_hz or any(isinstance(e, RecordedLines) for e in material.effects):
         return model
     thickness, across = walls(model.vertex_m, model.face)
@@ -58,7 +51,8 @@ def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMI
     middle_m = _weighted_median(thickness[known], area[known])
     skin = known & (thickness < 2.5 * middle_m)
     wall_m2 = model.volume_m3 / middle_m
-    if np.sqrt(wall_m2) < THIN_WALL * middle_m or area[skin].sum() < 0.5 * area.sum():
+    thin_wall = 5.0  # √area over thickness from which on a body is a plate or a shell
+    if np.sqrt(wall_m2) < thin_wall * middle_m or area[skin].sum() < 0.5 * area.sum():
         return model
     seed = hashlib.sha256(np.round(model.vertex_m, 7).tobytes() + model.face.tobytes()).digest()
     rng = np.random.default_rng(int.from_bytes(seed[:8], "little"))
@@ -147,7 +141,8 @@ def _places(
     grid = np.geomspace(from_hz, to_hz, 2000)
     number = waves.count(grid, area_m2)
     per_third = np.gradient(number, np.log2(grid)) / 3
-    each = np.maximum(per_third / PER_THIRD, 1.0)
+    modes_per_third = 20  # of 1/3 octave: twice as many as the ear has filters' widths there, 4 to a tone's own
+    each = np.maximum(per_third / modes_per_third, 1.0)
     index = np.concatenate([[0.0], np.cumsum(np.diff(number) / ((each[1:] + each[:-1]) / 2))])
     count = int(index[-1])
     at = np.arange(count) + 0.5 + rng.uniform(-0.4, 0.4, count)
@@ -201,10 +196,11 @@ def _shapes(
 ) -> Array:
     """Draw shapes (v, 3, m) along the wall's normal, of mean square 1 over it."""
     shape = np.zeros((len(model.vertex_m), 3, len(freq)))
+    summed_waves = 32  # in a shape: the sum is normal within 1 % of its fourth moment
     for m, square in enumerate(waves.square(freq)):
-        chosen = rng.choice(WALL_SAMPLES, SUMMED_WAVES, p=square / square.sum())
+        chosen = rng.choice(WALL_SAMPLES, summed_waves, p=square / square.sum())
         vector = np.sqrt(square[chosen])[:, None] * waves.direction[chosen]
-        phase = model.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, SUMMED_WAVES)
-        along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((SUMMED_WAVES, 3)), axis)
+        phase = model.vertex_m @ vector.T + rng.uniform(0, 2 * np.pi, summed_waves)
+        along = np.einsum("vi,vi->v", np.cos(phase) @ rng.standard_normal((summed_waves, 3)), axis)
         shape[:, :, m] = axis * (along / np.sqrt(weight @ along**2))[:, None]
     return shape

@@ -15,14 +15,8 @@ from sonic_bullet.records.coerce import as_kinds, as_number, shown
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AnimationError
 
-SLOWEST_FPS, FASTEST_FPS = 5.0, 10_000.0
 STILL_M, STILL_RAD = 1e-5, 1e-4
 """A body that moves less from its first pose all the time does not move: a hundredth of a millimetre."""
-
-
-QUARTER_RAD = np.pi / 2
-"""Rotation from frame to frame above which the frame rate hides how a body rotates: it is known but for whole turns,
-and the next that fits, 2π less this one the other way, is no three times as fast."""
 
 
 def check_orientations(names: Sequence[str], turn: Array) -> None:
@@ -67,7 +61,8 @@ class Animation:
     def __post_init__(self) -> None:
         """Check the numbers, and that something moves."""
         remedy = "give a frame rate from 5 to 10000"
-        fps = as_number(self.fps, "fps", remedy, least=SLOWEST_FPS, most=FASTEST_FPS, error=AnimationError)
+        slowest_fps, fastest_fps = 5.0, 10_000.0
+        fps = as_number(self.fps, "fps", remedy, least=slowest_fps, most=fastest_fps, error=AnimationError)
         bodies = as_kinds(self.bodies, AnimatedBody, "bodies", "give AnimatedBody", error=AnimationError)
         place = frozen_array(self.position_m, float, (None, len(bodies), 3), "animation: position_m")
         check_orientations([one.name for one in bodies], np.asarray(self.quaternion_xyzw))

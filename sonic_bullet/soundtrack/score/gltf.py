@@ -29,9 +29,6 @@ from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
 from sonic_bullet.soundtrack.score.keyframes import tipped, upright
 from sonic_bullet.storage.reading import reading
 
-BYTES_MAX = 1 << 30
-POSES_MAX = 2_000_000
-"""Of all nodes: half a gigabyte while they are read."""
 ANIMATION_REMEDY = "export it again as glTF 2.0 (.glb)"
 
 
@@ -42,8 +39,10 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
     """
     late_s = 1e-3
     place = Path(path)
+    most_bytes = 1 << 30
+    most_poses = 2_000_000  # of all nodes: half a gigabyte while they are read
     with reading(path, "glTF file", AnimationError, ANIMATION_REMEDY):
-        if place.stat().st_size > BYTES_MAX:
+        if place.stat().st_size > most_bytes:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         file = read_tree(place, AnimationError, ANIMATION_REMEDY)
         channels = read_channels(file)
@@ -56,9 +55,9 @@ def read_gltf(path: str | os.PathLike[str], fps: float | None = None, scale: flo
         first, last = min(t[0] for t in times), max(t[-1] for t in times)
         count = int(np.floor((last - first) * rate + 1e-3)) + 1
         many = max(len(_needed(file)), 1)
-        if not 0 < count * many <= POSES_MAX:
+        if not 0 < count * many <= most_poses:
             raise AnimationError(
-                f"{path} has {count} frames of {many} nodes, {POSES_MAX} poses are the most",
+                f"{path} has {count} frames of {many} nodes, {most_poses} poses are the most",
                 "export a shorter take, or give a lower --fps",
             )
         at_s = first + np.arange(count) / rate

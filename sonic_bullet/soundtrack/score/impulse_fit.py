@@ -25,9 +25,6 @@ from sonic_bullet.listener.polling import NO_RAW
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 
-TOUCH_M = 1.5e-3
-"""How far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)."""
-
 
 def momentum_changes(animation: Animation, motion: Array, hidden_m_s: float = 0.0) -> Array:
     """Compute linear and angular momentum (t, b, 6) that contacts gave round each frame, in N·s and N·m·s.
@@ -84,7 +81,9 @@ def fit_steps(
     motion, step_s = animation.poses(), 1 / animation.fps
     change = momentum_changes(animation, motion, hidden_m_s) - known
     static = ~animation.moving
-    touch_m = TOUCH_M + hidden_m_s / float(np.sqrt(6)) / animation.fps  # what noise hides of a gap, too
+    # how far apart bodies may seem at the moment at which they touch: collision margins (Bullet's hulls: 1 mm)
+    margin_m = 1.5e-3
+    touch_m = margin_m + hidden_m_s / float(np.sqrt(6)) / animation.fps  # what noise hides of a gap, too
     for k in range(len(animation) - 1):
         raw = NO_RAW
         if k:

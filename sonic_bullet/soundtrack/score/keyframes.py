@@ -24,7 +24,6 @@ from sonic_bullet.storage.container import read_container
 from sonic_bullet.storage.reading import reading
 from sonic_bullet.storage.typed_json import decode_json
 
-ANIMATION_FORMAT = "sonic-bullet-animation/1"
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
@@ -74,11 +73,12 @@ def read_keyframes(path: str | os.PathLike[str], fps: float | None = None, scale
     bytes_max = 1 << 30
     remedy = "see docs/reference/animation.md, or export it again"
     place = Path(path)
+    animation_format = "sonic-bullet-animation/1"
     with reading(path, "animation", AnimationError, remedy):
         if place.stat().st_size > bytes_max:
             raise AnimationError(f"{path} is larger than a gigabyte", "export fewer frames")
         if place.suffix.lower() == ".npz":
-            made, arrays = read_container(place, _File, ANIMATION_FORMAT, "animation")
+            made, arrays = read_container(place, _File, animation_format, "animation")
             many = len(made.bodies)
             position, turn = (_numbers(arrays, name, many, n) for name, n in (("position", 3), ("quaternion_xyzw", 4)))
             poses = [(position[:, i], turn[:, i]) for i in range(many)]

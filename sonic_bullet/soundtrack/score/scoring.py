@@ -28,7 +28,6 @@ from sonic_bullet.session.arguments import MicrophoneLike
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, Rule, assembled
 from sonic_bullet.soundtrack.score.flight import (
-    FALL_RANGE,
     alone,
     driven_bodies,
     fall_m_s2,
@@ -40,8 +39,6 @@ from sonic_bullet.soundtrack.score.flight import (
 from sonic_bullet.soundtrack.score.method import find_steps, substeps_of
 
 SCORE_MICROPHONE = (0.0, -1.0, 0.5)
-DEEP_M = 0.01
-"""How deep poses may overlap at a frame and still be one touch of two bodies."""
 
 
 def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale: float = 1.0) -> Export:
@@ -215,7 +212,8 @@ def _check_fall(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
     if found is None or expected == 0:
         return ()
     ratio = found / expected
-    if not FALL_RANGE[0] < ratio < FALL_RANGE[1]:
+    fall_range = (0.02, 5.0)  # falls below are a slow motion of 1:7, and above another unit of length
+    if not fall_range[0] < ratio < fall_range[1]:
         factor = {2: "0.01, centimetres", 3: "0.001, millimetres"}.get(round(np.log10(ratio)), f"{1 / ratio:.3g}")
         raise AnimationError(
             f"bodies fall with {found:.4g} m/s² in this animation, gravity is {expected:.3g}",
@@ -282,7 +280,8 @@ def _deep_notes(steps: Sequence[tuple[Array, Array]], stage: PoseStage, hidden: 
         if len(raw):
             known = ~(hidden[stage.rows(raw["body_a"])] | hidden[stage.rows(raw["body_b"])])
             deepest = max(deepest, -float(raw["gap_m"][known].min(initial=0.0)))
-    if deepest < DEEP_M:
+    deep_m = 0.01  # how deep poses may overlap at a frame and still be one touch of two bodies
+    if deepest < deep_m:
         return ()
     return (f"bodies overlap by up to {deepest * 1e3:.0f} mm at frames: their meshes, or the scale, may be wrong",)
 

@@ -23,14 +23,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import whitening
 
-POSE_M, SPEED_M_S = 1e-4, 3e-2
-"""σ_x, σ_v: a pose is trusted to a tenth of a millimetre; a speed to what gravity changes it by in three milliseconds,
-about a step of the simulation.
-"""
 NUDGE = 0.01  # m/s, and of restitution
-FORCE_ROWS = ("force_n", "friction_1_n", "friction_2_n")
-ENOUGH_COST = 4.0
-"""Cost of a body's shot below which nothing is searched: every pose within 2 σ."""
 
 
 @dataclass(slots=True)
@@ -53,13 +46,23 @@ class Shooting:
     hidden_m_s / (√6 fps).
     """
 
+    # σ_x, σ_v: a pose is trusted to a tenth of a millimetre; a speed to what gravity changes it by in three
+    # milliseconds, about a step of the simulation
+    POSE_M, SPEED_M_S = 1e-4, 3e-2
+
+    FORCE_ROWS = ("force_n", "friction_1_n", "friction_2_n")
+
+    ENOUGH_COST = 4.0  # cost of a body's shot below which nothing is searched: every pose within 2 σ
+
     def __init__(self, animation: Animation, stage: PoseStage, substeps: int, hidden_m_s: float = 0.0) -> None:
         first_speed_m_s = 3.0
         self._animation, self._stage, self._substeps, self._hidden_m_s = animation, stage, substeps, hidden_m_s
         self._step_s = 1 / animation.fps / substeps
         self._hidden_m = hidden_m_s / float(np.sqrt(6)) / animation.fps
-        self._pose_m = max(POSE_M, self._hidden_m / np.sqrt(ENOUGH_COST))  # so that what is hidden is not searched for
-        self._speed_m_s = max(SPEED_M_S, hidden_m_s / np.sqrt(ENOUGH_COST))
+        self._pose_m = max(
+            self.POSE_M, self._hidden_m / np.sqrt(self.ENOUGH_COST)
+        )  # so that what is hidden is not searched for
+        self._speed_m_s = max(self.SPEED_M_S, hidden_m_s / np.sqrt(self.ENOUGH_COST))
         self._motion = animation.poses()
         self._start = self._motion[0].copy()
         self._free = np.flatnonzero(animation.free)
@@ -99,8 +102,8 @@ class Shooting:
 
         Begun at poses anew, a body at rest, touching (b,), would fall a little in every frame.
         """
-        good = np.sqrt(ENOUGH_COST) * POSE_M
-        hidden = np.where(touching, max(self._hidden_m, good), self._hidden_m if self._hidden_m >= POSE_M else 0.0)
+        good = np.sqrt(self.ENOUGH_COST) * self.POSE_M
+        hidden = np.where(touching, max(self._hidden_m, good), self._hidden_m if self._hidden_m >= self.POSE_M else 0.0)
         away = np.linalg.norm(end["position_m"] - pose["position_m"], axis=1)
         turned = np.linalg.norm(rotation(pose["quaternion_xyzw"], end["quaternion_xyzw"]), axis=1)
         within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < hidden)
@@ -140,7 +143,7 @@ class Shooting:
         raws = [raw.copy() for raw in shot.raw]
         for rows, more in zip(strikes.values(), share.tolist(), strict=True):
             for number, row in rows:
-                for name in FORCE_ROWS:
+                for name in self.FORCE_ROWS:
                     raws[number][name][row] *= 1 + more
             self._without_hidden(raws, rows)
         return list(zip(shot.motion[:-1], raws, strict=True))
@@ -161,7 +164,7 @@ class Shooting:
         if (first + sum(max(one - weight, 0) for one in later)) * self._step_s < mass * self._hidden_m_s:
             mean = sum(load.values()) / len(load) if len(load) == self._substeps else 0.0
             for number, row in rows:
-                for name in FORCE_ROWS:
+                for name in self.FORCE_ROWS:
                     raws[number][name][row] *= mean / load[number]
 
     def _strikes(self, shot: Shot) -> dict[tuple[int, int, int], list[tuple[int, int]]]:
@@ -212,7 +215,7 @@ class Shooting:
         if others:
             best = self._shot(k, best.speed, best.restitution)
         for _ in range(rounds):
-            rest = [x for x in islands if best.cost(x) > ENOUGH_COST * len(x)]
+            rest = [x for x in islands if best.cost(x) > self.ENOUGH_COST * len(x)]
             if not rest:
                 break
             before = best.cost(self._free)
@@ -231,7 +234,7 @@ class Shooting:
         best = first
         for _ in range(2):
             alone = ~best.shot.touching.any(axis=1) & self._animation.free
-            wrong = alone & ((best.residual[:, :6] ** 2).sum(axis=1) > ENOUGH_COST)
+            wrong = alone & ((best.residual[:, :6] ** 2).sum(axis=1) > self.ENOUGH_COST)
             if not wrong.any():
                 break
             speed = best.speed.copy()

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import IMAGE_WINDOW, OUTSIDE
+from sonic_bullet.estimator.perceptual.image import OUTSIDE
 from sonic_bullet.machine.compiled import njit
+
+IMAGE_WINDOW = (0.355768, 0.487396, 0.144232, 0.012604)
 
 NODES = 8  # of the loudness table, an octave of power
 TABLE_FROM, TABLE_TO = -13, 54  # its powers of two: −39 to 162 dB SPL

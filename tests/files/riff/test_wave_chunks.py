@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import AudioWriter, read_audio, write_audio
-from sonic_bullet.files.riff.wave_chunks import CHUNK_TEXT_BYTES, LAST_SAMPLE, Cue, wave_chunks
+from sonic_bullet.files.riff.wave_chunks import Cue, wave_chunks
 from sonic_bullet.records.errors import FileError, RecordError
 from tests.made.disks import full_disk
+
+LAST_SAMPLE = 2**32 - 1
+CHUNK_TEXT_BYTES = 200
 
 CUES = (Cue(0, 0, "impact a - b 3 mN·s"), Cue(777, 500, "roll x - y"), Cue(999, 0, "odd"), Cue(2000, 0, ""))
 

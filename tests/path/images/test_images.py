@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.geometry.flat_faces import UNBOUNDED_M, flat_faces
+from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Material, Microphone, MicrophonePath, Shape
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.runtime.body_stems import render_apart
@@ -16,6 +16,8 @@ from sonic_bullet.runtime.channels.body_images import specific_admittance
 from sonic_bullet.runtime.replay import LATENCY_STEPS, log_frames, render_log
 from tests.made import heads
 from tests.made.models import STEEL, box_body, row, step, wall_body
+
+UNBOUNDED_M = 1e6
 
 SR, C, DT_S = 48_000, 343.0, 1 / 240
 QUIET = replace(STEEL, alpha_per_s=1.0, beta_s=0.0)

@@ -18,7 +18,7 @@ from sonic_bullet.soundtrack.frame_rates import nearest_rate, rate_of_keys
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule, assembled
 from sonic_bullet.soundtrack.score.flight import driven_bodies, fall_m_s2, hidden_n_s, pose_noise_m
-from sonic_bullet.soundtrack.score.keyframes import ANIMATION_FORMAT, read_rules
+from sonic_bullet.soundtrack.score.keyframes import read_rules
 from sonic_bullet.soundtrack.score.scoring import read_animation
 from tests.made.animations import (
     EDGES_M,
@@ -31,6 +31,8 @@ from tests.made.animations import (
     write_glb,
     write_tree,
 )
+
+ANIMATION_FORMAT = "sonic-bullet-animation/1"
 
 
 def test_three_files_of_one_scene_are_one_animation(tmp_path: Path) -> None:

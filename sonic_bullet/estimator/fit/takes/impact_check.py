@@ -1,12 +1,14 @@
 """Whether a take is one impact: its sound begins with its most, and falls; speech, rain and noise do not.
 
-    F = energy of the first `FRONT` of a take over all, E = energy that its lines describe, both over the noise
-    no impact: F < FRONT_ENERGY and E < DESCRIBED, or more than BEFORE of the energy before the onset
+    F = energy of the first three tenths of a take over all, E = energy that its lines describe, both over the noise
+    no impact: F < 0.75 and E < 0.8, or more than 0.6 of the energy before the onset
 
-What falls has F ≥ FRONT. Long beats and long rings have little more; lines describe them.
+What falls has F ≥ 0.3. Long beats and long rings have little more; lines describe them.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
 from sonic_bullet.estimator.lines.line_values import Lines
@@ -14,10 +16,17 @@ from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 
-FRONT, FRONT_ENERGY, DESCRIBED = 0.3, 0.75, 0.8
-"""As of `features`. Takes of 22 measured objects have 0.97 of one or the other; speech and rain 0.45 and 0.62."""
-BEFORE = 0.6
-"""Of measured takes 0.43 at most, of speech whose last syllable is the loudest 0.67 and more."""
+
+class _AnImpact(NamedTuple):
+    """Shares of the energy of what is an impact."""
+
+    # As of `features`. Takes of 22 measured objects have 0.97 of one or the other; speech and rain 0.45 and 0.62.
+    front: float = 0.3
+    front_energy: float = 0.75
+    described: float = 0.8
+
+
+AN_IMPACT = _AnImpact()
 
 
 def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: float) -> str:
@@ -26,16 +35,17 @@ def describe_no_impact(signal: Array, lines: Lines, take: int, sr: int, before: 
     before: part of the energy that lies before its loudest rise.
     """
     least_energy = 0.05  # of a take's energy, over the noise: of less nothing is said
-    if before > BEFORE:
+    most_before = 0.6  # of measured takes 0.43 at most, of speech whose last syllable is the loudest 0.67 and more
+    if before > most_before:
         return f"{100 * before:.0f} % of its energy lies before its loudest rise, and does not decay from there"
     noise = float(floor_between([signal]).variance.mean())
-    n, front = len(signal), int(FRONT * len(signal))
+    n, front = len(signal), int(AN_IMPACT.front * len(signal))
     whole, first = (float(x @ x) - noise * len(x) for x in (signal, signal[:front]))
     if whole < least_energy * float(signal @ signal):
         return ""
     rest = signal - lines_sound(lines, take, n, sr)
     described = 1 - max(float(rest @ rest) - noise * n, 0.0) / whole
-    if first / whole < FRONT_ENERGY and described < DESCRIBED:
+    if first / whole < AN_IMPACT.front_energy and described < AN_IMPACT.described:
         return (
             f"{100 * max(first / whole, 0.0):.0f} % of its energy is in its first third, and lines that decay describe "
             f"{100 * max(described, 0.0):.0f} % of it"

@@ -17,8 +17,6 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject
 from sonic_bullet.estimator.fit.typical_strike import ringing
 
 ATTACK_S = 0.02
-NOT_MODAL = 0.5
-"""Of the energy within ATTACK_S, that lines which ring do not describe."""
 
 
 def next_measurement(found: CaseFit) -> str:
@@ -51,7 +49,8 @@ def _open_of_takes(e: RecordedObject) -> Iterator[str]:
     """Say what the takes of an object leave open by themselves."""
     if len(e.recordings) == 1:
         yield "strike the same place again, three times or more: of one take nothing is held out, no spread is known"
-    if _attack_left(e) > NOT_MODAL:
+    not_modal = 0.5  # of the energy within ATTACK_S, that lines which ring do not describe
+    if _attack_left(e) > not_modal:
         yield (
             "record the hammer's force with the sound (case new --force-channel): most of the first "
             f"{1000 * ATTACK_S:.0f} ms is no mode, and the force tells what of it is the contact"

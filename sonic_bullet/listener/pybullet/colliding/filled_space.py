@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.pybullet.colliding.given_bodies import SAME_M, SAME_SHARE
+from sonic_bullet.listener.pybullet.colliding.given_bodies import SAME_SIZE
 from sonic_bullet.listener.pybullet.urdf_meshes import joined, read_surfaces
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
@@ -93,7 +93,7 @@ def fills(
         sphere = pieces[0].kind == pybullet.GEOM_SPHERE
         sides.append(known[0][0] if sphere else np.abs(turn @ _turn(pieces[0].quaternion)) @ known[0][0])
     middle = turn @ (most + least) / 2 + position
-    tolerance = fine * (SAME_M + SAME_SHARE * float((high - low).max()))
+    tolerance = fine * (SAME_SIZE.metres + SAME_SIZE.share * float((high - low).max()))
     return bool(
         np.abs((low + high) / 2 - middle).max() < tolerance
         and min(np.abs((high - low) / 2 - side).max() for side in sides) < tolerance

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
@@ -42,8 +42,16 @@ MAKERS = {
 """Calls that determine a body's shape, and their positional arguments."""
 ENDERS = {"removeBody": ("bodyUniqueId",), "resetSimulation": ("flags",)}
 """Calls after which ids may be reused."""
-SAME_M, SAME_SHARE = 2e-3, 0.01
-"""Tolerances of the boxes of one shape: Bullet's margins of 1 mm, and its rounding."""
+
+
+class _SameSize(NamedTuple):
+    """Sizes that count as the same."""
+
+    metres: float = 2e-3  # tolerances of the boxes of one shape: Bullet's margins of 1 mm, and its rounding
+    share: float = 0.01
+
+
+SAME_SIZE = _SameSize()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +172,7 @@ def _one_box(one: tuple[int, int], other: tuple[int, int]) -> bool:
     pose = pybullet.getBasePositionAndOrientation(one[1], physicsClientId=one[0])
     pybullet.resetBasePositionAndOrientation(other[1], *pose, physicsClientId=other[0])
     box, same = (np.array(pybullet.getAABB(body, -1, physicsClientId=client)) for client, body in (one, other))
-    return bool(np.abs(box - same).max() < SAME_M + SAME_SHARE * float(np.ptp(box, axis=0).max()))
+    return bool(np.abs(box - same).max() < SAME_SIZE.metres + SAME_SIZE.share * float(np.ptp(box, axis=0).max()))
 
 
 def given_triangles(client_id: int, body: int) -> tuple[Array, Array] | None:

@@ -31,7 +31,6 @@ from sonic_bullet.listener.quiet import quiet_stdout
 if TYPE_CHECKING:
     from sonic_bullet.listener.pybullet.colliding.pieces import Piece
 
-LOADED = re.compile(r'^objects = p\.loadMJCF\("(.*)"\)$', re.MULTILINE)
 Ends = tuple[float, ...] | None
 """Both ends of a geom, 6 numbers, or None where it has no fromto."""
 
@@ -45,7 +44,8 @@ def loaded_files(client_id: int) -> tuple[str, ...]:
             text = place.read_text(errors="replace")
         except (pybullet.error, OSError):
             return ()
-    return tuple(dict.fromkeys(LOADED.findall(text)))
+    load_line = re.compile(r'^objects = p\.loadMJCF\("(.*)"\)$', re.MULTILINE)
+    return tuple(dict.fromkeys(load_line.findall(text)))
 
 
 def must_not_be_asked(client_id: int, body: int, drawn: tuple[Piece, ...]) -> bool:

@@ -18,15 +18,13 @@ from sonic_bullet.listener.animated import rotation
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import BodyPath, RigidBody
 
-IMMOVABLE_KG = 1e6
-KINEMATIC_SIZE_M = 1.0
-"""Of the sphere whose moments it has."""
-
 
 def as_kinematic(body: RigidBody) -> RigidBody:
     """Make a body so heavy that nothing moves it."""
-    moments = np.full(3, 0.4 * IMMOVABLE_KG * KINEMATIC_SIZE_M**2)
-    return replace(body, mass_kg=IMMOVABLE_KG, inertia_kg_m2=moments)
+    immovable_kg = 1e6
+    kinematic_size_m = 1.0  # of the sphere whose moments it has
+    moments = np.full(3, 0.4 * immovable_kg * kinematic_size_m**2)
+    return replace(body, mass_kg=immovable_kg, inertia_kg_m2=moments)
 
 
 def follow_path(client: Any, body_id: int, path: BodyPath) -> Callable[[], None]:

@@ -1,7 +1,7 @@
 """Joints between free bodies as PyBullet's constraints.
 
     fixed -> fixed      point -> point2point      slider -> prismatic
-    hinge -> two points on its axis, HINGE_M apart: they leave the turn about it alone
+    hinge -> two points on its axis, 0.1 m apart: they leave the turn about it alone
 
 PyBullet's constraints hold no range, and at most a force, which is set beyond any scene's.
 """
@@ -14,8 +14,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import RigidJoint, RigidScene
-
-HINGE_M = 0.1
 
 
 def make_joints(client: Any, scene: RigidScene, ids: list[int]) -> tuple[str, ...]:
@@ -36,7 +34,8 @@ def make_joints(client: Any, scene: RigidScene, ids: list[int]) -> tuple[str, ..
 def _places(joint: RigidJoint) -> list[Array]:
     if joint.kind != "hinge":
         return [joint.position_m]
-    return [joint.position_m + side * HINGE_M / 2 * joint.axis for side in (-1, 1)]
+    hinge_m = 0.1
+    return [joint.position_m + side * hinge_m / 2 * joint.axis for side in (-1, 1)]
 
 
 def _constrain(client: Any, joint: RigidJoint, ends: list[int], place: Array) -> None:

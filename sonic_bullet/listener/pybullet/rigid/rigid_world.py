@@ -24,12 +24,6 @@ from sonic_bullet.listener.pybullet.staged.body_shapes import collision_options,
 from sonic_bullet.records import Array
 from sonic_bullet.records.rigid_scene import CombineRule, PhysicsMaterial, RigidBody, RigidScene, SpeedDrive
 
-COMBINE_RULES: tuple[CombineRule, ...] = ("average", "minimum", "multiply", "maximum")
-"""Of two rules the later counts [KHR_physics_rigid_bodies, Physics Materials]."""
-PAIR_OFF = 0.01
-LOCKED = 1e6
-"""Times its moments that a body has whose turns are locked."""
-
 
 def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callable[[], None], tuple[str, ...]]:
     """Make the bodies of a scene in an empty world.
@@ -49,11 +43,12 @@ def build_rigid_scene(client: Any, scene: RigidScene) -> tuple[list[int], Callab
     movers: list[Callable[[], None]] = [_lifter(client, one, x) for one, x in zip(ids, scene.bodies, strict=True)
         if x.mass_kg > 0 and x.gravity_factor != 1]  # fmt: skip
     movers += [follow_path(client, ids[i], path) for i, path in driven.items()]
+    locked_factor = 1e6  # times its moments that a body has whose turns are locked
     for drive in scene.drives:
         movers.append(_motor(client, ids, drive, scene.bodies[drive.body].mass_kg))
         if drive.turns_locked:
             moments = client.getDynamicsInfo(ids[drive.body], -1)[2]
-            client.changeDynamics(ids[drive.body], -1, localInertiaDiagonal=[LOCKED * x for x in moments])
+            client.changeDynamics(ids[drive.body], -1, localInertiaDiagonal=[locked_factor * x for x in moments])
 
     def act() -> None:
         for move in movers:
@@ -93,7 +88,9 @@ def combined_restitution(a: PhysicsMaterial, b: PhysicsMaterial) -> float:
 
 
 def _combined(a: float, b: float, of_a: CombineRule, of_b: CombineRule) -> float:
-    match max(of_a, of_b, key=COMBINE_RULES.index):
+    # of two rules the later counts [KHR_physics_rigid_bodies, Physics Materials]
+    combine_rules = ("average", "minimum", "multiply", "maximum")
+    match max(of_a, of_b, key=combine_rules.index):
         case "average":
             return (a + b) / 2
         case "minimum":
@@ -140,9 +137,10 @@ def pair_factors(
         used = np.array(rows).any(axis=0)
         factor = np.where(used, found, 0.0)
     notes = []
+    pair_tolerance = 0.01
     for i, j, value in pairs:
         got = float(factor[i] * factor[j])
-        if abs(got - value) > PAIR_OFF * max(value, 0.01):
+        if abs(got - value) > pair_tolerance * max(value, 0.01):
             who = [next(b.name for b in bodies if b.physics == kinds[k]) for k in (i, j)]
             notes.append(f"{who[0]} on {who[1]} is {got:.3g} in place of {value:.3g}: PyBullet multiplies")
     return np.array([factor[kinds.index(body.physics)] for body in bodies]), tuple(notes)

@@ -20,10 +20,6 @@ from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError, SceneError
 
-FAR_AWAY = (0.0, 0.0, -1e5)
-SMOOTH = 0.001
-"""Deviation of a simplified mesh, relative to its size: less than a pixel of a picture that it fills."""
-
 
 class PyBulletPictures:
     """`Pictures` by TinyRenderer, whose time is proportional to pixels.
@@ -105,11 +101,12 @@ class PyBulletPictures:
         """Draw a part of the picture: colours (height, width, 3) uint8 and depths (height, width)."""
         light = (0.4, -0.6, 1.2)
         (width, height), (x0, y0, x1, y1) = self._size, part
+        far_away = (0.0, 0.0, -1e5)
         for bodies, place, turn, there in zip(
             self._bodies, position_m.tolist(), quaternion_xyzw.tolist(), shown.tolist(), strict=True
         ):
             for body in bodies:
-                self._client.resetBasePositionAndOrientation(body, place if there else FAR_AWAY, turn)
+                self._client.resetBasePositionAndOrientation(body, place if there else far_away, turn)
         away = float(np.linalg.norm(camera.target_m - camera.eye_m))
         view = self._client.computeViewMatrix(camera.eye_m.tolist(), camera.target_m.tolist(), camera.up.tolist())
         near = 0.02 * away
@@ -140,8 +137,10 @@ def simplified(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 
     size = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
     made = manifold3d.Manifold(manifold3d.Mesh(vertex_m.astype(np.float32), face.astype(np.uint32)))
+    # deviation of a simplified mesh, relative to its size: less than a pixel of a picture that it fills
+    deviation = 0.001
     if made.status() == manifold3d.Error.NoError and not made.is_empty():
-        mesh = made.simplify(SMOOTH * size).to_mesh()
+        mesh = made.simplify(deviation * size).to_mesh()
         if len(mesh.tri_verts):
             vertex_m, face = np.asarray(mesh.vert_properties, float)[:, :3], np.asarray(mesh.tri_verts, np.int64)
     return vertex_m, face
