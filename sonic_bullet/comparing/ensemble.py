@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.comparing.inputs.tree_difference import with_leaves
 from sonic_bullet.comparing.outcome.sound_effects import AUDIBLE_OCTAVES_HZ
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.calls import Call, Who, with_leaves
+from sonic_bullet.listener.calls import Call, Who
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import CompareError

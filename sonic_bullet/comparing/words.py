@@ -10,9 +10,10 @@ import numpy as np
 from sonic_bullet.comparing.inputs.input_differences import Asked
 from sonic_bullet.comparing.inputs.log_differences import Logged
 from sonic_bullet.comparing.inputs.matched_logs import NO_NAME
+from sonic_bullet.comparing.inputs.tree_difference import same
 from sonic_bullet.comparing.sides import Side
 from sonic_bullet.comparing.tolerance import sameness_words
-from sonic_bullet.listener.calls import Call, InputFile, Who, same
+from sonic_bullet.listener.calls import Call, InputFile, Who
 
 if TYPE_CHECKING:
     from sonic_bullet.comparing.comparison_record import Comparison

@@ -9,7 +9,8 @@ import pytest
 
 from sonic_bullet.comparing.inputs.call_pairs import aligned, side_by_side
 from sonic_bullet.comparing.inputs.causes import find_causes, log_distance, same_sound, shapley_shares
-from sonic_bullet.listener.calls import ABSENT, Call, Who, leaves, same, with_leaves
+from sonic_bullet.comparing.inputs.tree_difference import ABSENT, leaves, same, with_leaves
+from sonic_bullet.listener.calls import Call, Who
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 

@@ -63,10 +63,10 @@ def test_where_contacts_differ_a_log_says_that_no_share_is_known(tmp_path: Path,
 
 
 def test_a_new_field_of_a_record_is_an_input_by_itself(log: ContactLog) -> None:
-    from sonic_bullet.comparing.inputs.matched_logs import body_leaves
+    from sonic_bullet.comparing.inputs.matched_logs import body_inputs
 
     body = log.bodies[0]
-    known = {path[0] for path in body_leaves(body)}
+    known = set(body_inputs(body))
     from dataclasses import fields
 
     assert {one.name for one in fields(body)} - set(NO_INPUT) - {"dynamics"} <= known

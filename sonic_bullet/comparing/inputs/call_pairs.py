@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from sonic_bullet.listener.calls import ABSENT, Call, Who, leaves, mapped, same
+from sonic_bullet.comparing.inputs.tree_difference import differing_leaves, unlike_fraction
+from sonic_bullet.listener.calls import Call, Who, mapped
 
 One = TypeVar("One")
 GAP = 0.6
@@ -111,12 +112,7 @@ def _middle(
 
 def differing(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any, Any]]:
     """Return the leaves of two calls that differ: (A's, B's), ABSENT where one has none."""
-    one, other = dict(leaves(a.arguments) if a else ()), dict(leaves(b.arguments) if b else ())
-    return {
-        path: (one.get(path, ABSENT), other.get(path, ABSENT))
-        for path in {**one, **other}
-        if not same(one.get(path, ABSENT), other.get(path, ABSENT))
-    }
+    return differing_leaves(a.arguments if a else {}, b.arguments if b else {})
 
 
 def about(call: Call) -> tuple[Any, ...]:
@@ -126,9 +122,7 @@ def about(call: Call) -> tuple[Any, ...]:
 
 
 def _unlike(a: Call, b: Call) -> float:
-    if about(a) != about(b):
-        return float("inf")
-    return _share(a, b)
+    return unlike_fraction(a.arguments, b.arguments) if about(a) == about(b) else float("inf")
 
 
 def _gap(call: Call) -> float:
@@ -136,13 +130,8 @@ def _gap(call: Call) -> float:
 
 
 def _unlike_bodies(a: Call, b: Call) -> float:
-    return _share(a, b) if a.name == b.name and len(a.made) == len(b.made) else float("inf")
-
-
-def _share(a: Call, b: Call) -> float:
-    """Compute the fraction of all leaves of both calls that differ."""
-    most = len({path for call in (a, b) for path, _ in leaves(call.arguments)})
-    return len(differing(a, b)) / max(most, 1)
+    alike = a.name == b.name and len(a.made) == len(b.made)
+    return unlike_fraction(a.arguments, b.arguments) if alike else float("inf")
 
 
 def _by_step(calls: Iterable[Call]) -> dict[int, list[Call]]:

@@ -15,8 +15,9 @@ from typing import Any
 
 from sonic_bullet.comparing.inputs.call_pairs import CallPair, differing, side_by_side
 from sonic_bullet.comparing.inputs.put_back import HANDLES, Place
+from sonic_bullet.comparing.inputs.tree_difference import ABSENT, Path, leaves
 from sonic_bullet.comparing.sides import Side
-from sonic_bullet.listener.calls import ABSENT, Call, Path, Who, leaves
+from sonic_bullet.listener.calls import Call, Who
 
 ONE_QUANTITY = {
     "baseMass": "mass",

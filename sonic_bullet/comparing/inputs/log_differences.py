@@ -7,16 +7,16 @@ An inertia that changed with the mass, a volume with the shape, and modes with t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet.comparing.inputs.input_differences import ONE_QUANTITY, damping
-from sonic_bullet.comparing.inputs.matched_logs import body_leaves
+from sonic_bullet.comparing.inputs.matched_logs import body_inputs
+from sonic_bullet.comparing.inputs.tree_difference import Path, differing_leaves, leaves, same, with_leaves
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.calls import Path, leaves, same, with_leaves
 from sonic_bullet.records import Array, Body
 
 Exchange = Callable[[ContactLog, ContactLog], ContactLog]
@@ -54,13 +54,9 @@ def logged_differences(a: ContactLog, b: ContactLog, pairs: list[tuple[int | Non
         else:
             found += _body(a, b, i, j)
     found += _changes(a, b, pairs)
-    for one in fields(a):
-        if one.name not in of_run:
-            old, new = dict(leaves(getattr(a, one.name), (one.name,))), dict(leaves(getattr(b, one.name), (one.name,)))
-            for path in {**old, **new}:
-                if not same(old.get(path), new.get(path)):
-                    what = ONE_QUANTITY.get(path[-1], path[-1])
-                    found.append(Logged("", what, old.get(path), new.get(path), _setting(path), "sound"))
+    settings = [{one.name: getattr(log, one.name) for one in fields(log) if one.name not in of_run} for log in (a, b)]
+    for path, values in differing_leaves(settings[0], settings[1], absent=None).items():
+        found.append(Logged("", ONE_QUANTITY.get(path[-1], path[-1]), *values, _setting(path), "sound"))
     step_s = max(float(a.steps[0].dt_s), float(b.steps[0].dt_s))
     if abs(a.duration_s - b.duration_s) > 1.5 * step_s:
         found.append(Logged("", "seconds", a.duration_s, b.duration_s))
@@ -98,13 +94,11 @@ def _body(a: ContactLog, b: ContactLog, i: int, j: int) -> list[Logged]:
     # Fields of a material on which modes depend
     of_modes = ("density_kg_m3", "stiffness_pa", "alpha_per_s", "beta_s", "effects", "includes_radiation", "name")
     one, other = a.bodies[i], b.bodies[j]
-    old, new = body_leaves(one), body_leaves(other)
-    changed = [path for path in {**old, **new} if not same(old.get(path), new.get(path))]
+    changed = differing_leaves(body_inputs(one), body_inputs(other), absent=None)
     found: dict[str, Logged] = {}
     modes_differ = not same_model(one, other)
     for path in changed:
-        what, acts = _quantity(path)
-        value = old.get(path), new.get(path)
+        (what, acts), value = _quantity(path), changed[path]
         if path[0] == "material" and one.material and other.material and one.material.name != other.material.name:
             what, value = "material", (one.material.name, other.material.name)
         if what == "damping":
@@ -242,18 +236,15 @@ def _setting(path: Path) -> Exchange:
     """Return the exchange of a setting, or of a part of it."""
 
     def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
-        value: Any = getattr(a, path[0])
-        for name in path[1:]:
-            value = getattr(value, name)
-        made: Mapping[str, Any] = {path[0]: with_leaves(getattr(b, path[0]), {path[1:]: value})}
-        return replace(b, **made)
+        made: ContactLog = with_leaves(b, {path: dict(leaves(getattr(a, path[0]), path[:1])).get(path)})
+        return made
 
     return exchange
 
 
 def _leaf(path: Path, i: int, j: int) -> Exchange:
     def exchange(a: ContactLog, b: ContactLog) -> ContactLog:
-        value = body_leaves(a.bodies[i]).get(path)
+        value = dict(leaves(body_inputs(a.bodies[i]))).get(path)
         return _with_body(b, j, with_leaves(b.bodies[j], {path: value}))
 
     return exchange

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.comparing.inputs.call_pairs import GAP, aligned
+from sonic_bullet.comparing.inputs.tree_difference import unlike_fraction
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.calls import leaves, same
 from sonic_bullet.records import Array, Body
 from sonic_bullet.records.errors import CompareError
 
@@ -31,15 +31,11 @@ class FirstDifference:
     bodies: frozenset[str] = frozenset()
 
 
-def body_leaves(body: Body) -> dict[tuple[str, ...], Any]:
-    """Return all inputs of a body, by path."""
-    found: dict[tuple[str, ...], Any] = {}
+def body_inputs(body: Body) -> dict[str, Any]:
+    """Return all inputs of a body, by field."""
     # fields of a body that identify it and its lifetime; its modes follow from the rest
     no_input = ("body_id", "link", "epoch", "name", "since_step", "until_step", "model")
-    for one in fields(body):
-        if one.name not in no_input:
-            found |= dict(leaves(getattr(body, one.name), (one.name,)))
-    return found
+    return {one.name: getattr(body, one.name) for one in fields(body) if one.name not in no_input}
 
 
 def matched(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]:
@@ -55,10 +51,10 @@ def matched(a: ContactLog, b: ContactLog) -> list[tuple[int | None, int | None]]
         (one[name], other[name]) for name in one if name in other and not NO_NAME.match(name)
     ]
     rest = [
-        [(index, body_leaves(log.bodies[index])) for name, index in known.items() if NO_NAME.match(name)]
+        [(index, body_inputs(log.bodies[index])) for name, index in known.items() if NO_NAME.match(name)]
         for log, known in ((a, one), (b, other))
     ]
-    found = aligned(rest[0], rest[1], lambda x, y: _unlike(x[1], y[1]), lambda x: GAP)
+    found = aligned(rest[0], rest[1], lambda x, y: unlike_fraction(x[1], y[1], absent=None), lambda x: GAP)
     pairs += [(None if x is None else x[0], None if y is None else y[0]) for x, y in found]
     pairs += [(index, None) for name, index in one.items() if name not in other and not NO_NAME.match(name)]
     pairs += [(None, index) for name, index in other.items() if name not in one and not NO_NAME.match(name)]
@@ -81,11 +77,6 @@ def _latest(log: ContactLog) -> dict[str, int]:
                 )
         found[body.name] = index
     return found
-
-
-def _unlike(a: dict[tuple[str, ...], Any], b: dict[tuple[str, ...], Any]) -> float:
-    paths = {*a, *b}
-    return sum(not same(a.get(path), b.get(path)) for path in paths) / max(len(paths), 1)
 
 
 def first_difference(a: ContactLog, b: ContactLog, pairs: list[tuple[int | None, int | None]]) -> FirstDifference:

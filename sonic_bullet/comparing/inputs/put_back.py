@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sonic_bullet.comparing.inputs.call_pairs import CallPair, about, differing
-from sonic_bullet.listener.calls import ABSENT, Call, Path, leaves, with_leaves
+from sonic_bullet.comparing.inputs.tree_difference import ABSENT, Path, leaves, with_leaves
+from sonic_bullet.listener.calls import Call
 
 HANDLES = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId", "body", "links", "linkIndex", "jointIndex")
 """Arguments that identify the body of a call; they are not inputs."""
