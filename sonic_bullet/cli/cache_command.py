@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 @json_option
 def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
     """List what is kept between runs (computed modes, machine code), bound it or clear it."""
-    from sonic_bullet.cli.output import clean_stdout, places, write_json
+    from sonic_bullet.cli.output import clean_stdout, places, print_report, write_json
     from sonic_bullet.machine.compiled import folder as code_folder
     from sonic_bullet.storage import cache as store
 
@@ -51,8 +52,9 @@ def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
         "removed": by_kind(removed),
     }
     with clean_stdout(json_to) as say:
-        say(_said(result, asked=clear or limit is not None))
-    write_json(json_to, result)
+        report = CacheReport(result, asked=clear or limit is not None)
+        print_report(report, say)
+    write_json(json_to, report.to_json())
 
 
 def by_kind(files: Iterable[KeptFile]) -> list[dict[str, Any]]:
@@ -73,22 +75,33 @@ def by_kind(files: Iterable[KeptFile]) -> list[dict[str, Any]]:
     ]
 
 
-def _said(result: dict[str, Any], asked: bool) -> str:
-    """Format the result. asked: a removal was asked for."""
-    from sonic_bullet.cli.output import table
+@dataclass(frozen=True, slots=True)
+class CacheReport:
+    """Report of what is cached. asked: a removal was asked for."""
 
-    def total_mb(kinds: list[dict[str, Any]]) -> float:
-        return float(sum(kind["bytes"] for kind in kinds) / 1e6)
+    found: dict[str, Any]
+    asked: bool
 
-    lines = [f"kept in {' and '.join(result['folders'])}" if result["folders"] else "nothing can be kept"]
-    if asked:
-        count = sum(kind["files"] for kind in result["removed"])
-        lines.append(f"removed: {format_count(count, 'file')}, {total_mb(result['removed']):.1f} MB")
-    rows = [
-        (kind["kind"], str(kind["files"]), f"{kind['bytes'] / 1e6:.1f}", kind["oldest_use"][:16])
-        for kind in result["kinds"]
-    ]
-    if rows:
-        lines.append(table(("kind", "files", "MB", "oldest use"), rows))
-    limit = result["limit_bytes"] / 1e6
-    return "\n".join([*lines, f"{total_mb(result['kinds']):.1f} MB in all; of what is computed {limit:.0f} MB at most"])
+    def to_json(self) -> dict[str, Any]:
+        """Return folders, limit, and each kind that is there or was removed."""
+        return self.found
+
+    def lines(self) -> list[str]:
+        """Return folders, what was removed, and a table of the kinds."""
+        from sonic_bullet.cli.output import table
+
+        def total_mb(kinds: list[dict[str, Any]]) -> float:
+            return float(sum(kind["bytes"] for kind in kinds) / 1e6)
+
+        lines = [f"kept in {' and '.join(self.found['folders'])}" if self.found["folders"] else "nothing can be kept"]
+        if self.asked:
+            count = sum(kind["files"] for kind in self.found["removed"])
+            lines.append(f"removed: {format_count(count, 'file')}, {total_mb(self.found['removed']):.1f} MB")
+        rows = [
+            (kind["kind"], str(kind["files"]), f"{kind['bytes'] / 1e6:.1f}", kind["oldest_use"][:16])
+            for kind in self.found["kinds"]
+        ]
+        if rows:
+            lines.append(table(("kind", "files", "MB", "oldest use"), rows))
+        limit = self.found["limit_bytes"] / 1e6
+        return [*lines, f"{total_mb(self.found['kinds']):.1f} MB in all; of what is computed {limit:.0f} MB at most"]

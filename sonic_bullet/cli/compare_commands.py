@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
@@ -64,12 +64,13 @@ def compare(a: str, b: str | None, **options: Any) -> None:
         assert b is not None
         tell = stack.enter_context(status("compare"))
         found, stopped = _found(Path(a), Path(b), options, tell, page is not None)
-        _say(say, found, stopped)
+        summary = CompareReport(found, stopped)
+        print_report(summary, say)
         if page is not None:
             from sonic_bullet.report.compare_page import write_page
 
             write_page(page, [one.kept["page"] for one in found if one.kept is not None])
-    write_json(to, _described(found, stopped))
+    write_json(to, summary.to_json())
     if stopped:
         raise KeyboardInterrupt("stopped: what was compared by then is above")
     _exit(found)
@@ -180,28 +181,37 @@ def _against_baseline(a: Path, b: Path, tell: Callable[[str], None], tolerance_d
             "stopped": False, "refused": ""}  # fmt: skip
 
 
-def _say(say: Callable[[str], None], found: list[Any], stopped: bool) -> None:
-    for one in found:
-        head = f"{one.name}: " if len(found) > 1 else ""
-        for number, line in enumerate(one.kept["lines"] if one.kept is not None else [one.error]):
-            say(f"{head if not number else ''}{line}")
-    compared = sum(one.kept is not None for one in found)
-    passed = sum(one.kept is not None and one.kept["passed"] for one in found)
-    rest = len(found) - compared
-    tail = f", {rest} not compared" if rest else ""
-    say(f"compared {compared}: {passed} the same, {compared - passed} differ{tail}{', stopped' if stopped else ''}")
+@dataclass(frozen=True, slots=True)
+class CompareReport:
+    """Report of all pairs, and whether it was interrupted."""
 
+    found: list[Any]
+    stopped: bool
 
-def _described(found: list[Any], stopped: bool) -> dict[str, Any]:
-    """Return the content of the JSON."""
-    return {
-        "compared": sum(one.kept is not None for one in found),
-        "stopped": stopped,
-        "pairs": [
-            {"name": one.name, "error": one.error or None, **({} if one.kept is None else one.kept["described"])}
-            for one in found
-        ],
-    }
+    def to_json(self) -> dict[str, Any]:
+        """Return each pair's comparison, or why there is none."""
+        return {
+            "compared": sum(one.kept is not None for one in self.found),
+            "stopped": self.stopped,
+            "pairs": [
+                {"name": one.name, "error": one.error or None, **({} if one.kept is None else one.kept["described"])}
+                for one in self.found
+            ],
+        }
+
+    def lines(self) -> list[str]:
+        """Return the lines of each pair, and a count."""
+        said = []
+        for one in self.found:
+            head = f"{one.name}: " if len(self.found) > 1 else ""
+            lines = one.kept["lines"] if one.kept is not None else [one.error]
+            said += [f"{head}{lines[0]}", *lines[1:]]
+        compared = sum(one.kept is not None for one in self.found)
+        passed = sum(one.kept is not None and one.kept["passed"] for one in self.found)
+        rest = len(self.found) - compared
+        tail = f", {rest} not compared" if rest else ""
+        end = ", stopped" if self.stopped else ""
+        return [*said, f"compared {compared}: {passed} the same, {compared - passed} differ{tail}{end}"]
 
 
 def _exit(found: list[Any]) -> None:

@@ -6,13 +6,13 @@ Exit 0: a verdict; 1: the baseline is farther from the recordings than silence.
 from __future__ import annotations
 
 import os
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
-from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, warn, write_json
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, status, table, warn, write_json
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
@@ -37,15 +37,15 @@ def run_diagnose(
         raise FileError(f"cannot write {report}: a report is a page", "end the name with .html")
     output, report, json_to = places(output, report, json_to)
     folder = None if predict is None else folder_place(predict, *SIDES)
-    case = read_case(source)
+    case, strike, written = read_case(source), None, ""
     warn(case.warnings)
     with clean_stdout(json_to) as say:
-        from sonic_bullet.diagnosis.diagnose import described, diagnose
+        from sonic_bullet.diagnosis.diagnose import diagnose
 
         with status(source) as progress:
             found = diagnose(case, seed=seed, progress=progress)
             if folder is not None:
-                written = _predicted(found, folder)
+                written = f"{format_count(_predicted(found, folder), 'strike')} predicted in {predict}"
             if propose:
                 from sonic_bullet.diagnosis.separating_strike import separating_strike
 
@@ -61,14 +61,10 @@ def run_diagnose(
             from sonic_bullet.presets import write_preset
 
             write_preset(output, preset_of(found))
-        say(_summary(found))
-        if propose:
-            say(f"next strike: {strike or 'no two models to separate, or no recordings'}")
-        if predict is not None:
-            say(f"{format_count(written, 'strike')} predicted in {predict}")
+        summary = DiagnosisReport(found, propose, strike, written)
+        print_report(summary, say)
     warn(found.warnings)
-    asked = {"next_strike": asdict(strike) if strike else None} if propose else {}
-    write_json(json_to, described(found) | asked)
+    write_json(json_to, summary.to_json())
     if found.verdict == "worse-than-silence":
         raise click.exceptions.Exit(1)
 
@@ -93,54 +89,76 @@ def _predicted(found: Any, folder: str) -> int:
     return len(made)
 
 
-def _summary(found: Any) -> str:
-    """Format the diagnosis for a terminal."""
-    from sonic_bullet.diagnosis.deciding_measurement import next_measurement
-    from sonic_bullet.diagnosis.remainder import NOTHING
-    from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
-    from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
+@dataclass(frozen=True, slots=True)
+class DiagnosisReport:
+    """Report of a `Diagnosis`; strike: the one to measure next, where ``proposed``; predicted: what was written."""
 
-    splits = {r.split for r in found.case.recordings}
+    found: Any
+    proposed: bool = False
+    strike: Any = None
+    predicted: str = ""
 
-    def missing(split: str) -> str:
-        return "not compared" if split in found.not_compared else "no audio"
+    def to_json(self) -> dict[str, Any]:
+        """Return the diagnosis, and the next strike where it was asked for."""
+        from sonic_bullet.diagnosis.diagnose import described
 
-    words = {
-        "none": "the model suffices: no effect is accepted",
-        "explained": "the model lacks" + (", not alone" if found.unexplained else ""),
-        "unexplained": "something is left that no known effect explains",
-        "worse-than-silence": "what was fitted is farther from the recordings than silence: no effect was sought",
-        "nothing": NOTHING,
-    }
-    nothing = type(found.closed) is NothingCompared
-    text = [f"{found.case.name}: {found.verdict}: {words['nothing' if nothing else found.verdict]}"]
-    for c in found.closed.added:
-        numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
-        text.append(
-            f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, "
-            f"chance {c.control_db:.2f} dB"
-        )
-    rows = [
-        (
-            split,
-            *(
-                f"{found.errors[side][split]:.2f} dB" if found.errors[side][split] is not None else missing(split)
-                for side in ("before", "after")
-            ),
-        )
-        for split in ("fit", "holdout", "transfer")
-        if split in found.errors["before"] and split in splits
-    ]
-    text.append(table(("log-spectral distance", "before", "after"), rows))
-    if found.errors["floor"] is not None:
-        text.append(f"noise alone: {found.errors['floor']:.2f} dB")
-    if tried := effect_table(found.closed):
-        text.append(table(HEAD, [row.cells() for row in tried]))
-    if found.unexplained:
-        text.append(f"left: {found.unexplained['words']}")
-    if said := next_measurement(found.found, found.closed, found.unexplained):
-        text.append(f"next: {said}")
-    return "\n".join(text)
+        asked = {"next_strike": asdict(self.strike) if self.strike else None} if self.proposed else {}
+        return described(self.found) | asked
+
+    def lines(self) -> list[str]:
+        """Return verdict, effects with their numbers, distances, and what to measure next."""
+        from sonic_bullet.diagnosis.deciding_measurement import next_measurement
+        from sonic_bullet.diagnosis.remainder import NOTHING
+        from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
+        from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
+
+        splits = {r.split for r in self.found.case.recordings}
+
+        def missing(split: str) -> str:
+            return "not compared" if split in self.found.not_compared else "no audio"
+
+        words = {
+            "none": "the model suffices: no effect is accepted",
+            "explained": "the model lacks" + (", not alone" if self.found.unexplained else ""),
+            "unexplained": "something is left that no known effect explains",
+            "worse-than-silence": "what was fitted is farther from the recordings than silence: no effect was sought",
+            "nothing": NOTHING,
+        }
+        nothing = type(self.found.closed) is NothingCompared
+        text = [f"{self.found.case.name}: {self.found.verdict}: {words['nothing' if nothing else self.found.verdict]}"]
+        for c in self.found.closed.added:
+            numbers = ", ".join(f"{k} {_number(v)}" for k, v in c.effect.parameters().items())
+            text.append(
+                f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, "
+                f"chance {c.control_db:.2f} dB"
+            )
+        rows = [
+            (
+                split,
+                *(
+                    f"{self.found.errors[side][split]:.2f} dB"
+                    if self.found.errors[side][split] is not None
+                    else missing(split)
+                    for side in ("before", "after")
+                ),
+            )
+            for split in ("fit", "holdout", "transfer")
+            if split in self.found.errors["before"] and split in splits
+        ]
+        text.append(table(("log-spectral distance", "before", "after"), rows))
+        if self.found.errors["floor"] is not None:
+            text.append(f"noise alone: {self.found.errors['floor']:.2f} dB")
+        if tried := effect_table(self.found.closed):
+            text.append(table(HEAD, [row.cells() for row in tried]))
+        if self.found.unexplained:
+            text.append(f"left: {self.found.unexplained['words']}")
+        if said := next_measurement(self.found.found, self.found.closed, self.found.unexplained):
+            text.append(f"next: {said}")
+        if self.proposed:
+            text.append(f"next strike: {self.strike or 'no two models to separate, or no recordings'}")
+        if self.predicted:
+            text.append(self.predicted)
+        return text
 
 
 def _number(value: Any) -> str:

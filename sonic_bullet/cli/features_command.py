@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, write_csv
-from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
+from sonic_bullet.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.files import read_channel
 from sonic_bullet.records import Array
@@ -46,52 +47,61 @@ def run_features(
         notes = "; ".join(filter(None, (which, found.note)))
         if picture is not None:
             _draw(picture, observed, sr, found)
-        say(_summary(recording, found))
+        report = FeatureReport(recording, found, notes, bool(found.note) or (bool(which) and channel is None))
+        print_report(report, say)
     warn(f"{recording}: {note}" for note in [found.note] if note)
-    write_csv(csv_to, feature_rows(found), (*LINE_NUMBERS, *decays))
-    write_json(json_to, described(found, notes, doubtful=bool(found.note) or (bool(which) and channel is None)))
+    write_csv(csv_to, report.rows(), (*LINE_NUMBERS, *decays))
+    write_json(json_to, report.to_json())
 
 
-def described(found: Features, notes: str, *, doubtful: bool) -> dict[str, Any]:
-    """Convert features to JSON values; null for a spread that is not known. doubtful: a note puts them in doubt."""
-    rows = feature_rows(found)
-    verdict = "features" if rows and not doubtful else "doubtful" if rows else "no features"
-    return {
-        "features": rows,
-        "onset_s": found.onset_s,
-        "noise_dbfs": found.noise_dbfs,
-        "sr": found.sr,
-        "verdict": verdict,
-        "note": notes,
-    }
+@dataclass(frozen=True, slots=True)
+class FeatureReport:
+    """Report of the features of a recording. doubtful: a note puts them in doubt."""
 
+    recording: str
+    found: Features
+    notes: str
+    doubtful: bool
 
-def feature_rows(found: Features) -> list[dict[str, float | int | None]]:
-    """Return a row a feature, strongest first, with T60, η and Q of its decay; None for a spread not known."""
-    columns = [getattr(found, name) for name in LINE_NUMBERS]
-    return [
-        {name: finite(column[k]) for name, column in zip(LINE_NUMBERS, columns, strict=True)}
-        | decay_values(found.freq_hz[k], found.decay_per_s[k], found.decay_sd_per_s[k])
-        for k in range(len(found.freq_hz))
-    ]
+    def to_json(self) -> dict[str, Any]:
+        """Return features, onset and noise; null for a spread that is not known."""
+        rows = self.rows()
+        verdict = "features" if rows and not self.doubtful else "doubtful" if rows else "no features"
+        return {
+            "features": rows,
+            "onset_s": self.found.onset_s,
+            "noise_dbfs": self.found.noise_dbfs,
+            "sr": self.found.sr,
+            "verdict": verdict,
+            "note": self.notes,
+        }
 
+    def lines(self) -> list[str]:
+        """Return onset and noise, and a table of the features."""
+        order, values = np.argsort(self.found.freq_hz), self.rows()
+        rows = [
+            (
+                f"{self.found.freq_hz[k]:.3f}",
+                f"{self.found.freq_sd_hz[k]:.2g}",
+                f"{self.found.decay_per_s[k]:.4g}",
+                f"{self.found.decay_sd_per_s[k]:.2g}",
+                *decay_cells(values[k]),
+                f"{20 * np.log10(self.found.amplitude[k]):.1f}",
+            )
+            for k in order
+        ]
+        head = f"{self.recording}: {format_count(len(rows), 'feature')}, onset at {self.found.onset_s:.4f} s, "
+        head += f"noise {self.found.noise_dbfs:.1f} dBFS"
+        return [head, table(("Hz", "±", "decay 1/s", "±", "T60 s", "loss factor", "Q", "dBFS"), rows)]
 
-def _summary(recording: str, found: Features) -> str:
-    order, values = np.argsort(found.freq_hz), feature_rows(found)
-    rows = [
-        (
-            f"{found.freq_hz[k]:.3f}",
-            f"{found.freq_sd_hz[k]:.2g}",
-            f"{found.decay_per_s[k]:.4g}",
-            f"{found.decay_sd_per_s[k]:.2g}",
-            *decay_cells(values[k]),
-            f"{20 * np.log10(found.amplitude[k]):.1f}",
-        )
-        for k in order
-    ]
-    head = f"{recording}: {format_count(len(rows), 'feature')}, onset at {found.onset_s:.4f} s, "
-    head += f"noise {found.noise_dbfs:.1f} dBFS"
-    return "\n".join([head, table(("Hz", "±", "decay 1/s", "±", "T60 s", "loss factor", "Q", "dBFS"), rows)])
+    def rows(self) -> list[dict[str, float | int | None]]:
+        """Return a row a feature, strongest first, with T60, η and Q of its decay; None for a spread not known."""
+        columns = [getattr(self.found, name) for name in LINE_NUMBERS]
+        return [
+            {name: finite(column[k]) for name, column in zip(LINE_NUMBERS, columns, strict=True)}
+            | decay_values(self.found.freq_hz[k], self.found.decay_per_s[k], self.found.decay_sd_per_s[k])
+            for k in range(len(self.found.freq_hz))
+        ]
 
 
 def _draw(path: str, sound: Array, sr: int, found: Features) -> None:

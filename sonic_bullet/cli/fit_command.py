@@ -5,7 +5,7 @@ Exit 0: fitted; 1: the fit is farther from the takes than silence; 2: as for all
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import click
 import numpy as np
 
 from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, take_tables, write_csv
-from sonic_bullet.cli.output import clean_stdout, places, status, table, warn, write_json
+from sonic_bullet.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.files.case_fields import LARGEST_NUMBER
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, dimension_tolerance, medium_of, read_case
 from sonic_bullet.files.uff.writer import uff_name, write_uff
@@ -91,10 +91,11 @@ def run_fit(
             from sonic_bullet.plots.fit_plot import write_fit_picture
 
             write_fit_picture(picture, found)
-        say(_summary(found, preset))
+        report = FitReport(found, preset)
+        print_report(report, say)
     warn(found.warnings)
-    write_csv(csv_to, line_rows(found), fit_columns)
-    write_json(json_to, described(found))
+    write_csv(csv_to, report.line_rows(), fit_columns)
+    write_json(json_to, report.to_json())
     if found.worse_than_silence:
         raise click.exceptions.Exit(1)
 
@@ -182,110 +183,122 @@ def _unit(name: str, one: dict[str, Any]) -> Point | None:
     return (direction[0] / length, direction[1] / length, direction[2] / length)
 
 
-def described(found: Any) -> dict[str, Any]:
-    """Convert the fit to JSON values, None where not identifiable."""
-    from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
+@dataclass(frozen=True, slots=True)
+class FitReport:
+    """Report of a `CaseFit` and of the preset made of it."""
 
-    fit = found.fit
-    return {
-        "alpha_per_s": fit.alpha_per_s,
-        "beta_s": fit.beta_s,
-        "gamma_m2_s2": fit.gamma_m2_s2 if found.has_material else None,
-        "sigma": fit.sigma,
-        "poisson_ratio": fit.poisson_ratio if found.has_material else None,
-        "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
-        "dimension_tolerance": found.dimension_tolerance,
-        "verdict": fit.verdict,
-        "log_spectral_db": found.log_spectral_db if found.log_spectral_db >= 0 else None,
-        "takes": [asdict(take) for take in found.takes],
-        "next_measurement": next_measurement(found),
-        "modes": [
-            {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
-            for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
-        ],
-        "lines": line_rows(found),
-    }
+    found: Any
+    preset: Any
 
+    def to_json(self) -> dict[str, Any]:
+        """Return parameters, lines and takes; None where not identifiable."""
+        from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 
-def line_rows(found: Any) -> list[dict[str, Any]]:
-    """Return a row an observed line, by object: frequency, decay, T60, η and Q with spreads, and its fitted mode.
+        fit = self.found.fit
+        return {
+            "alpha_per_s": fit.alpha_per_s,
+            "beta_s": fit.beta_s,
+            "gamma_m2_s2": fit.gamma_m2_s2 if self.found.has_material else None,
+            "sigma": fit.sigma,
+            "poisson_ratio": fit.poisson_ratio if self.found.has_material else None,
+            "covariance": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.covariance],
+            "dimension_tolerance": self.found.dimension_tolerance,
+            "verdict": fit.verdict,
+            "log_spectral_db": self.found.log_spectral_db if self.found.log_spectral_db >= 0 else None,
+            "takes": [asdict(take) for take in self.found.takes],
+            "next_measurement": next_measurement(self.found),
+            "modes": [
+                {"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)}
+                for f, d, a in zip(fit.freq_hz, fit.decay_per_s, fit.amplitude, strict=True)
+            ],
+            "lines": self.line_rows(),
+        }
 
-    mode_hz is None where no mode is paired with the line.
-    """
-    rows = []
-    shaped = {o.evidence.thing.name: o for o in found.objects}
-    for e in found.evidence:
-        lines, o = e.lines, shaped.get(e.thing.name)
-        mode = (
-            {} if o is None else dict(zip(o.line[o.line >= 0].tolist(), o.freq_hz[o.line >= 0].tolist(), strict=True))
+    def lines(self) -> list[str]:
+        """Return verdict, parameters, paired lines, takes and what to measure next."""
+        from sonic_bullet.estimator.fit.dimension_tolerance import GAMMA_PER_SCALE, lines_sd
+        from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
+
+        fit, elasticity, damping = self.found.fit, self.preset.elasticity, self.preset.damping
+        sd = np.sqrt(np.diag(fit.covariance))
+
+        def shown(value: float, spread: float, relative: bool = True) -> tuple[str, str]:
+            known = f"{spread * (value if relative else 1):.2g}" if np.isfinite(spread) else "not identifiable"
+            return f"{value:.6g}", known
+
+        rows = [("alpha in 1/s", *shown(damping.alpha_per_s, sd[0])), ("beta in s", *shown(damping.beta_s, sd[1]))]
+        rows += [
+            ("E/density in m²/s²", *shown(elasticity.youngs_pa / self.found.density_kg_m3, sd[2])),
+            ("E in Pa", *shown(elasticity.youngs_pa, sd[2])),
+            ("density in kg/m³", f"{self.found.density_kg_m3:.6g}", "the guess's"),
+            ("Poisson's ratio", *shown(elasticity.poisson, sd[4], False)),
+            ("sigma", *shown(fit.sigma, sd[3])),
+        ] * self.found.has_material
+        paired = sum(int((o.line >= 0).sum()) for o in self.found.objects)
+        lines = sum(len(e.lines.freq_hz) for e in self.found.evidence)
+        correction: Array = (
+            np.concatenate([o.correction[o.line >= 0] for o in self.found.objects])
+            if self.found.objects
+            else np.zeros(0)
         )
-        for k in range(len(lines.freq_hz)):
-            freq, decay, sd = lines.freq_hz[k], lines.decay_per_s[k], lines.identified_sd_per_s[k]
-            own = {"freq_hz": freq, "freq_sd_hz": lines.freq_sd_hz[k], "decay_per_s": decay, "decay_sd_per_s": sd}
-            rows.append(
-                {"object": e.thing.name}
-                | {name: finite(value) for name, value in own.items()}
-                | decay_values(freq, decay, sd)
-                | {"mode_hz": mode.get(k)}
+        text = [
+            f"{self.found.case.name}: {fit.verdict}",
+            table(("", "value", "spread"), rows),
+            f"{format_count(paired, 'mode')} paired with {format_count(lines, 'observed line')}",
+        ]
+        tolerance = self.found.dimension_tolerance
+        if np.isfinite(sd[2]) and tolerance:
+            own = lines_sd(fit.covariance, tolerance)
+            text.append(
+                f"spread of E: lines {own:.2g}, dimensions {GAMMA_PER_SCALE * tolerance:.2g} of it, "
+                f"as they are known to {tolerance:.2%} (--dimension-tolerance)"
             )
-    return rows
+        if not self.found.has_material:
+            text.append(
+                "the preset plays the observed lines; all else in it is steel's, as nobody says what was struck"
+            )
+        elif self.preset.provenance.assumed:
+            text.append(f"assumed: {'; '.join(self.preset.provenance.assumed)}")
+        cells = [
+            (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
+            for row in self.line_rows()
+            if row["mode_hz"] is not None
+        ]
+        if cells:
+            text.append(table(("line Hz", "mode Hz", "decay 1/s", "T60 s", "loss factor", "Q"), cells))
+        if len(correction):
+            text.append(
+                f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest "
+                f"{np.abs(correction).max():.2%}"
+            )
+        if self.found.log_spectral_db >= 0:
+            text.append(f"log-spectral distance of recording and synthesis: {self.found.log_spectral_db:.2f} dB")
+        text += take_tables(self.found.takes)
+        if said := next_measurement(self.found):
+            text.append(f"next: {said}")
+        return text
 
+    def line_rows(self) -> list[dict[str, Any]]:
+        """Return a row an observed line, by object: frequency, decay, T60, η and Q with spreads, and its fitted mode.
 
-def _summary(found: Any, preset: Any) -> str:
-    """Format a fit and its preset for a terminal."""
-    from sonic_bullet.estimator.fit.dimension_tolerance import GAMMA_PER_SCALE, lines_sd
-    from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
-
-    fit, elasticity, damping = found.fit, preset.elasticity, preset.damping
-    sd = np.sqrt(np.diag(fit.covariance))
-
-    def shown(value: float, spread: float, relative: bool = True) -> tuple[str, str]:
-        known = f"{spread * (value if relative else 1):.2g}" if np.isfinite(spread) else "not identifiable"
-        return f"{value:.6g}", known
-
-    rows = [("alpha in 1/s", *shown(damping.alpha_per_s, sd[0])), ("beta in s", *shown(damping.beta_s, sd[1]))]
-    rows += [
-        ("E/density in m²/s²", *shown(elasticity.youngs_pa / found.density_kg_m3, sd[2])),
-        ("E in Pa", *shown(elasticity.youngs_pa, sd[2])),
-        ("density in kg/m³", f"{found.density_kg_m3:.6g}", "the guess's"),
-        ("Poisson's ratio", *shown(elasticity.poisson, sd[4], False)),
-        ("sigma", *shown(fit.sigma, sd[3])),
-    ] * found.has_material
-    paired = sum(int((o.line >= 0).sum()) for o in found.objects)
-    lines = sum(len(e.lines.freq_hz) for e in found.evidence)
-    correction: Array = (
-        np.concatenate([o.correction[o.line >= 0] for o in found.objects]) if found.objects else np.zeros(0)
-    )
-    text = [
-        f"{found.case.name}: {fit.verdict}",
-        table(("", "value", "spread"), rows),
-        f"{format_count(paired, 'mode')} paired with {format_count(lines, 'observed line')}",
-    ]
-    if np.isfinite(sd[2]) and found.dimension_tolerance:
-        own = lines_sd(fit.covariance, found.dimension_tolerance)
-        text.append(
-            f"spread of E: lines {own:.2g}, dimensions {GAMMA_PER_SCALE * found.dimension_tolerance:.2g} of it, "
-            f"as they are known to {found.dimension_tolerance:.2%} (--dimension-tolerance)"
-        )
-    if not found.has_material:
-        text.append("the preset plays the observed lines; all else in it is steel's, as nobody says what was struck")
-    elif preset.provenance.assumed:
-        text.append(f"assumed: {'; '.join(preset.provenance.assumed)}")
-    cells = [
-        (f"{row['freq_hz']:.2f}", f"{row['mode_hz']:.2f}", f"{row['decay_per_s'] or np.nan:.3g}", *decay_cells(row))
-        for row in line_rows(found)
-        if row["mode_hz"] is not None
-    ]
-    if cells:
-        text.append(table(("line Hz", "mode Hz", "decay 1/s", "T60 s", "loss factor", "Q"), cells))
-    if len(correction):
-        text.append(
-            f"corrections of single modes' frequencies: rms {np.sqrt((correction**2).mean()):.2%}, largest "
-            f"{np.abs(correction).max():.2%}"
-        )
-    if found.log_spectral_db >= 0:
-        text.append(f"log-spectral distance of recording and synthesis: {found.log_spectral_db:.2f} dB")
-    text += take_tables(found.takes)
-    if said := next_measurement(found):
-        text.append(f"next: {said}")
-    return "\n".join(text)
+        mode_hz is None where no mode is paired with the line.
+        """
+        rows = []
+        shaped = {o.evidence.thing.name: o for o in self.found.objects}
+        for e in self.found.evidence:
+            lines, o = e.lines, shaped.get(e.thing.name)
+            mode = (
+                {}
+                if o is None
+                else dict(zip(o.line[o.line >= 0].tolist(), o.freq_hz[o.line >= 0].tolist(), strict=True))
+            )
+            for k in range(len(lines.freq_hz)):
+                freq, decay, sd = lines.freq_hz[k], lines.decay_per_s[k], lines.identified_sd_per_s[k]
+                own = {"freq_hz": freq, "freq_sd_hz": lines.freq_sd_hz[k], "decay_per_s": decay, "decay_sd_per_s": sd}
+                rows.append(
+                    {"object": e.thing.name}
+                    | {name: finite(value) for name, value in own.items()}
+                    | decay_values(freq, decay, sd)
+                    | {"mode_hz": mode.get(k)}
+                )
+        return rows

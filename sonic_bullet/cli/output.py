@@ -1,7 +1,7 @@
 """Output of the commands: JSON, tables and progress.
 
-result -> JSON  -> PATH, or stdout and nothing else there
-       -> text  -> stdout
+Report -> to_json -> PATH, or stdout and nothing else there
+       -> lines   -> stdout
 warnings        -> stderr, a line each
 progress        -> stderr: on a terminal one line, rewritten, else a line a stage and every 4 s
 """
@@ -10,28 +10,37 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from sonic_bullet.machine.progress import is_shown, on_terminal, percent, shown_by, status
 from sonic_bullet.records.errors import FileError
 
-if TYPE_CHECKING:
-    from sonic_bullet.files import AudioReport, ContactLog
-
 __all__ = [
+    "Report",
     "clean_stdout",
-    "described_render",
     "places",
+    "print_report",
     "progress_bar",
     "quiet_stderr",
     "status",
     "table",
     "write_json",
 ]
+
+
+class Report(Protocol):
+    """What a command found. Each command has one, and prints and writes nothing else on stdout."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the values of its JSON."""
+        ...
+
+    def lines(self) -> list[str]:
+        """Return what it prints: a line each, or a table."""
+        ...
 
 
 @contextmanager
@@ -109,6 +118,11 @@ def folder_place(asked: str, *inside: str) -> str:
     return str(folder)
 
 
+def print_report(report: Report, say: Callable[[str], None]) -> None:
+    """Print the lines of a report."""
+    say("\n".join(report.lines()))
+
+
 def write_json(json_to: str | None, value: Any) -> None:
     """Write ``value`` as strict JSON to a path, to stdout for "-", nowhere for None; raises FileError."""
     if json_to is None:
@@ -173,55 +187,3 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
         return "  ".join(cells).rstrip()
 
     return "\n".join(line(row) for row in [head, *rows])
-
-
-def described_render(
-    log: ContactLog,
-    report: AudioReport,
-    notes: tuple[str, ...],
-    lifted: Mapping[str, tuple[int, int]] | None = None,
-) -> dict[str, Any]:
-    """Convert a render to JSON values. lifted: see `Listener.lifted`; None: not counted."""
-    return {
-        "output": report.path,
-        "format": report.format,
-        "subtype": report.subtype,
-        "sr": report.sr,
-        "channels": report.channels,
-        "frames": report.frames,
-        "seconds": report.seconds,
-        "peak_pa": report.peak_pa,
-        "rms_pa": report.rms_pa,
-        "gain_per_pa": report.gain_per_pa,
-        "clipped": report.clipped,
-        "steps": len(log.steps),
-        "contacts": len(log),
-        "bodies": _bodies(log),
-        "events": [{"kind": x.kind, "step": x.step, "body": x.body} for x in log.events],
-        "changes": [{"step": x.step, "body": x.body, "values": dict(x.values)} for x in log.changes],
-        "supports": log.supports,
-        "image": log.image,
-        "lifted": None if lifted is None else {name: list(of) for name, of in lifted.items()},
-        "engine": dict(log.engine),
-        "versions": dict(log.versions),
-        "notes": list(notes),
-    }
-
-
-def _bodies(log: ContactLog) -> list[dict[str, Any]]:
-    return [
-        {
-            "body": body.body_id,
-            "link": body.link,
-            "name": body.name.encode("utf-8", "replace").decode(),
-            "material": None if body.material is None else body.material.name,
-            "modes": None if body.model is None else body.model.mode_count,
-            "dropped": None if body.model is None else body.model.dropped,
-            "since_step": body.since_step,
-            "until_step": body.until_step,
-            "mounting": body.mounting,
-            "options": None if body.options is None else asdict(body.options),
-            "dynamics": dict(body.dynamics),
-        }
-        for body in log.bodies
-    ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from sonic_bullet.cli.fit_command import as_case
 from sonic_bullet.cli.line_table import take_tables
-from sonic_bullet.cli.output import clean_stdout, places, status, warn, write_json
+from sonic_bullet.cli.output import clean_stdout, places, print_report, status, warn, write_json
 from sonic_bullet.files import read_channel
 from sonic_bullet.records import Residual
 from sonic_bullet.records.counts import format_count
@@ -35,8 +35,9 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
             from sonic_bullet.plots.residual_plot import write_residual_picture
 
             write_residual_picture(picture, strikes)
-        say("\n".join([_summary(source, strikes.residual), *take_tables(takes)]))
-    write_json(json_to, described(strikes.residual) | {"takes": [asdict(take) for take in takes]})
+        report = ResidualReport(source, strikes.residual, takes)
+        print_report(report, say)
+    write_json(json_to, report.to_json())
 
 
 def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
@@ -94,26 +95,38 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
     return msgspec.structs.replace(preset, residual=form_of(strikes.residual)), strikes, ()
 
 
-def described(residual: Residual) -> dict[str, Any]:
-    """Convert the figures of the residual to JSON values."""
-    lines = zip(residual.line_freq_hz, residual.line_decay_per_s, residual.line_amplitude, strict=True)
-    share = residual.share_of_clip
-    return {
-        "residual_of_clip_db": 10 * float(np.log10(share)) if share > 0 else None,
-        "modes": len(residual.mode_freq_hz),
-        "lines": [{"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)} for f, d, a in lines],
-        "noise_cells": int((residual.power_per_hz > 0).sum()),
-        "noise_s": float(residual.time_s[-1]) if residual.power_per_hz.any() else 0.0,
-        "source": residual.source,
-    }
+@dataclass(frozen=True, slots=True)
+class ResidualReport:
+    """Report of the residual of a source, and of how near the preset's takes are with it."""
 
+    source: str
+    residual: Residual
+    takes: tuple[Any, ...]
 
-def _summary(source: str, residual: Residual) -> str:
-    shown = described(residual)
-    level = shown["residual_of_clip_db"]
-    loud = "nothing" if level is None else f"{level:.1f} dB of the recordings' energy"
-    return (
-        f"{source}: beside {format_count(shown['modes'], 'mode')} there is {loud}: "
-        f"{format_count(len(shown['lines']), 'line')}, and noise in "
-        f"{shown['noise_cells']} cells of band and time"
-    )
+    def to_json(self) -> dict[str, Any]:
+        """Return the figures of the residual and the takes."""
+        lines = zip(
+            self.residual.line_freq_hz, self.residual.line_decay_per_s, self.residual.line_amplitude, strict=True
+        )
+        share = self.residual.share_of_clip
+        return {
+            "residual_of_clip_db": 10 * float(np.log10(share)) if share > 0 else None,
+            "modes": len(self.residual.mode_freq_hz),
+            "lines": [{"freq_hz": float(f), "decay_per_s": float(d), "amplitude": float(a)} for f, d, a in lines],
+            "noise_cells": int((self.residual.power_per_hz > 0).sum()),
+            "noise_s": float(self.residual.time_s[-1]) if self.residual.power_per_hz.any() else 0.0,
+            "source": self.residual.source,
+            "takes": [asdict(take) for take in self.takes],
+        }
+
+    def lines(self) -> list[str]:
+        """Return how much there is beside the modes, and the takes."""
+        shown = self.to_json()
+        level = shown["residual_of_clip_db"]
+        loud = "nothing" if level is None else f"{level:.1f} dB of the recordings' energy"
+        return [
+            f"{self.source}: beside {format_count(shown['modes'], 'mode')} there is {loud}: "
+            f"{format_count(len(shown['lines']), 'line')}, and noise in "
+            f"{shown['noise_cells']} cells of band and time",
+            *take_tables(self.takes),
+        ]

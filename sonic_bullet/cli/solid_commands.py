@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.cli.output import clean_stdout, places, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, places, print_report, status, table, write_json
 from sonic_bullet.files import write_model
 from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
@@ -88,14 +88,15 @@ def run_modes(
             write_model(to, model)
         if uff_to is not None:
             write_uff(uff_to, _shapes(mesh, made, model))
-        say(_summary(mesh, made, model))
-        if whole is not model:
-            say(f"with --tail, or tail=True in a scene{whole.note[len(solved.note) :].replace('; ', ', ', 1)}")
+        more = whole.note[len(solved.note) :].replace("; ", ", ", 1)
+        beyond = "" if whole is model else f"with --tail, or tail=True in a scene{more}"
+        report = ModesReport(mesh, made, model, output, beyond)
+        print_report(report, say)
     if large := oversize(model.vertex_m, model.mass_kg):
         print(
             f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr
         )
-    write_json(json_to, _described(mesh, made, model, output))
+    write_json(json_to, report.to_json())
 
 
 def _shapes(mesh: str, material: Material, model: ModalModel) -> ModalShapes:
@@ -247,32 +248,44 @@ def _material(m: Material) -> dict[str, Any]:
     }
 
 
-def _described(mesh: str, material: Material, model: ModalModel, output: str | None) -> dict[str, Any]:
-    modes = [
-        {"freq_hz": float(f), "decay_per_s": None if math.isnan(d) else float(d)}
-        for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
-    ]
-    return {
-        "modes": modes,
-        "mesh": mesh,
-        "material": material.name,
-        "volume_m3": model.volume_m3,
-        "mass_kg": model.mass_kg,
-        "vertices": len(model.vertex_m),
-        "dropped": model.dropped,
-        "note": model.note,
-        "output": output,
-    }
+@dataclass(frozen=True, slots=True)
+class ModesReport:
+    """Report of a mesh's modes. tail: what --tail would add, "" for nothing."""
 
+    mesh: str
+    material: Material
+    model: ModalModel
+    output: str | None
+    tail: str = ""
 
-def _summary(mesh: str, material: Material, model: ModalModel) -> str:
-    rows = [
-        (str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}")
-        for i, (f, d) in enumerate(zip(model.freq_hz, model.decay_per_s, strict=True), 1)
-    ]
-    dropped = f", {format_count(model.dropped, 'overdamped mode')} dropped" if model.dropped else ""
-    head = (
-        f"{mesh}: {material.name}, {model.volume_m3 * 1e6:.4g} cm³, {model.mass_kg:.4g} kg, {model.mode_count} "
-        f"modes{dropped}\n{model.note}"
-    )
-    return head.rstrip() + ("\n" + table(("mode", "Hz", "decay in 1/s"), rows) if rows else "")
+    def to_json(self) -> dict[str, Any]:
+        """Return frequencies and decays, and what the mesh is as a body."""
+        modes = [
+            {"freq_hz": float(f), "decay_per_s": None if math.isnan(d) else float(d)}
+            for f, d in zip(self.model.freq_hz, self.model.decay_per_s, strict=True)
+        ]
+        return {
+            "modes": modes,
+            "mesh": self.mesh,
+            "material": self.material.name,
+            "volume_m3": self.model.volume_m3,
+            "mass_kg": self.model.mass_kg,
+            "vertices": len(self.model.vertex_m),
+            "dropped": self.model.dropped,
+            "note": self.model.note,
+            "output": self.output,
+        }
+
+    def lines(self) -> list[str]:
+        """Return what the mesh is as a body, and a table of its modes."""
+        rows = [
+            (str(i), f"{f:.2f}", "-" if math.isnan(d) else f"{d:.3f}")
+            for i, (f, d) in enumerate(zip(self.model.freq_hz, self.model.decay_per_s, strict=True), 1)
+        ]
+        dropped = f", {format_count(self.model.dropped, 'overdamped mode')} dropped" if self.model.dropped else ""
+        head = (
+            f"{self.mesh}: {self.material.name}, {self.model.volume_m3 * 1e6:.4g} cm³, {self.model.mass_kg:.4g} kg, "
+            f"{self.model.mode_count} modes{dropped}\n{self.model.note}"
+        )
+        modes = [table(("mode", "Hz", "decay in 1/s"), rows)] if rows else []
+        return [head.rstrip(), *modes, *([self.tail] if self.tail else [])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
@@ -34,6 +34,10 @@ class DatasetSummary:
     objects: Mapping[str, int]
     failures: Mapping[int, str] = field(default_factory=dict)
     layouts: Mapping[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return its fields."""
+        return asdict(self)
 
     def lines(self) -> list[str]:
         """Describe it, a line a thing."""

@@ -12,6 +12,7 @@ Exit 0: all done; 1: a case failed, or is farther from its recordings than silen
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ import msgspec
 
 from sonic_bullet.cli.line_table import finite, write_csv
 from sonic_bullet.cli.many.case_jobs import CASE_FILES, CaseFolder, CaseResult, digest, run_case
-from sonic_bullet.cli.output import clean_stdout, folder_place, places, status, table, write_json
+from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, status, table, write_json
 from sonic_bullet.cli.parameters import ManyOptions, cores
 from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
 from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines
@@ -61,9 +62,9 @@ def run_many(
             )  # fmt: skip
             rows = _rows(command, place, cases)
         failed = {case.name: reason for case, reason in failures.items()}
-        for line in _lines(command, rows, made, failed):
-            say(line)
-    write_json(to, {"made": made, "cases": rows, "failures": failed})
+        summary = CasesReport(command, rows, made, failed)
+        print_report(summary, say)
+    write_json(to, summary.to_json())
     if failed or any(row["verdict"] == "worse-than-silence" for row in rows):
         raise click.exceptions.Exit(1)
 
@@ -192,16 +193,29 @@ MANY_COLUMNS = {
 }  # fmt: skip
 
 
-def _lines(command: str, rows: Sequence[Mapping[str, Any]], made: int, failed: Mapping[str, str]) -> list[str]:
-    """Describe a run, a line a thing."""
-    heads = [name for name in MANY_COLUMNS[command] if any(row[name] is not None for row in rows)]
-    cells = [tuple(_cell(row[name]) for name in heads) for row in rows]
-    return [
-        *([table(tuple(name.replace("_", " ") for name in heads), cells)] if rows else []),
-        f"{format_count(len(rows), 'case')} with a result, {made} made now"
-        + (f"; {len(failed)} without, in failures.jsonl" if failed else ""),
-        *(f"{name}: {reason}" for name, reason in sorted(failed.items())[:10]),
-    ]
+@dataclass(frozen=True, slots=True)
+class CasesReport:
+    """Report of a command run over cases. made: in this run; failed: reasons by case."""
+
+    command: str
+    rows: Sequence[Mapping[str, Any]]
+    made: int
+    failed: Mapping[str, str]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the row of each case, and the reasons."""
+        return {"made": self.made, "cases": self.rows, "failures": self.failed}
+
+    def lines(self) -> list[str]:
+        """Return a table of the cases, a count, and the first reasons."""
+        heads = [name for name in MANY_COLUMNS[self.command] if any(row[name] is not None for row in self.rows)]
+        cells = [tuple(_cell(row[name]) for name in heads) for row in self.rows]
+        return [
+            *([table(tuple(name.replace("_", " ") for name in heads), cells)] if cells else []),
+            f"{format_count(len(self.rows), 'case')} with a result, {self.made} made now"
+            + (f"; {len(self.failed)} without, in failures.jsonl" if self.failed else ""),
+            *(f"{name}: {reason}" for name, reason in sorted(self.failed.items())[:10]),
+        ]
 
 
 def _cell(value: Any) -> str:

@@ -53,9 +53,15 @@ def dataset(
     json_to: str | None,
 ) -> None:
     """Make a data set: audio, contacts as labels, parameters and provenance of each sample, split by object."""
-    from dataclasses import asdict
-
-    from sonic_bullet.cli.output import clean_stdout, folder_place, places, quiet_stderr, status, write_json
+    from sonic_bullet.cli.output import (
+        clean_stdout,
+        folder_place,
+        places,
+        print_report,
+        quiet_stderr,
+        status,
+        write_json,
+    )
 
     (to,) = places(json_to)
     root = folder_place(folder)
@@ -69,8 +75,7 @@ def dataset(
             workers=workers or cores(), limit_s=limit_s, formats=formats,
             shares=as_shares(shares), scheduler=scheduler, say=tell,
         )  # fmt: skip
-        for line in made.lines():
-            say(line)
-    write_json(to, asdict(made))
+        print_report(made, say)
+    write_json(to, made.to_json())
     if made.failures:
         raise click.exceptions.Exit(1)

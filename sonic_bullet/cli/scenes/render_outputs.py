@@ -11,7 +11,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import described_render, progress_bar
+from sonic_bullet.cli.output import progress_bar
+from sonic_bullet.cli.scenes.render_report import RenderReport
 from sonic_bullet.cli.scenes.scene_runs import Replay, is_log
 from sonic_bullet.cli.sound_level import LevelWish, level_warnings
 from sonic_bullet.cli.soundtrack.session_output import SessionWish
@@ -19,7 +20,6 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import Soundtrack, Soundtrac
 from sonic_bullet.files import AudioReport, kept_name, write_at_level, write_audio, write_log
 from sonic_bullet.files.loudness.meter import measure_loudness
 from sonic_bullet.machine.worker import note_closing, stop_word
-from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 
 if TYPE_CHECKING:
@@ -74,16 +74,21 @@ class RenderOutputs:
             seen = made.events if made is not None else ()
             render_picture(self.picture, sound, result.sr, result.log, Path(self.scene).name, seen)
         notes = (*result.notes, *_by_hand(self.scene, result.log), *_oversized(result.log), *level_warnings(report))
+        lifted = None if isinstance(result, Replay) else result.lifted
+        rendered = RenderReport(result.log, report, notes, lifted)
         loudness_line = (f"{self.output}: {loudness}",) * (loudness.true_peak_dbtp is not None)
-        say("\n".join([summary(report, result.log), *loudness_line, *(made.words if made is not None else ())]))
+        say("\n".join([*rendered.lines(), *loudness_line, *(made.words if made is not None else ())]))
         scale = {}
         if report.channels:
             scale = self.level.say(self.to, found, report.peak_pa, result.log, report.clipped)
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-        lifted = None if isinstance(result, Replay) else result.lifted
-        described = described_render(result.log, report, notes, lifted)
-        return described | {"scale": scale, "loudness": asdict(loudness)} | (made.described if made else {}) | edited
+        return (
+            rendered.to_json()
+            | {"scale": scale, "loudness": asdict(loudness)}
+            | (made.described if made else {})
+            | edited
+        )
 
     def _made(self, result: RenderResult | Replay) -> Soundtrack | None:
         """Write the log, make stems and events; where that fails, keep the sound as a partial file."""
@@ -174,18 +179,3 @@ def _oversized(log: ContactLog) -> tuple[str, ...]:
     large = [(body, oversize(body.model.vertex_m, body.model.mass_kg)) for body in log.bodies if body.model is not None]
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     return tuple(f"{with_body_id(body.name, body.body_id)} {words}; {remedy}" for body, words in large if words)
-
-
-def summary(report: AudioReport, log: ContactLog) -> str:
-    """Describe the file written in one line."""
-    from sonic_bullet.plots.scene_plot import quantity
-
-    channels = format_count(report.channels, "channel")
-    scale = "" if report.gain_per_pa == 1 else f", scaled by {report.gain_per_pa:.4g}"
-    scale += ", clipped" if report.clipped else ""
-    units = {quantity(sensor)[1] for sensor in log.sensors}
-    unit = units.pop() if len(units) == 1 else "(mixed units)"
-    return (
-        f"{report.path}: {report.seconds:.3f} s, {channels}, {report.sr} Hz, peak {report.peak_pa:.4g} {unit}, "
-        f"rms {report.rms_pa:.4g} {unit}{scale}"
-    )

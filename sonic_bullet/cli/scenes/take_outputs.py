@@ -11,8 +11,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import described_render, progress_bar
-from sonic_bullet.cli.scenes.render_outputs import find_level_of, summary, with_partial
+from sonic_bullet.cli.output import progress_bar
+from sonic_bullet.cli.scenes.render_outputs import find_level_of, with_partial
+from sonic_bullet.cli.scenes.render_report import RenderReport
 from sonic_bullet.cli.scenes.scene_runs import Wish, rendered
 from sonic_bullet.cli.scenes.take_options import TakesWish, describe_draws
 from sonic_bullet.cli.sound_level import LevelWish, level_warnings
@@ -63,11 +64,12 @@ def write_takes(
         sound = result.sound.shaped(found.curve)
         loudness = measure_loudness(sound, result.sr, found.gain_per_pa)
         draws = describe_draws(take)
-        lines += [summary(report, take.log), f"{output}: {loudness}", *[f"{output}: {draws}"] * bool(draws)]
+        written = RenderReport(take.log, report, result.notes)
+        lines += [*written.lines(), f"{output}: {loudness}", *[f"{output}: {draws}"] * bool(draws)]
         scales.append((to, found, report.peak_pa, take.log, report.clipped))
         said += [one for one in (*result.notes, *level_warnings(report)) if one not in said]
         described.append(
-            described_render(take.log, report, result.notes)
+            written.to_json()
             | {"take": number, "seed": take.log.seed, "drawn": {name: dict(of) for name, of in take.drawn.items()}}
             | {"loudness": asdict(loudness)}
         )

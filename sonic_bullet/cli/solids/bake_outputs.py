@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, status, warn, write_json
+from sonic_bullet.cli.output import (
+    clean_stdout,
+    places,
+    print_report,
+    progress_bar,
+    quiet_stderr,
+    status,
+    warn,
+    write_json,
+)
 from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, is_log
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, nearest
@@ -96,29 +105,30 @@ def run_bake(
     whole = scene and end in GLTF_ENDINGS and body is None
     if seconds is not None and not whole:
         raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] | None = None
     programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
     with clean_stdout(json_to) as say:
         from sonic_bullet.bake import PruningOptions, write_baked
 
         pruning = PruningOptions(modes, below_db, points or (few_points if end in programs else None))
+        more = ""
         if whole:
             from sonic_bullet.cli.solids.scene_outputs import write_whole_scene
 
-            models, line, notes = write_whole_scene(to, source, WantedMaterials.read(material, ()), pruning, seconds)
-            say("\n".join([*map(_line, models), line]))
+            models, more, notes = write_whole_scene(to, source, WantedMaterials.read(material, ()), pruning, seconds)
         elif scene:
             models = _scene_models(source, material, body, pruning, one=end in ONE_MODEL)
         else:
             models = [_mesh_model(source, material, scale, thickness_m, to_hz, pruning)]
         if end == ".wav":
-            say(_line(models[0]) + "\n" + wish.write(to, models[0]))
+            more = wish.write(to, models[0])
         elif not whole:
             write_baked(to, models)
-            say("\n".join(map(_line, models)))
-        warn([*(f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note), *notes])
-    described = {"output": output, "bodies": [_described(model) for model in models]}
-    write_json(json_to, described | ({"notes": list(notes)} if whole else {}))
+        report = BakeReport(output, models, more, notes)
+        print_report(report, say)
+        pruned = [f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note]
+        warn([*pruned, *(notes or ())])
+    write_json(json_to, report.to_json())
 
 
 def _mesh_model(
@@ -210,25 +220,41 @@ def scene_log(
         return render_scene(source, **asked, progress=progress, say=tell).log
 
 
-def _line(model: BakedModel) -> str:
-    """Describe a model in a line."""
-    low, high = model.freq_hz.min(), model.freq_hz.max()
-    weight = "" if model.mass is None else f", {model.mass.mass_kg:.4g} kg"
-    return (
-        f"{model.name}: {model.material.name}{weight}, {format_count(model.mode_count, 'mode')} from {low:.0f} to "
-        f"{high:.0f} Hz at {len(model.point_m)} points"
-    )
+@dataclass(frozen=True, slots=True)
+class BakeReport:
+    """Report of what was baked. more: a line of the file; notes: of a whole scene, None for another file."""
 
+    output: str
+    models: list[BakedModel]
+    more: str = ""
+    notes: tuple[str, ...] | None = None
 
-def _described(model: BakedModel) -> dict[str, Any]:
-    return {
-        "name": model.name,
-        "material": model.material.name,
-        "mass_kg": None if model.mass is None else model.mass.mass_kg,
-        "points": len(model.point_m),
-        "modes": [
-            {"freq_hz": float(f), "decay_per_s": float(d)}
-            for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
-        ],
-        "notes": list(model.notes),
-    }
+    def to_json(self) -> dict[str, Any]:
+        """Return each body's modes, and the notes."""
+        bodies = [
+            {
+                "name": model.name,
+                "material": model.material.name,
+                "mass_kg": None if model.mass is None else model.mass.mass_kg,
+                "points": len(model.point_m),
+                "modes": [
+                    {"freq_hz": float(f), "decay_per_s": float(d)}
+                    for f, d in zip(model.freq_hz, model.decay_per_s, strict=True)
+                ],
+                "notes": list(model.notes),
+            }
+            for model in self.models
+        ]
+        return {"output": self.output, "bodies": bodies} | ({} if self.notes is None else {"notes": list(self.notes)})
+
+    def lines(self) -> list[str]:
+        """Describe each body, and the file, in a line."""
+        said = []
+        for model in self.models:
+            low, high = model.freq_hz.min(), model.freq_hz.max()
+            weight = "" if model.mass is None else f", {model.mass.mass_kg:.4g} kg"
+            said.append(
+                f"{model.name}: {model.material.name}{weight}, {format_count(model.mode_count, 'mode')} "
+                f"from {low:.0f} to {high:.0f} Hz at {len(model.point_m)} points"
+            )
+        return [*said, *([self.more] if self.more else [])]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
+from sonic_bullet.cli.output import clean_stdout, places, print_report, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option, scene_options
 from sonic_bullet.cli.scenes.room_options import OPTIONS as ROOM_OPTIONS
 from sonic_bullet.cli.scenes.room_options import read_room, room_options
@@ -130,22 +131,14 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 level=found,
                 progress=progress,
             )
-        say(_summary(output, report))
+        notes = (*result.notes, *report.notes, *_clipped(report))
+        written = WrittenFilm(output, report, notes)
+        print_report(written, say)
         peak = float(result.sound.shaped(found.curve).peaks().max())
         scale = level.say(str(to), found, peak, result.log, report.clipped)
-        notes = (*result.notes, *report.notes, *_clipped(report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, _described(output, report, notes) | {"scale": scale})
-
-
-def _summary(output: str, report: FilmReport) -> str:
-    width, height = report.size
-    channels = format_count(report.channels, "channel")
-    return (
-        f"{output}: {float(report.pictures / report.fps):.3f} s, {report.pictures} pictures of {width}x{height} at "
-        f"{report.fps} a second, {report.codec}, {channels}, {report.sr} Hz, scaled by {report.gain_per_pa:.4g}"
-    )
+    write_json(json_to, written.to_json() | {"scale": scale})
 
 
 def _clipped(report: FilmReport) -> tuple[str, ...]:
@@ -153,18 +146,37 @@ def _clipped(report: FilmReport) -> tuple[str, ...]:
     return (f"{many} clipped at full scale; --peak-dbfs -1 avoids it",) * bool(report.clipped)
 
 
-def _described(output: str, report: FilmReport, notes: tuple[str, ...]) -> dict[str, Any]:
-    return {
-        "output": output,
-        "pictures": report.pictures,
-        "fps": str(report.fps),
-        "size": list(report.size),
-        "seconds": float(report.pictures / report.fps),
-        "samples": report.samples,
-        "sr": report.sr,
-        "channels": report.channels,
-        "codec": report.codec,
-        "gain_per_pa": report.gain_per_pa,
-        "clipped": report.clipped,
-        "notes": list(notes),
-    }
+@dataclass(frozen=True, slots=True)
+class WrittenFilm:
+    """Report of a film that was written."""
+
+    output: str
+    film: FilmReport
+    notes: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the figures of pictures and sound."""
+        return {
+            "output": self.output,
+            "pictures": self.film.pictures,
+            "fps": str(self.film.fps),
+            "size": list(self.film.size),
+            "seconds": float(self.film.pictures / self.film.fps),
+            "samples": self.film.samples,
+            "sr": self.film.sr,
+            "channels": self.film.channels,
+            "codec": self.film.codec,
+            "gain_per_pa": self.film.gain_per_pa,
+            "clipped": self.film.clipped,
+            "notes": list(self.notes),
+        }
+
+    def lines(self) -> list[str]:
+        """Describe the film in one line."""
+        film = self.film
+        width, height = film.size
+        channels = format_count(film.channels, "channel")
+        return [
+            f"{self.output}: {float(film.pictures / film.fps):.3f} s, {film.pictures} pictures of {width}x{height} at "
+            f"{film.fps} a second, {film.codec}, {channels}, {film.sr} Hz, scaled by {film.gain_per_pa:.4g}"
+        ]

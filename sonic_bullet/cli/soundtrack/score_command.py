@@ -56,8 +56,9 @@ materials and an export script for Blender."""
 @json_option
 def score(animation: str, output: str, json_to: str | None, contacts: str | None, **options: Any) -> None:
     """Render a baked animation's sound (.glb .gltf .json .npz), or that of a scene's bodies that are moved by hand."""
-    from sonic_bullet.cli.output import described_render
-    from sonic_bullet.cli.scenes.render_outputs import summary, with_partial
+    from sonic_bullet.cli.output import print_report
+    from sonic_bullet.cli.scenes.render_outputs import with_partial
+    from sonic_bullet.cli.scenes.render_report import RenderReport
     from sonic_bullet.cli.scenes.scene_commands import rendered_again
     from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, Wish
     from sonic_bullet.files import check_audio_output, check_sr, write_at_level, write_log
@@ -99,12 +100,13 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
             raise with_partial(error, str(to), output, level) from error
         found = level.found(result.sound, sr, result.log, str(to))
         report = replace(write_at_level(str(to), result.sound, sr, found), path=output)
-        say(summary(report, result.log))
-        scale = level.say(str(to), found, report.peak_pa, result.log, report.clipped)
         notes = (*result.notes, *level_warnings(report))
+        rendered = RenderReport(result.log, report, notes)
+        print_report(rendered, say)
+        scale = level.say(str(to), found, report.peak_pa, result.log, report.clipped)
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    write_json(json_to, described_render(result.log, report, notes) | {"scale": scale})
+    write_json(json_to, rendered.to_json() | {"scale": scale})
 
 
 def _check_options(animation: str, contacts: str | None, options: dict[str, Any]) -> bool:
