@@ -118,10 +118,10 @@ def shares(log: ContactLog, until_s: float = 4.9) -> Iterator[str]:
     for b, one in enumerate(state.resonators):
         if one.body.mass_kg <= 0 or not one.mode_count:
             continue
-        _, touches, load, placed = pole_updates.standing(state, b, turned)
+        _, touches, load, placed = pole_updates.couple_body(state, b, turned)
         if not touches:
             continue
-        rang, lifted = synth.lifted.get(one.body.name, (0, 0))
+        rang, lifted = synth.separations.get(one.body.name, (0, 0))
         rough = rough_share(state, b, touches, load)
         free, now = t60_s(one.decay_per_s), t60_s(placed.decay_per_s)
         part = placed.shares / placed.decay_per_s[:, None]
@@ -175,18 +175,18 @@ def rod() -> Iterator[str]:
 def clicks() -> Iterator[str]:
     """Changes that lie apart from strikes; the sound at the microphone is 2.5 ms late, at every change alike."""
     made: list[int] = []
-    old = pole_updates._stand
+    old = pole_updates._update_body
 
     def stand(state: Any, b: int, quaternion: Array) -> None:
         made.append(state.ringing.at)
         old(state, b, quaternion)
 
-    pole_updates._stand = stand
+    pole_updates._update_body = stand
     try:
         shape = {"shapeType": 5, "fileName": str(ROOT / "assets" / "bowl.obj")}
         client, listener = fallen(shape, 0.06, (0.5, 0.2, 0), 5.0, 7850 * 75.1e-6)
     finally:
-        pole_updates._stand = old
+        pole_updates._update_body = old
     sound, sr, struck = listener.sound()[0], listener.sr, find_leaps(listener.contacts).strike_s
     disconnect(client)
     travel = round(np.hypot(0.7, 0.5) / 343 * sr)

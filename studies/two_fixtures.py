@@ -83,7 +83,7 @@ def stand_in(material: str, scale: float) -> tuple[Array, Array]:
         client.stepSimulation()
     state = listener._synth._state
     b = next(i for i, one in enumerate(state.resonators) if one.body.mass_kg > 0)
-    _, touches, _, placed = pole_updates.standing(state, b, state.window.quaternion_xyzw[(state.number - 1) % SPAN])
+    _, touches, _, placed = pole_updates.couple_body(state, b, state.window.quaternion_xyzw[(state.number - 1) % SPAN])
     assert touches, "it does not stand"
     one = state.resonators[b]
     disconnect(client)

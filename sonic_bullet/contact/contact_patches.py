@@ -2,8 +2,8 @@
 
     rows of the step being rendered, load less strikes -> each row to the tracked point near it, or a new one
         -> n += a (load of its rows − n),   a = 1 − e^{−dt/SMOOTH_S}
-        -> HELD: up to PATCH_POINTS points a pair, sum and moment those of the rows, smoothed
-    sets or loads that differ from those of the present poles -> STAND.stale of both bodies
+        -> CONTACT_PATCH: up to PATCH_POINTS points a pair, sum and moment those of the rows, smoothed
+    sets or loads that differ from those of the present poles -> SUPPORT_STATE.stale of both bodies
 
 A resting box shows two, three or four of its corners, another choice each step; sum and moment alone are right. Each
 point keeps the mean of the loads of its rows, so sum and moment of the tracked points are the smoothed ones exactly,
@@ -34,7 +34,7 @@ FAR_OFF, OFF_PATCH = 1.6, 1.1
 a Hertz spring, and after REST_S, 3 %."""
 REST_S = 0.2
 
-HELD = np.dtype(
+CONTACT_PATCH = np.dtype(
     [
         ("count", "i8"),
         ("point_m", "f8", (PATCH_POINTS, 2, 3)),  # in either body's frame
@@ -49,7 +49,7 @@ HELD = np.dtype(
 )
 """Contact patch of a pair; beside its row of PAIR, in the same slot."""
 
-STAND = np.dtype(
+SUPPORT_STATE = np.dtype(
     [
         ("stale", "i8"),  # 1 where its poles are not those of its contacts
         ("stale_s", "f8"),  # since when
@@ -57,7 +57,7 @@ STAND = np.dtype(
         ("wanted", "i8"),  # 1: they are to be made before this step rings
         ("points", "i8"),  # tracked points of its poles
         ("steps", "i8"),  # steps that it rang on them, and below those with contact separation
-        ("lifted", "i8"),
+        ("separated", "i8"),
     ],
     align=True,
 )
@@ -73,7 +73,7 @@ AGAIN_S = 0.02
 
 
 @njit(nogil=True, error_model="numpy")
-def hold_contacts(here, rows, table, pairs, stand):
+def track_contact_patches(here, rows, table, pairs, support_state):
     """Advance the contact patches of all pairs by a step, a row of WINDOW.
 
     A patch without rows for SPAN steps is released.
@@ -83,7 +83,7 @@ def hold_contacts(here, rows, table, pairs, stand):
     target, place = np.empty(PATCH_POINTS), np.empty((PATCH_POINTS + 1, 2, 3))
     for i in range(pairs.count[0]):
         slot = pairs.active[i]
-        pair, one = pairs.pair[slot], pairs.held[slot]
+        pair, one = pairs.pair[slot], pairs.patch[slot]
         while row < stop and rows[row].key < pair.key:
             row += 1
         begin = row
@@ -96,7 +96,7 @@ def hold_contacts(here, rows, table, pairs, stand):
         for column in range(NOW, NOW + SPAN):
             touches = touches or pair.force_n[column] > 0.0
         if not touches:
-            let_go(one, pair, stand)
+            release_patch(one, pair, support_state)
             continue
         size = np.inf
         for side in range(2):
@@ -111,14 +111,14 @@ def hold_contacts(here, rows, table, pairs, stand):
             for k in range(one.count):
                 one.used_n[k] = one.load_n[k]
                 _copy(one.point_m[k], one.used_m[k])
-            stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
+            support_state[pair.body[0]].stale = support_state[pair.body[1]].stale = 1
 
 
 @njit(nogil=True, error_model="numpy")
-def let_go(one, pair, stand):
+def release_patch(one, pair, support_state):
     """Release the contact patch of a pair."""
     if one.used:
-        stand[pair.body[0]].stale = stand[pair.body[1]].stale = 1
+        support_state[pair.body[0]].stale = support_state[pair.body[1]].stale = 1
     one.count = one.used = 0
     one.used_s = 0.0
 
@@ -257,35 +257,35 @@ def choose_bodies(dt_s, table, pairs, supports, bank, scratch):
 
     Silent bodies wait.
     """
-    stand, credit_s, bodies = supports.stand, supports.credit_s, table.bodies
+    support_state, credit_s, bodies = supports.support_state, supports.credit_s, table.bodies
     credit_s[0] = min(credit_s[0] + POLES_SHARE * dt_s, SAVED_S)
     some = False
-    for b in range(len(stand)):
-        one = stand[b]
+    for b in range(len(support_state)):
+        one = support_state[b]
         one.wait_s = max(one.wait_s - dt_s, 0.0)
         if one.stale:
             one.stale_s += dt_s
             some = some or (one.wait_s == 0.0 and bodies[b].modes > 0)
     if not some or credit_s[0] <= 0.0:
         return 0
-    sounds, points = np.zeros(len(stand), np.int64), np.zeros(len(stand), np.int64)
+    sounds, points = np.zeros(len(support_state), np.int64), np.zeros(len(support_state), np.int64)
     for side in range(2):
         for i in range(scratch.count[0]):
             sounds[scratch.pulse[i].body[side]] = 1
         for i in range(scratch.count[1]):
             sounds[scratch.body[i, side]] = 1
         for i in range(pairs.count[0]):
-            points[pairs.pair[pairs.active[i]].body[side]] += pairs.held[pairs.active[i]].count
-    for b in range(len(stand)):
+            points[pairs.pair[pairs.active[i]].body[side]] += pairs.patch[pairs.active[i]].count
+    for b in range(len(support_state)):
         now = bank.ringing[b]
         sounds[b] |= now.ringing | now.driven | now.tiled | (now.strike >= 0)
-        sounds[b] &= stand[b].stale & (stand[b].wait_s == 0.0) & (bodies[b].modes > 0)
+        sounds[b] &= support_state[b].stale & (support_state[b].wait_s == 0.0) & (bodies[b].modes > 0)
     wanted = 0
     while credit_s[0] > 0.0:
-        best = _longest_stale(stand, bodies, sounds)
+        best = _longest_stale(support_state, bodies, sounds)
         if best < 0:
             break
-        one = stand[best]
+        one = support_state[best]
         sounds[best] = one.stale = 0
         one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, AGAIN_S, points[best]
         if points[best]:  # its free poles are known
@@ -295,35 +295,37 @@ def choose_bodies(dt_s, table, pairs, supports, bank, scratch):
 
 
 @njit(nogil=True, error_model="numpy")
-def _longest_stale(stand, bodies, waits):
+def _longest_stale(support_state, bodies, waits):
     """Choose the next of those that wait: of moving bodies, the one stale longest, then of fixed ones; -1 for none."""
     best = -1
-    for b in range(len(stand)):
+    for b in range(len(support_state)):
         if waits[b]:
             if best < 0:
                 best = b
                 continue
             fixed, best_fixed = bodies[b].mass_kg <= 0.0, bodies[best].mass_kg <= 0.0
-            if (best_fixed and not fixed) or (fixed == best_fixed and stand[b].stale_s > stand[best].stale_s):
+            if (best_fixed and not fixed) or (
+                fixed == best_fixed and support_state[b].stale_s > support_state[best].stale_s
+            ):
                 best = b
     return best
 
 
 @njit(nogil=True, error_model="numpy")
-def count_lifted(stand, bank):
-    """Count the steps in which ringing may cause contact separation: Σ_k lift_k |z_k| > 1.
+def count_separations(support_state, bank):
+    """Count the steps in which ringing may cause contact separation: Σ_k law[6, k] |z_k| > 1.
 
-    law[6]: lift, newtons per unit of z over the load, of each mode at the point where it separates first. No step is
+    law[6]: newtons per unit of z over the load, of each mode at the point where it separates first. No step is
     missed, and some are counted in which modes separate at different points.
     """
     ringing, law, z, driven = bank.ringing, bank.law, bank.z, bank.driven
     modes = law.shape[1]
-    for b in range(len(stand)):
-        if stand[b].points and (ringing[b].ringing or ringing[b].driven):
+    for b in range(len(support_state)):
+        if support_state[b].points and (ringing[b].ringing or ringing[b].driven):
             total = 0.0
             for m in range(bank.body[b].start, bank.body[b].stop):
                 if law[6, m] > 0.0:
                     x, y = z[m] + driven[m], z[modes + m] + driven[modes + m]
                     total += law[6, m] * np.sqrt(x * x + y * y)
-            stand[b].steps += 1
-            stand[b].lifted += total > 1.0
+            support_state[b].steps += 1
+            support_state[b].separated += total > 1.0

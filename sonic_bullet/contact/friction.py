@@ -133,7 +133,8 @@ def _voices(pairs, bodies, rows, follow, voices):
             sounds = low.modes > 0 or low.rigid > 0 or high.modes > 0 or high.rigid > 0
             if target <= 0.0 or not sounds or (low.mass_kg <= 0.0 and high.mass_kg <= 0.0):
                 continue
-            voice.fresh, pair.depth, pair.lift, pair.substeps, pair.load_n, pair.gains = 1, 0.0, 0.0, 0, 0.0, 0
+            voice.fresh, pair.depth, pair.separation_speed, pair.substeps = 1, 0.0, 0.0, 0
+            pair.load_n, pair.gains = 0.0, 0
             for axis in range(3):
                 pair.direction[axis] = 0.0
         while row < row_count and rows[row].key < pair.key:
@@ -149,7 +150,7 @@ def _voices(pairs, bodies, rows, follow, voices):
             start = aim if unknown and touching else pair.direction[axis]
             direction[0, axis] = start
             pair.direction[axis] = direction[1, axis] = start + (follow * (aim - start) if touching else 0.0)
-        moves = pair.depth != 0.0 or pair.lift != 0.0
+        moves = pair.depth != 0.0 or pair.separation_speed != 0.0
         for side in range(2):
             sweep[0, side] = 0.0 if voice.fresh else pair.sweep_m_s[side]
             pair.sweep_m_s[side] = sweep[1, side]

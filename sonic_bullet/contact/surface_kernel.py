@@ -131,7 +131,7 @@ def _law(pair, voice, sr, constants, at):
     square = change * change
     constants[at + _DEPTH], constants[at + _LIFT] = (
         pair.depth * (square * square),
-        pair.lift * (square * square * change),
+        pair.separation_speed * (square * square * change),
     )
     sweep = voice.sweep_m_s
     still = sweep[0, 0] == 0.0 and sweep[0, 1] == 0.0 and sweep[1, 0] == 0.0 and sweep[1, 1] == 0.0
@@ -191,7 +191,7 @@ def sound_voices(pairs, voices, count, x, sr, tracks, force):
         for lane in range(LANES if first + LANES <= count else count - first):
             v = voices[first + lane].order
             pair = pairs[voices[v].slot]
-            pair.depth, pair.lift = lanes[lane], lanes[LANES + lane]
+            pair.depth, pair.separation_speed = lanes[lane], lanes[LANES + lane]
             pair.substeps = int(constants[v * _ROWS + _SUBSTEPS])
             for i in range(n):
                 force[v, i] = rate[lane * whole + i]
@@ -272,8 +272,8 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
                 f = builder.fadd(builder.fsub(elastic, load), builder.fmul(loss, builder.fsub(dh, u)))
                 f = builder.fdiv(f, builder.fadd(one, builder.fmul(two_thirds, loss)))
                 f = builder.select(runs, larger(f, builder.fneg(load)), none)
-                lifted = builder.fadd(u, builder.fmul(two_thirds, f))
-                return [builder.select(runs, moved, z), lifted, builder.fadd(total, f)]
+                separating = builder.fadd(u, builder.fmul(two_thirds, f))
+                return [builder.select(runs, moved, z), separating, builder.fadd(total, f)]
 
             z, u, total = e.loop(most, 1, [*state, none], substep)
             bound = builder.fmul(constant(_STILL), d0)

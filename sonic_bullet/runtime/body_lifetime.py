@@ -100,19 +100,19 @@ def release(state: State) -> None:
         stays |= ~state.space.silent()
     stays[[body for low, high, _ in state.rubs for body in (low, high)]] = True
     if not stays.all():
-        state.lifted = lifted(state, np.flatnonzero(~stays))
+        state.separations = sum_separations(state, np.flatnonzero(~stays))
         subset(state, np.flatnonzero(stays))
 
 
-def lifted(state: State, who: Array | None = None) -> dict[str, tuple[int, int]]:
+def sum_separations(state: State, who: Array | None = None) -> dict[str, tuple[int, int]]:
     """Count, by name of each body so far, the steps that it rang on contacts, and those with contact separation.
 
     The second is an upper bound: Σ|F| of the modes, each where it separates first, exceeded the load. who: of the
     tables, None: all of them, beside those that have left.
     """
-    found = dict(state.lifted)
-    for b in range(len(state.stand)) if who is None else who.tolist():
-        rang, beyond = int(state.stand["steps"][b]), int(state.stand["lifted"][b])
+    found = dict(state.separations)
+    for b in range(len(state.support_state)) if who is None else who.tolist():
+        rang, beyond = int(state.support_state["steps"][b]), int(state.support_state["separated"][b])
         if rang:
             before = found.get(state.resonators[b].body.name, (0, 0))
             found[state.resonators[b].body.name] = before[0] + rang, before[1] + beyond
@@ -128,7 +128,7 @@ def subset(state: State, keep: Array) -> None:
     follows = [np.zeros(0, np.int64) if voice is None else voice.follows for voice in state.voices]
     state.table = state.table.subset(keep, list(zip(state.resonators, follows, strict=True)))
     state.bank, state.ringing = bank.subset(state.bank, state.ringing, keep)
-    state.stand = state.stand[keep]
+    state.support_state = state.support_state[keep]
     state.travelling = propagation.subset(state.path, state.travelling, keep)
     state.window.subset(keep, number)
     for part in (state.space, state.surface, state.directions, state.images):

@@ -2,7 +2,7 @@
 
     CONTACT rows, poses of a step -> take: ROW, load histories, into a window of SPAN steps
         -> excite: PULSE (strikes), drives (friction) of the step LOOKAHEAD before
-        -> settle: contact patches, and bodies whose poles they change, which Python computes (pole_updates.py)
+        -> track_supports: contact patches, and bodies whose poles they change, as Python computes them (pole_updates)
         -> ring: modes and translations of all bodies -> source (W, b, n), pushed (b, 3, n)
         -> hear: through the air to the microphones; other sensors sum their weight set over the bodies
 
@@ -22,7 +22,7 @@ from sonic_bullet.bank import bank_kernel
 from sonic_bullet.bank.bank_kernel import DRIVE_SCRATCH, RING_SCRATCH
 from sonic_bullet.bank.layout import DRIVEN, BankWork
 from sonic_bullet.bank.strike_pool import enter_pulses
-from sonic_bullet.contact.contact_patches import choose_bodies, count_lifted, hold_contacts
+from sonic_bullet.contact.contact_patches import choose_bodies, count_separations, track_contact_patches
 from sonic_bullet.contact.contact_rows import enter_loads, orient
 from sonic_bullet.contact.friction import advance_friction
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, SPAN
@@ -36,7 +36,7 @@ from sonic_bullet.path.path_kernel import WORK, hear
 from sonic_bullet.path.path_places import DONE, Arrivals, Course, Emission
 from sonic_bullet.runtime.groups import Groups
 
-TO_GROW, PAUSED, BROKEN, TO_SETTLE = -1, -2, -3, -4
+TO_GROW, PAUSED, BROKEN, TO_UPDATE_POLES = -1, -2, -3, -4
 """Why the driver returned early: a table is too small; asked to stop before `hear`; an error (a sum that is not finite
 or a strike without a place); poles are to be computed. Else it is DONE, or the result of `path_kernel.hear`."""
 ANEW, RINGS, EXCITED = 0, 1, 2
@@ -108,11 +108,11 @@ def excite(number, quench, x, sr, window, table, pairs, scratch):  # pragma: no 
 
 
 @njit(nogil=True, error_model="numpy")
-def settle(number, window, table, pairs, supports, bank, scratch):  # pragma: no cover - compiled
+def track_supports(number, window, table, pairs, supports, bank, scratch):  # pragma: no cover - compiled
     """Update the support state of step ``number``; return how many bodies' poles are to be computed."""
     here = window.step[number % SPAN]
-    hold_contacts(here, window.row, table, pairs, supports.stand)
-    count_lifted(supports.stand, bank)
+    track_contact_patches(here, window.row, table, pairs, supports.support_state)
+    count_separations(supports.support_state, bank)
     return choose_bodies(here.dt_s, table, pairs, supports, bank, scratch)
 
 
@@ -188,8 +188,8 @@ def advance_steps(values):  # pragma: no cover - compiled
                 x[k] = min(max((k + step.offset) / (dt_s * sr), 0.0), 1.0)
             if far == ANEW:
                 excite(number, step.quench, x, sr, window, table, pairs, scratch)
-                if len(supports.credit_s) > 0 and settle(number, window, table, pairs, supports, bank, scratch):
-                    return done, TO_SETTLE
+                if len(supports.credit_s) > 0 and track_supports(number, window, table, pairs, supports, bank, scratch):
+                    return done, TO_UPDATE_POLES
             if far != RINGS:
                 if not ring(step, x, sr, bank, scratch):
                     return done, BROKEN

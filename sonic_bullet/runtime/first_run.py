@@ -20,7 +20,7 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.runtime import driver
 from sonic_bullet.runtime.groups import Groups
 
-STAGES = (driver.excite, driver.ring, driver.finish, driver.take, driver.settle)
+STAGES = (driver.excite, driver.ring, driver.finish, driver.take, driver.track_supports)
 """Stages, the slowest to compile first. Whatever types they get here, the driver compiles those that it needs."""
 INNER = {
     **dict.fromkeys(("i", "number", "quench"), types.int64),

@@ -91,13 +91,13 @@ class PairTables(NamedTuple):
     count: Array  # type: ignore[assignment]
     free: Array
     gain: Array
-    held: Array
+    patch: Array
 
 
 class SupportTables(NamedTuple):
-    """Support states (b,) STAND, and time left for new poles, (1,), (0,) where nothing supports."""
+    """Support states (b,) SUPPORT_STATE, and time left for new poles, (1,), (0,) where nothing supports."""
 
-    stand: Array
+    support_state: Array
     credit_s: Array
 
 

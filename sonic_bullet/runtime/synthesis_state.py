@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet import bank
 from sonic_bullet.bank import Bank, BankState, resonator
 from sonic_bullet.bank.resonator import Resonator, build_resonator, read_sets, weight_set_count
-from sonic_bullet.contact.contact_patches import HELD, SAVED_S, STAND
+from sonic_bullet.contact.contact_patches import CONTACT_PATCH, SAVED_S, SUPPORT_STATE
 from sonic_bullet.contact.friction import surface_seed
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.machine.grouping import gather, kinds_of
@@ -129,7 +129,7 @@ class TouchingPairs:
     """Pairs of bodies that touch.
 
     pair (slots,) PAIR; active (slots,): those in use by rising key; count (2,): how many are in use and free; free
-    (slots,); gain (slots, 2, columns): Uᵀ per newton on either body; held (slots,) HELD.
+    (slots,); gain (slots, 2, columns): Uᵀ per newton on either body; patch (slots,) CONTACT_PATCH.
     """
 
     pair: Array
@@ -137,7 +137,7 @@ class TouchingPairs:
     count: Array
     free: Array
     gain: Array
-    held: Array
+    patch: Array
 
     def subset(self, number: Array) -> None:
         """Renumber the bodies; number (b,): the new one of each."""
@@ -158,7 +158,7 @@ class TouchingPairs:
         gain = np.zeros((old + more, 2, max(columns, width)))
         gain[:old, :, :width] = self.gain
         self.gain = gain
-        self.held = np.concatenate([self.held, np.zeros(more, HELD)])
+        self.patch = np.concatenate([self.patch, np.zeros(more, CONTACT_PATCH)])
 
     def copy(self) -> TouchingPairs:
         """Return an independent copy."""
@@ -173,11 +173,11 @@ class State:
     rendered. body (b,): each body's index in the log, ascending; present: those of the step taken in last (the others
     have left, and ring on where they were); newest: the highest so far. quenches: steps before which all ringing stops.
     voices (b): residuals; grains, rubs: their grains and sections under way. witness: called with every step once it
-    rings, then one at a time. stand (b,) STAND: support state; credit_s (1,): time left for new poles, (0,) where
-    nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces;
-    directions: of microphones with directivity; sets (c,): the weight set of each microphone. lifted: of bodies that
-    left, by name, the steps that they rang on contacts, and those with contact separation. images: of bodies in faces
-    (images/).
+    rings, then one at a time. support_state (b,) SUPPORT_STATE; credit_s (1,): time left for new poles, (0,)
+    where nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces;
+    directions: of microphones with directivity; sets (c,): the weight set of each microphone. separations: of bodies
+    that left, by name, the steps that they rang on contacts, and those with contact separation. images: of bodies in
+    faces (images/).
     """
 
     window: Window
@@ -202,9 +202,9 @@ class State:
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
     witness: Witness | None = None
-    stand: Array = field(default_factory=lambda: np.zeros(0, STAND))
+    support_state: Array = field(default_factory=lambda: np.zeros(0, SUPPORT_STATE))
     credit_s: Array = field(default_factory=lambda: np.zeros(0))
-    lifted: dict[str, tuple[int, int]] = field(default_factory=dict)
+    separations: dict[str, tuple[int, int]] = field(default_factory=dict)
     space: SpaceState | None = None
     surface: SurfaceState | None = None
     directions: Directions | None = None
@@ -244,7 +244,8 @@ class State:
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
-            self.reads, self.has_residual, self.witness, self.stand.copy(), self.credit_s.copy(), dict(self.lifted),
+            self.reads, self.has_residual, self.witness, self.support_state.copy(), self.credit_s.copy(),
+            dict(self.separations),
             self.space and self.space.copy(), self.surface and self.surface.copy(),
             self.directions and self.directions.copy(), self.sets, self.images.copy(),
         )  # fmt: skip
@@ -266,7 +267,9 @@ def start(setup: Setup) -> State:
     none = np.zeros(0, np.int64)
     poses = np.zeros((SPAN, 0, 3)), np.zeros((SPAN, 0, 4)), np.zeros((SPAN, 0), bool)
     window = Window(np.zeros(SPAN, WINDOW), *poses, np.zeros(0, ROW))
-    pairs = TouchingPairs(np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)), np.zeros(0, HELD))
+    pairs = TouchingPairs(
+        np.zeros(0, PAIR), none, np.zeros(2, np.int64), none, np.zeros((0, 2, 0)), np.zeros(0, CONTACT_PATCH)
+    )
     credit_s = np.full(1 if setup.supports else 0, SAVED_S)
     state = State(
         window, pairs, BodyTable(), instrument, ringing, air, travelling, reads=setup.reads, credit_s=credit_s
@@ -293,7 +296,7 @@ def with_bodies(setup: Setup, state: State, bodies: Sequence[Body], position_m: 
     state.window.with_bodies(position_m, quaternion_xyzw)
     state.resonators, state.voices = state.resonators + new, state.voices + voices
     state.has_residual = any(voice is not None for voice in state.voices)
-    state.stand = np.concatenate([state.stand, np.zeros(len(new), STAND)])
+    state.support_state = np.concatenate([state.support_state, np.zeros(len(new), SUPPORT_STATE)])
     state.scratch = StepScratch()
     if state.directions is not None:
         state.directions.with_bodies(new, voices, setup.air)

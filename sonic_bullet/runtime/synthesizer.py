@@ -26,7 +26,7 @@ from sonic_bullet.records.arrays import joined
 from sonic_bullet.records.contacts import CONTACT, Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.runtime import driver
-from sonic_bullet.runtime.body_lifetime import Records, admit, in_tables, lifted, release
+from sonic_bullet.runtime.body_lifetime import Records, admit, in_tables, release, sum_separations
 from sonic_bullet.runtime.channels.body_images import completed
 from sonic_bullet.runtime.channels.directional_weights import take_aim, until_turned
 from sonic_bullet.runtime.channels.finished_channels import finish_channels
@@ -35,7 +35,7 @@ from sonic_bullet.runtime.first_run import make_driver
 from sonic_bullet.runtime.groups import DriverCall, Frames, StepTables
 from sonic_bullet.runtime.residual_voice import add_residuals
 from sonic_bullet.runtime.ringing_on import with_tail
-from sonic_bullet.runtime.supports.pole_updates import prepare_supports, settle
+from sonic_bullet.runtime.supports.pole_updates import prepare_supports, update_poles
 from sonic_bullet.runtime.synthesis_state import Setup, State, quench, start
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
@@ -128,8 +128,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
             continue
         if status == driver.TO_GROW:
             _make_room(state, table[done], longest)
-        elif status == driver.TO_SETTLE:
-            settle(state, state.taken + done - LOOKAHEAD)
+        elif status == driver.TO_UPDATE_POLES:
+            update_poles(state, state.taken + done - LOOKAHEAD)
             resume = driver.EXCITED
         elif status == driver.PAUSED:
             found, drives = state.scratch.count.tolist()
@@ -229,9 +229,9 @@ class Synthesizer:
         return self._clock.time_s
 
     @property
-    def lifted(self) -> dict[str, tuple[int, int]]:
-        """Steps with contact separation, see `body_lifetime.lifted`."""
-        return lifted(self._state)
+    def separations(self) -> dict[str, tuple[int, int]]:
+        """Steps with contact separation, see `body_lifetime.sum_separations`."""
+        return sum_separations(self._state)
 
     def feed(self, step: Step, bodies: Records) -> Array:
         """Take in a step; return the frame (channels, n) as long as the step, LATENCY_STEPS late.

@@ -122,7 +122,7 @@ PAIR = np.dtype(
         ("ball_m", "f8"),  # R* of a ball on a stated spectrum, 0: it follows all waves
         ("slope", "f8"),  # rms, of both surfaces; 0: not known, the contact is in spots
         ("depth", "f8"),  # from here: state of its voice
-        ("lift", "f8"),
+        ("separation_speed", "f8"),
         ("substeps", "i8"),
         ("swept_m", "f8", (2,)),
     ],

@@ -300,7 +300,7 @@ class Listener:
         In the latter the vibration is so large that contacts would lift off and chatter, which their law does not
         describe.
         """
-        return self._synth.lifted
+        return self._synth.separations
 
     @property
     def time_s(self) -> float:

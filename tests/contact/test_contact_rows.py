@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sonic_bullet.contact.contact_patches import HELD
+from sonic_bullet.contact.contact_patches import CONTACT_PATCH
 from sonic_bullet.contact.contact_rows import enter_loads, orient
 from sonic_bullet.contact.load_splitting import HISTORY, SPAN
 from sonic_bullet.records import Array
@@ -59,7 +59,7 @@ def oriented(contacts: Contacts, quaternion: Array) -> Array:
 
 
 def group(pairs: Array, active: Array, counts: Array, free: Array) -> PairTables:
-    return PairTables(pairs, active, counts, free, np.zeros((0, 2, 0)), np.zeros(0, HELD))
+    return PairTables(pairs, active, counts, free, np.zeros((0, 2, 0)), np.zeros(0, CONTACT_PATCH))
 
 
 def test_rows_are_sorted_by_pair_and_within_it_as_they_came() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.bank.layout import ScratchTables
-from sonic_bullet.contact.contact_patches import HELD
+from sonic_bullet.contact.contact_patches import CONTACT_PATCH
 from sonic_bullet.contact.friction import FOLLOW_S, advance_friction
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.contact.surface_kernel import VOICE
@@ -76,7 +76,12 @@ class Table:
             np.zeros(0),
         )
         pairs = PairTables(
-            self.pairs, np.zeros(1, np.int64), np.array([1, 0]), np.zeros(0, np.int64), self.gain, np.zeros(2, HELD)
+            self.pairs,
+            np.zeros(1, np.int64),
+            np.array([1, 0]),
+            np.zeros(0, np.int64),
+            self.gain,
+            np.zeros(2, CONTACT_PATCH),
         )
         none = np.zeros((0, 2, 0))
         count, silence = np.zeros(2, np.int64), (none, none, none, np.zeros((0, 2), np.int64))

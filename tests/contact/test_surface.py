@@ -110,7 +110,7 @@ def test_a_ball_that_stops_falls_silent_to_exact_zero_and_starts_without_a_click
     assert np.abs(sound[:3]).max() < 0.5 * loud
     assert np.abs(np.diff(sound)).max() < 20 * np.diff(sound[STEP * 20 : STEP * 60]).std()
     assert not sound[-10 * STEP :].any()
-    assert pairs["depth"][0] == 0 and pairs["lift"][0] == 0
+    assert pairs["depth"][0] == 0 and pairs["separation_speed"][0] == 0
     tiny = np.abs(sound[sound != 0])
     assert tiny.min() > 1e-300
     fade = [np.std(step) for step in steps[60:120:10]]  # continuous as the speed fades: no step up, no sudden end

@@ -8,7 +8,7 @@ import numpy as np
 
 from sonic_bullet.bank.layout import ScratchTables
 from sonic_bullet.bank.resonator import build_resonator
-from sonic_bullet.contact.contact_patches import HELD
+from sonic_bullet.contact.contact_patches import CONTACT_PATCH
 from sonic_bullet.contact.contact_rows import enter_loads, orient
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, SPAN
 from sonic_bullet.contact.strike_pulses import STRIKE, find_pulses
@@ -49,7 +49,7 @@ class Stages:
         )  # fmt: skip
         self.pairs = PairTables(
             np.zeros(pairs, PAIR), np.zeros(pairs, np.int64), np.array([0, pairs]), np.arange(pairs),
-            np.zeros((pairs, 2, 0)), np.zeros(pairs, HELD),
+            np.zeros((pairs, 2, 0)), np.zeros(pairs, CONTACT_PATCH),
         )  # fmt: skip
         self.strikes, self.pulses = np.zeros(pairs, STRIKE), np.zeros(2 * pairs, PULSE)
         self.push = np.zeros((2 * pairs, 2, self.table.columns))

@@ -120,9 +120,9 @@ def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_
     whole = first + second
     a, b = region.half_axes_m(1 / whole, load)
     smooth = math.pi * a / (whole * float(ellipkm1((b / a) ** 2)))
-    lift = PERSSON * math.hypot(one.roughness_m, other.roughness_m)
+    layer_m = PERSSON * math.hypot(one.roughness_m, other.roughness_m)
     loss = (first * one.loss_factor + second * other.loss_factor) / whole
-    normal = (1 + 1j * loss) / (1 / smooth + lift / load)
+    normal = (1 + 1j * loss) / (1 / smooth + layer_m / load)
     poisson = (first * one.poisson + second * other.poisson) / whole
     return ContactSpring(normal, normal * 2 * (1 - poisson) / (2 - poisson))
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from sonic_bullet.contact.contact_patches import HELD
+from sonic_bullet.contact.contact_patches import CONTACT_PATCH
 from sonic_bullet.contact.contact_place import CREASE_COS
 from sonic_bullet.geometry.nearest_point import nearest_face
 from sonic_bullet.machine.compiled import njit
@@ -34,7 +34,7 @@ class PlacedPoints(NamedTuple):
 
 
 @njit(nogil=True, error_model="numpy")
-def write_axes(quaternion, both, held, axes):
+def write_axes(quaternion, both, patch, axes):
     """Write normal and two tangents as rows (2, 3, 3), in either body's frame, the same directions for both."""
     turn = np.empty((2, 3, 3))
     for side in range(2):
@@ -43,7 +43,7 @@ def write_axes(quaternion, both, held, axes):
         r[0, 0], r[0, 1], r[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
         r[1, 0], r[1, 1], r[1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
         r[2, 0], r[2, 1], r[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-    n, r = held.outward[0], turn[0]
+    n, r = patch.outward[0], turn[0]
     x = r[0, 0] * n[0] + r[0, 1] * n[1] + r[0, 2] * n[2]
     y = r[1, 0] * n[0] + r[1, 1] * n[1] + r[1, 2] * n[2]
     z = r[2, 0] * n[0] + r[2, 1] * n[1] + r[2, 2] * n[2]
@@ -87,20 +87,20 @@ def write_rigid(body, point, axes, turn, moves):
 
 
 @njit(nogil=True, error_model="numpy")
-def place_points(table, quaternion, held, both, turn, axes, moves, curvature):
+def place_points(table, quaternion, patch, both, turn, axes, moves, curvature):
     """Fill moves of both bodies, (k, 3, m + 6) of zeros each, and curvature (k,); return off_m.
 
     both (2,): the bodies; turn (2, 3, 3): J^{−1/2} of both; axes (2, 3, 3): filled too.
     """
     bodies, faces, nodes, shapes = table
-    far, count = 0.0, held.count
-    write_axes(quaternion, both, held, axes)
+    far, count = 0.0, patch.count
+    write_axes(quaternion, both, patch, axes)
     for side in range(2):
-        body, normal = bodies[both[side]], held.outward[side]
+        body, normal = bodies[both[side]], patch.outward[side]
         made = moves[0] if side == 0 else moves[1]
         n, middle, bent = (normal[0], normal[1], normal[2]), np.zeros(3), body.curvature_per_m
         for k in range(count + 1):
-            point = held.point_m[k, side] if k < count else middle / count
+            point = patch.point_m[k, side] if k < count else middle / count
             for x in range(3):
                 middle[x] += point[x]
             here = bent if np.isfinite(bent) else 0.0
@@ -123,22 +123,22 @@ def place_points(table, quaternion, held, both, turn, axes, moves, curvature):
     return far
 
 
-def _arguments(table: BodyTable, quaternion: Array, held: Any, both: Array, turns: Array, modes: list[int]) -> Any:
-    count = int(held["count"])
+def _arguments(table: BodyTable, quaternion: Array, patch: Any, both: Array, turns: Array, modes: list[int]) -> Any:
+    count = int(patch["count"])
     moves = tuple(np.zeros((count, 3, m + 6)) for m in modes)
     tables = table.bodies, table.faces, table.nodes, table.shapes
-    return tables, quaternion, held, both, turns, np.empty((2, 3, 3)), moves, np.zeros(count)
+    return tables, quaternion, patch, both, turns, np.empty((2, 3, 3)), moves, np.zeros(count)
 
 
-def placed_points(table: BodyTable, quaternion: Array, held: Array, both: Array, turns: Array) -> PlacedPoints:
-    """Locate a patch, a row of HELD, on bodies ``both`` (2,); turns (2, 3, 3): J^{−1/2} of either."""
-    given = _arguments(table, quaternion, held, both, turns, table.bodies["modes"][both].tolist())
+def placed_points(table: BodyTable, quaternion: Array, patch: Array, both: Array, turns: Array) -> PlacedPoints:
+    """Locate a patch, a row of CONTACT_PATCH, on bodies ``both`` (2,); turns (2, 3, 3): J^{−1/2} of either."""
+    given = _arguments(table, quaternion, patch, both, turns, table.bodies["modes"][both].tolist())
     off = place_points(*given)
     return PlacedPoints(given[-2], given[-1], off)
 
 
 def make_ready() -> None:
     """Compile the kernel, or load its machine code."""
-    held, both = np.zeros(1, HELD)[0], np.zeros(2, np.int64)
-    given = _arguments(BodyTable(), np.zeros((0, 4)), held, both, np.zeros((2, 3, 3)), [0, 0])
+    patch, both = np.zeros(1, CONTACT_PATCH)[0], np.zeros(2, np.int64)
+    given = _arguments(BodyTable(), np.zeros((0, 4)), patch, both, np.zeros((2, 3, 3)), [0, 0])
     place_points.compile(tuple(numba.typeof(one) for one in given))

@@ -1,6 +1,6 @@
 """Effect of resting contacts on a body: other poles while they last, and transmission to the bodies it touches.
 
-    HELD of a body's pairs -> touches: places on both bodies, springs of the regions that touch     (coupling)
+    CONTACT_PATCH of a body's pairs -> touches: places on both bodies, springs of the regions that touch     (coupling)
         -> first_order -> poles, transmission to each partner, contact separation -> the bank, from its next block on
 
 The driver chooses the bodies (`contact_patches.choose_bodies`): active ones whose contacts differ from those of their
@@ -75,16 +75,16 @@ def prepare_supports(state: State) -> None:
     _blas()
 
 
-def settle(state: State, number: int) -> None:
+def update_poles(state: State, number: int) -> None:
     """Update the poles of the bodies that the driver wants, before step ``number`` rings."""
     many = any(one.user_api == "blas" and one.num_threads != 1 for one in _blas().lib_controllers)
     with _blas().limit(limits=1, user_api="blas") if many else nullcontext():
-        for b in np.flatnonzero(state.stand["wanted"]).tolist():
-            state.stand["wanted"][b] = 0
-            _stand(state, b, state.window.quaternion_xyzw[number % SPAN])
+        for b in np.flatnonzero(state.support_state["wanted"]).tolist():
+            state.support_state["wanted"][b] = 0
+            _update_body(state, b, state.window.quaternion_xyzw[number % SPAN])
 
 
-def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
+def couple_body(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
     """Compute a body's partners, its touches, the load (c,) on each, and its coupled modes.
 
     quaternion (b, 4): all bodies'.
@@ -94,8 +94,8 @@ def standing(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
     return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches, state.table.turn_of(b))
 
 
-def _stand(state: State, b: int, quaternion: Array) -> None:
-    partners, touches, load_n, placed = standing(state, b, quaternion)
+def _update_body(state: State, b: int, quaternion: Array) -> None:
+    partners, touches, load_n, placed = couple_body(state, b, quaternion)
     free = _lanes(state, b)
     m = state.resonators[b].mode_count
     turn_modes(state, b, placed.turn if touches else None)
@@ -108,9 +108,9 @@ def _stand(state: State, b: int, quaternion: Array) -> None:
     if voice is not None:
         new = np.concatenate([new, free[m : m + len(voice.follows)] + (new - free[:m])[voice.follows]])
     new = np.concatenate([new, free[len(new) :]])  # rigid motions
-    lift = np.zeros(len(free))
-    lift[:m] = np.nan_to_num(np.abs(placed.force_n_s) / load_n[:, None]).max(axis=0)
-    bank.set_poles(state.bank, state.ringing, b, new, lift)
+    separation = np.zeros(len(free))
+    separation[:m] = np.nan_to_num(np.abs(placed.force_n_s) / load_n[:, None]).max(axis=0)
+    bank.set_poles(state.bank, state.ringing, b, new, separation)
     bank.set_passes(state.bank, state.ringing, b, dict(_passed(state, b, partners, placed, len(free))))
 
 
@@ -163,8 +163,8 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
     touches, loads = [], []
     pairs = state.pairs
     for slot in pairs.active[: pairs.count[0]].tolist():
-        held, both = pairs.held[slot], pairs.pair["body"][slot].tolist()
-        if b not in both or not held["count"]:
+        patch, both = pairs.patch[slot], pairs.pair["body"][slot].tolist()
+        if b not in both or not patch["count"]:
             continue
         side = both.index(b)
         other = both[1 - side]
@@ -173,17 +173,17 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
         if not sum(state.resonators[one].side.compliance_per_pa for one in both):
             continue  # both rigid: their materials are unknown
         turns = np.stack([state.resonators[one].moving.turn for one in both])
-        placed = placed_points(state.table, quaternion, held, pairs.pair["body"][slot], turns)
+        placed = placed_points(state.table, quaternion, patch, pairs.pair["body"][slot], turns)
         own, there = placed.moves[side], placed.moves[1 - side]
-        load = held["load_n"][: held["count"]]
-        for i, spring in enumerate(_springs(state, both, held, placed.curvature_per_m, placed.off_m, load)):
+        load = patch["load_n"][: patch["count"]]
+        for i, spring in enumerate(_springs(state, both, patch, placed.curvature_per_m, placed.off_m, load)):
             touches.append(Touch(partners.index(other), own[i], there[i], spring))
             loads.append(load[i])
     return partners, touches, np.array(loads)
 
 
 def _springs(
-    state: State, both: list[int], held: Array, curvature: Array, off_m: float, load: Array
+    state: State, both: list[int], patch: Array, curvature: Array, off_m: float, load: Array
 ) -> Iterator[ContactSpring]:
     """Yield the spring of each of a pair's points: of its part of one region, or of a region of its own.
 
@@ -192,7 +192,7 @@ def _springs(
     sides = state.resonators[both[0]].side, state.resonators[both[1]].side
     sizes = [float(row["size_m"]) for row in state.table.bodies[both] if row["volume_m3"] > 0]
     size = min(sizes, default=SIZELESS_M)
-    region = _one_region(held["point_m"][: held["count"], 0], float(curvature.mean()), off_m, size)
+    region = _one_region(patch["point_m"][: patch["count"], 0], float(curvature.mean()), off_m, size)
     whole = float(load.sum())
     slips = any(state.resonators[one].body.dynamics.get("lateralFriction") == 0 for one in both)  # μ is their product
     if region is not None:

@@ -64,14 +64,14 @@ def _turn_state(state: State, b: int, pairs: Array, step: Array) -> None:
     while slot >= 0:
         turn_lanes(now.rows[slot, :2], pairs, step)  # r, which holds the gain
         slot = int(now.strikes[slot]["next"])
-    scratch, held = state.scratch, state.pairs
+    scratch, touching = state.scratch, state.pairs
     found, drives = scratch.count.tolist()
-    active = held.active[: held.count[0]]
+    active = touching.active[: touching.count[0]]
     for side in range(2):
         struck = np.flatnonzero(scratch.pulse["body"][:found, side] == b)
         driven = np.flatnonzero(scratch.body[:drives, side] == b)
-        slots = active[held.pair["body"][active, side] == b]
-        mine = (scratch.push, struck), (scratch.gain0, driven), (scratch.gain1, driven), (held.gain, slots)
+        slots = active[touching.pair["body"][active, side] == b]
+        mine = (scratch.push, struck), (scratch.gain0, driven), (scratch.gain1, driven), (touching.gain, slots)
         for gains, rows in mine:
             for row in rows.tolist():
                 turn_lanes(gains[row, side], pairs, step)

@@ -75,7 +75,7 @@ def test_without_friction_nothing_is_held_sideways(client: Any) -> None:
         held: list[Any] = []
 
         def look(state: Any, *_: Any, found: list[Any] = held) -> None:
-            if state.stand["points"].any():
+            if state.support_state["points"].any():
                 found[:] = [one.spring for one in pole_updates._touches(state, 1, state.window.quaternion_xyzw[0])[1]]
 
         for _ in render_apart(log, witness=look):
@@ -100,7 +100,7 @@ def test_the_held_points_carry_the_weight_while_the_simulators_flicker(client: A
     listener = landed(client, seconds=2.0)
     state = listener._synth._state
     (slot,) = state.pairs.active[: state.pairs.count[0]]
-    held = state.pairs.held[slot]
+    held = state.pairs.patch[slot]
     load, point = held["load_n"][: held["count"]], held["point_m"][: held["count"], 1]
     assert load.sum() == pytest.approx(0.4 * 9.81, rel=0.02)
     centre = load @ point / load.sum()
@@ -160,7 +160,7 @@ def test_a_body_that_slides_takes_the_place_where_it_lies_now(client: Any) -> No
         client.stepSimulation()
     state = listener._synth._state
     (slot,) = state.pairs.active[: state.pairs.count[0]]
-    held = state.pairs.held[slot]
+    held = state.pairs.patch[slot]
     assert client.getBasePositionAndOrientation(sliding)[0][0] > -0.1
     off = np.linalg.norm((held["used_m"] - held["point_m"])[: held["count"]], axis=2)
     assert off.max() < 0.25 * max(EDGES_M)
