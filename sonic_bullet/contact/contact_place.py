@@ -1,7 +1,7 @@
 """Location of a contact on both bodies' true surfaces, and its force on their modes: for strikes and friction.
 
     row of ROW -> touch: nearest triangle, weights, curvature, once a row -> add_push: Uᵀj on either body's columns
-    1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)],  1/E* = Σ (1-ν²)/E    [force_pulse]
+    1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)]    [Johnson 1985, sec. 11.1]
 
 Plain functions on the tables of `sonic_bullet.runtime.tables`, called by the stages of the run time. Triangles are
 looked up only for rows with a strike or friction: each stage calls `touch` for those it needs.
@@ -96,12 +96,6 @@ def turn_push(body, turns, out):
         one, other = out[k], out[k + 1]
         out[k] = one * by[0, 0] + other * by[1, 0]
         out[k + 1] = one * by[0, 1] + other * by[1, 1]
-
-
-@njit(nogil=True, error_model="numpy")
-def contact_modulus(low_pa, high_pa):
-    """Compute E* in Pa of two moduli E/(1-ν²); infinite where both are rigid partners."""
-    return 1 / (1 / low_pa + 1 / high_pa)
 
 
 @njit(nogil=True, error_model="numpy")

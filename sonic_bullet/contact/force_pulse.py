@@ -2,11 +2,7 @@
 
     1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)]            effective mass at the contact
         [Johnson 1985, Contact Mechanics, sec. 11.1]
-    1/E* = Σ (1-ν²)/E,  1/R* = κ1 + κ2         Hertz                               [Johnson 1985, eq. 4.24]
-    τ = 2.868 (m*²/(E*² R* v))^(1/5)           curved faces, approach speed v
-        [Johnson 1985, eq. 11.24; = 2.94 δmax/v]
-    τ = π √(m*/k),  k = 2 E* √(A/π)            flat faces of area A, any speed
-        [Sneddon 1965; Johnson 1985, eq. 3.36]
+    τ = τ(m*, E*, R*, v) of curved faces, τ(m*, E*, A) of flat ones                `hertz`
     δ'' = -δ^(3/2),  F ∝ δ^(3/2)               the Hertz pulse's own shape; flat: F ∝ sin(πt/τ)
 
 All reads use the table of the cumulated force Q(s) = ∫F over the fraction s of the pulse in [0, 1] (Q(1) = 1). For the
@@ -21,6 +17,7 @@ from math import gamma, pi, sqrt
 
 import numpy as np
 
+from sonic_bullet.contact.hertz import ball_stiffness, impact_duration_s, punch_duration_s
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
@@ -57,7 +54,7 @@ def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, ap
 
     A contact is never stiffer than the flat punch that its area allows, so the longer τ counts. Without area Hertz
     decides alone, without curvature the punch. With neither, with infinite mass or at no speed τ is LONGEST_S. Clamped
-    to SHORTEST_S … LONGEST_S. Equations: the module's τ.
+    to SHORTEST_S … LONGEST_S.
 
     Parameters
     ----------
@@ -67,13 +64,10 @@ def pulse_length(mass_kg, modulus_pa, relative_curvature_per_m, flat_area_m2, ap
     curvature, area = relative_curvature_per_m, flat_area_m2
     if not curvature > 0 and not area > 0:
         return LONGEST_S, 0
-    hertz, punch = 0.0, 0.0
-    if curvature > 0:
-        hertz = 2.868 * (mass_kg * mass_kg * curvature / (modulus_pa * modulus_pa * max(approach_m_s, 0.0))) ** 0.2
-    if area > 0:
-        punch = np.pi * np.sqrt(mass_kg / (2 * modulus_pa * np.sqrt(area / np.pi)))
-    longer = hertz if hertz >= punch or np.isnan(punch) else punch
-    return min(max(LONGEST_S if np.isnan(longer) else longer, SHORTEST_S), LONGEST_S), 1 if punch >= hertz else 0
+    curved = impact_duration_s(mass_kg, modulus_pa, curvature, approach_m_s) if curvature > 0 else 0.0
+    punch = punch_duration_s(mass_kg, modulus_pa, area) if area > 0 else 0.0
+    longer = curved if curved >= punch or np.isnan(punch) else punch
+    return min(max(LONGEST_S if np.isnan(longer) else longer, SHORTEST_S), LONGEST_S), 1 if punch >= curved else 0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -83,7 +77,7 @@ def rough_share(mass_kg, modulus_pa, relative_curvature_per_m, approach_m_s, lay
     The rough layer of stiffness f/u₀ [Persson 2007, PRL 99, 125502] lies in series with the bulk and takes u₀f of
     energy: 2/5 k^(-2/3) f^(5/3) + u₀ f = ½ m* v². Impulse and shape are kept. layer_m: u₀.
     """
-    k = 4.0 / 3.0 * modulus_pa / np.sqrt(relative_curvature_per_m)
+    k = ball_stiffness(modulus_pa, 1.0 / relative_curvature_per_m)
     energy = 0.5 * mass_kg * approach_m_s * approach_m_s
     peak = (2.5 * energy * k ** (2.0 / 3.0)) ** 0.6
     b, y = layer_m * peak / energy, 1.0

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.contact.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch, turn_push
+from sonic_bullet.contact.contact_place import add_push, effective_mass, flat_area_m2, touch, turn_push
+from sonic_bullet.contact.hertz import contact_modulus
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.contact.octave_heights import (
     add_waves,

@@ -18,6 +18,7 @@ from sonic_bullet.contact.contact_place import add_push, effective_mass, flat_ar
 from sonic_bullet.contact.contact_rows import opening
 from sonic_bullet.contact.coupling.springs import PERSSON
 from sonic_bullet.contact.force_pulse import compliance, pulse_length, rough_share
+from sonic_bullet.contact.hertz import ball_stiffness, contact_modulus, impact_depth_m
 from sonic_bullet.contact.load_splitting import NOW, SPAN
 from sonic_bullet.contact.strike_timing import accept, date_strikes
 from sonic_bullet.machine.compiled import njit
@@ -269,8 +270,7 @@ def _roughened(bodies, low, high, mass_kg, modulus_pa, curvature_per_m, speed_m_
     low_m, high_m = bodies[low].octave_rms_m, bodies[high].octave_rms_m
     if not curvature_per_m > 0.0 or (low_m[0] < 0.0 and high_m[0] < 0.0):
         return 1.0
-    k = 4.0 / 3.0 * modulus_pa / np.sqrt(curvature_per_m)
-    depth = (1.25 * mass_kg * speed_m_s * speed_m_s / k) ** 0.4
+    depth = impact_depth_m(mass_kg, ball_stiffness(modulus_pa, 1.0 / curvature_per_m), speed_m_s)
     across, square = 2.0 * np.sqrt(depth / curvature_per_m), 0.0
     for j in range(len(low_m)):
         if WAVE_M[j] < across:
@@ -307,7 +307,7 @@ def _make(strike, quaternion, rows, table, pulse, push):
                     spread += load / raw * (off * off)
     area = flat_area_m2(bodies, low, high, np.sqrt(spread), bent, STRUCK_FLAT)
     speed = strike.approach_m_s if strike.approach_m_s > 0 else accepted / (1.5 * mass)
-    modulus = 1 / (1 / bodies[low].modulus_pa + 1 / bodies[high].modulus_pa)
+    modulus = contact_modulus(bodies[low].modulus_pa, bodies[high].modulus_pa)
     length, flat = pulse_length(mass, modulus, bent, area, max(speed, 1e-6))
     if not flat:
         length *= _roughened(bodies, low, high, mass, modulus, bent, max(speed, 1e-6))

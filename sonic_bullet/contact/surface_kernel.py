@@ -5,7 +5,7 @@
     m* du/dt = f - N
     δ = δ0(N) + z,   f = k δ^(3/2) (1 + c(dh/dt - u)),  never below 0
         [Hunt & Crossley 1975, eq. 12; clamped: micro-collisions]
-    k = (4/3) E* √R*,   N = k δ0^(3/2),   a = (3 N R*/4E*)^(1/3)            [Johnson 1985, eq. 4.22-4.24]
+    N = k δ0^(3/2);  k, and the patch's radius a: `hertz`
     c = 2ζ √(m* dN/dδ0)/N,  at least 3/2 (1 - e) s/m      ζ = 0.25: waves into both bodies; e: restitution at 1 m/s
 
 The oscillator gives f - N in newton: along the normal as it is; times the friction direction and coefficient for slip.
@@ -39,6 +39,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from sonic_bullet.contact.hertz import ball_patch_m, ball_stiffness
 from sonic_bullet.contact.profile import gained_heights, sweep_profile
 from sonic_bullet.contact.track import sweep_track
 from sonic_bullet.machine.compiled import njit
@@ -100,7 +101,7 @@ def _law(pair, voice, sr, constants, at):
     """Write the contact law of a voice in this step into constants[at] …, with its pair's state in that law's units."""
     mass, radius, modulus = pair.mass_kg, pair.radius_m, pair.modulus_pa
     load0, load1 = voice.load_n
-    k = 4.0 / 3.0 * modulus * np.sqrt(radius)
+    k = ball_stiffness(modulus, radius)
     soft = 1.5 * k ** (2.0 / 3.0)
     most = load0 if load0 > load1 else load1
     # half a radian a substep at rest leaves room for collisions four times (√δ twice) as stiff
@@ -119,7 +120,7 @@ def _law(pair, voice, sr, constants, at):
         loss = pair.dissipation_s_m if pair.dissipation_s_m > loss else loss
         constants[at + _REST + end] = depth / limit
         constants[at + _DAMPING + end] = loss * limit / h
-        patch = (0.75 * load * radius / modulus) ** (1.0 / 3.0)
+        patch = ball_patch_m(load, modulus, radius)
         constants[at + _PATCH + end] = patch
         pressure = load / (np.pi * patch * patch) if patch > 0.0 else 0.0
         touching = math.erf(np.sqrt(np.pi) * pressure / (modulus * pair.slope)) if pair.slope > 0.0 else 0.0

@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sonic_bullet.contact import force_pulse as pulse
-from sonic_bullet.contact.contact_place import add_push, contact_modulus, effective_mass, flat_area_m2, touch
+from sonic_bullet.contact.contact_place import add_push, effective_mass, flat_area_m2, touch
+from sonic_bullet.contact.hertz import contact_modulus
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.grouping import gather

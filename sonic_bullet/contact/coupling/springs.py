@@ -1,11 +1,8 @@
 """Stiffness and loss of a contact, from its region, the materials and the load.
 
-    K_c = π E* a / 𝐊(e),  e² = 1 − (b/a)²     a region with half-axes a >= b acts as the flat punch of its outline
-        [Green & Sneddon 1950; of a circle 2E*a: Johnson 1985, Contact Mechanics, eq. 3.36]
-    point  √(ab) = (3N/4E*√(κ₁κ₂))^{1/3}, b/a = (κ₁/κ₂)^{2/3}          K_c = (6 E*² R N)^{1/3} where κ₁ = κ₂ = 1/R
-        [Johnson 1985, eq. 4.22, 4.28]
-    line   b = √(4N/πE*Lκ),  a = L/2                                   [Johnson 1985, eq. 4.43]
-    face   a, b of the geometry; rectangles as the ellipse of their area and aspect
+    K_c: a region with half-axes a >= b acts as the flat punch of its outline    `hertz`
+    a, b   of a point and a line under the load: `hertz`; K_c = (6 E*² R N)^{1/3} of a ball
+        of a face that of the geometry; rectangles as the ellipse of their area and aspect
     K_r = N/u₀,  u₀ = h/2                     roughness in series, h rms of both    [Persson 2007, PRL 99, 125502]
     1/K = (1/K_c + 1/K_r)/(1 + jη),  K_t/K = 2(1 − ν)/(2 − ν)          [Mindlin 1949; Johnson 1985, eq. 7.42, 7.44]
     η = Σ η_i c_i/Σ c_i,  c_i = (1 − ν_i²)/E_i        loss by each material's fraction of the compliance, 1/E* = Σ c_i
@@ -23,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet.contact.hertz import line_half_width_m, point_half_axes_m, punch_stiffness_n_m
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import RecordError
@@ -86,15 +84,11 @@ class Region:
     def half_axes_m(self, modulus_pa: float, load_n: float) -> tuple[float, float]:
         """Compute a >= b in m of the ellipse that touches under a load. modulus_pa: E*."""
         if not any(self.half_m):
-            small, large = sorted(self.curvature_per_m)
-            mean = (3 * load_n / (4 * modulus_pa * math.sqrt(small * large))) ** (1 / 3)
-            longer = (large / small) ** (1 / 3)
-            return mean * longer, mean / longer
+            return point_half_axes_m(self.curvature_per_m, modulus_pa, load_n)
         a, b = self.half_m
         if not all(self.half_m):
             curved = self.curvature_per_m[0 if a == 0 else 1]
-            b = math.sqrt(2 * load_n / (math.pi * modulus_pa * max(a, b) * curved))
-            a = max(self.half_m)
+            a, b = max(a, b), line_half_width_m(max(a, b), curved, modulus_pa, load_n)
         return SQUARE * max(a, b), SQUARE * min(a, b)
 
 
@@ -112,14 +106,12 @@ class ContactSpring:
 
 def contact_spring(region: Region, sides: tuple[ContactSide, ContactSide], load_n: float) -> ContactSpring:
     """Compute the whole region's spring under the whole load in N. Raises RecordError for a load not above zero."""
-    from scipy.special import ellipkm1
-
     load = as_number(load_n, "load of a contact", "give a load above zero", above=0)
     one, other = sides
     first, second = one.compliance_per_pa, other.compliance_per_pa
     whole = first + second
     a, b = region.half_axes_m(1 / whole, load)
-    smooth = math.pi * a / (whole * float(ellipkm1((b / a) ** 2)))
+    smooth = punch_stiffness_n_m(a, b, whole)
     layer_m = PERSSON * math.hypot(one.roughness_m, other.roughness_m)
     loss = (first * one.loss_factor + second * other.loss_factor) / whole
     normal = (1 + 1j * loss) / (1 / smooth + layer_m / load)
