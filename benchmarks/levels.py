@@ -60,10 +60,10 @@ def stopped(sr: int = 1_536_000) -> Iterator[str]:
     silent = np.zeros(0)
     one = ModeSet(silent, silent, np.zeros((1, 0), complex), translation=Translation(rate, rate, weight))
     bank, state = append(*empty_bank(sr), [one])
-    pushed = np.zeros((1, 3, 4096))
-    shove = np.array([density * volume * speed, 0.0, 0.0])
-    advance(bank, state, 4096, [Strike(0, 0.0, 1e-7, silent, True, shove)], pushed=pushed)
-    energy = np.sum(pushed[0, 0] ** 2) / sr / RHO_C * 4 * np.pi / 3  # cos²θ over the sphere at 1 m
+    dipole = np.zeros((1, 3, 4096))
+    rigid_impulse = np.array([density * volume * speed, 0.0, 0.0])
+    advance(bank, state, 4096, [Strike(0, 0.0, 1e-7, silent, True, rigid_impulse)], dipole=dipole)
+    energy = np.sum(dipole[0, 0] ** 2) / sr / RHO_C * 4 * np.pi / 3  # cos²θ over the sphere at 1 m
     share, law = energy / (0.5 * density * volume * speed**2), AIR.density_kg_m3 / (2 * density)
     yield f"stopped at once: {share:.3g} of its energy, closed form {law:.3g}: {db(share / law):+.2f} dB"
 

@@ -30,14 +30,14 @@ def ours(sounding: int) -> float:
     rng = np.random.default_rng(0)
     path, state = empty_path(SR, Air(), MICROPHONES)
     path, state = append_bodies(path, state, np.full(BODIES, 0.02))
-    source, pushed = np.zeros((BODIES, FRAME)), np.zeros((BODIES, 3, FRAME))
-    source[:sounding], pushed[:sounding] = rng.normal(size=(sounding, FRAME)), rng.normal(size=(sounding, 3, FRAME))
+    source, dipole = np.zeros((BODIES, FRAME)), np.zeros((BODIES, 3, FRAME))
+    source[:sounding], dipole[:sounding] = rng.normal(size=(sounding, FRAME)), rng.normal(size=(sounding, 3, FRAME))
     place, progress, still = rng.uniform(-3, 3, (BODIES, 3)), np.arange(FRAME) / FRAME, np.zeros(BODIES, bool)
     times = []
     for repeat in range(6):
         begin = time.thread_time()
         for step in range(48):
-            propagate(path, state, 48 * repeat + step, source, pushed, place, place + 0.01, still, progress)
+            propagate(path, state, 48 * repeat + step, source, dipole, place, place + 0.01, still, progress)
         times.append((time.thread_time() - begin) * 5)
     return min(times)
 

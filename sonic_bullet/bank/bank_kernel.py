@@ -25,8 +25,8 @@ from sonic_bullet.bank.translation import translate
 from sonic_bullet.machine.vector import LANES, At
 
 RING_SCRATCH = (2 + 10 + 2 * TILE_ROW + 2 * ROWS) * CHUNK
-PUSH_SCRATCH = COLUMNS // LANE_PAIR * ROOM * drive.SAMPLE_NUMBERS
-DRIVE_SCRATCH = PUSH_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
+IMPULSE_SCRATCH = COLUMNS // LANE_PAIR * ROOM * drive.SAMPLE_NUMBERS
+DRIVE_SCRATCH = IMPULSE_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 
 @uncounted
@@ -128,10 +128,10 @@ def _part_force(d, n, progress, period, force, signal):  # pragma: no cover - co
     early, late = signal[d, 0], signal[d, 1]
     drive.part_force(At(force, d * n), progress, period, whole, signal, 2 * d * stride, (2 * d + 1) * stride)
     for k in range(whole, n):
-        push = force[d * n + k] * period
-        push = push if push * push >= FLUSH**2 else 0.0
-        early[k] = push * (1.0 - progress[k])
-        late[k] = push * progress[k]
+        impulse = force[d * n + k] * period
+        impulse = impulse if impulse * impulse >= FLUSH**2 else 0.0
+        early[k] = impulse * (1.0 - progress[k])
+        late[k] = impulse * progress[k]
     for k in range(n, stride):
         early[k] = 0.0
         late[k] = 0.0
@@ -170,25 +170,25 @@ def list_forces(n, progress, period, bank, scratch, work):  # pragma: no cover -
 
 
 @uncounted
-def _press_strikes(b, stretch, column, keep, pushes, bank, work):  # pragma: no cover - compiled
-    """Add body b's strikes to COLUMNS lanes, or what is left, from ``column`` on; return 1 where push is in use.
+def _add_strikes(b, stretch, column, keep, used, bank, work):  # pragma: no cover - compiled
+    """Add body b's strikes to COLUMNS lanes, or what is left, from ``column`` on; return 1 where impulse is in use.
 
-    pushes: 1 where push is in use already. keep: their phasors advance, and with the last lanes they themselves.
+    used: 1 where impulse is in use already. keep: their phasors advance, and with the last lanes they themselves.
     """
-    push, due = work.flat[:PUSH_SCRATCH], work.flat[DRIVE_SCRATCH - MOST_DUE : DRIVE_SCRATCH]
+    impulse, due = work.flat[:IMPULSE_SCRATCH], work.flat[DRIVE_SCRATCH - MOST_DUE : DRIVE_SCRATCH]
     left, width, strikes = bank.body[b].stop - bank.body[b].start - column, bank.rows.shape[2], bank.strikes
     lanes, final, sample = min(COLUMNS, left), keep and left <= COLUMNS, stretch.at + stretch.i
     slot = bank.ringing[b].strike
     while slot >= 0:
         if strikes[slot].modal and strikes[slot].first < sample + stretch.count:
-            if not pushes:
-                drive.clear(push, lanes, stretch.count)
-                pushes = 1
+            if not used:
+                drive.clear(impulse, lanes, stretch.count)
+                used = 1
             begin, end = plan_nodes(slot, sample, stretch.count, bank, work.plan, due, final)
             rows, plan = At(bank.rows, slot * 8 * width + column), drive.NodePlan(work.plan, due, begin, end)
-            drive.strike_nodes(push, rows, width, lanes, plan, keep)
+            drive.strike_nodes(impulse, rows, width, lanes, plan, keep)
         slot = strikes[slot].next
-    return pushes
+    return used
 
 
 @uncounted
@@ -196,8 +196,8 @@ def _drive(b, stretch, bank, scratch, work):  # noqa: PLR0912 - a loop a set  # 
     """Advance body b by a stretch within one of the DRIVEN; sum driven and free part."""
     modes, ringing, count = bank.law.shape[1], bank.ringing[b], stretch.count
     start, stop, f0, f1 = bank.body[b].start, bank.body[b].stop, work.first[b], work.first[b + 1]
-    push, partial = work.flat[:PUSH_SCRATCH], work.flat[PUSH_SCRATCH : PUSH_SCRATCH + DRIVEN * LANES]
-    total = work.flat[PUSH_SCRATCH + DRIVEN * LANES : PUSH_SCRATCH + DRIVEN * LANES + DRIVEN]
+    impulse, partial = work.flat[:IMPULSE_SCRATCH], work.flat[IMPULSE_SCRATCH : IMPULSE_SCRATCH + DRIVEN * LANES]
+    total = work.flat[IMPULSE_SCRATCH + DRIVEN * LANES : IMPULSE_SCRATCH + DRIVEN * LANES + DRIVEN]
     forces = drive.Forces(work.side, f0, f1, work.signal, work.signal.shape[2])
     ringing.driven = 1
     sets, last = len(bank.observed), transmission.last_set(b, bank)
@@ -209,21 +209,23 @@ def _drive(b, stretch, bank, scratch, work):  # noqa: PLR0912 - a loop a set  # 
         for k in range(count * LANES):
             partial[k] = 0.0
         for lo in range(start, stop, COLUMNS):
-            lanes, column, pushes = Lanes(modes, lo, min(COLUMNS, stop - lo)), lo - start, 0
+            lanes, column, used = Lanes(modes, lo, min(COLUMNS, stop - lo)), lo - start, 0
             if f1 > f0:
-                pushes = 1
+                used = 1
                 gains = drive.Gains(scratch.gain0, scratch.gain1, scratch.gain0.shape[2], column)
-                drive.press(push, gains, forces, stretch.i, At(bank.law, 2 * modes + lo), lanes.count, count)
+                drive.project_forces(
+                    impulse, gains, forces, stretch.i, At(bank.law, 2 * modes + lo), lanes.count, count
+                )
             if ringing.strike >= 0:
-                pushes = _press_strikes(b, stretch, column, keep, pushes, bank, work)
-            if not pushes:
+                used = _add_strikes(b, stretch, column, keep, used, bank, work)
+            if not used:
                 for k in range(drive.SAMPLE_NUMBERS):
-                    push[k] = 0.0
+                    impulse[k] = 0.0
             weight = At(bank.weight if j < 0 else bank.pass_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
             if j < 0 and bank.aims[w] >= 0:
                 weight = At(bank.aim, 4 * bank.aims[w] * modes + lo)
             motion = drive.DrivenModes(bank.driven, bank.pole)
-            drive.run(motion, lanes, weight, drive.Pushes(push, pushes), count, partial, keep)
+            drive.run(motion, lanes, weight, drive.LaneImpulses(impulse, used), count, partial, keep)
         if j >= 0 or bank.observed[w, b]:
             drive.across(partial, count, total)
             free, place = bank.sound[w, b] if j < 0 else bank.pass_sound[w - sets, b], (stretch.at + stretch.i) % BLOCK
@@ -269,17 +271,17 @@ def _open_block(b, bank, scratch):  # pragma: no cover - compiled
 @uncounted
 def _advance_modes(at, n, b, bank, scratch, work):  # pragma: no cover - compiled
     """Compute samples at … at + n - 1 of body b's modes into scratch.source (W, b, n or more)."""
-    ringing, pressed = bank.ringing[b], work.first[b + 1] > work.first[b]
+    ringing, forced = bank.ringing[b], work.first[b + 1] > work.first[b]
     i = np.int64(0)  # a literal has its own type, and its callees would be compiled twice
     while i < n:
         place = (at + i) % BLOCK
         if place == 0:
             _open_block(b, bank, work.flat)
         end = min(n, i + BLOCK - place)
-        if ringing.driven or pressed or ringing.strike >= 0:
+        if ringing.driven or forced or ringing.strike >= 0:
             end = min(end, i + DRIVEN - (at + i) % DRIVEN)
         stretch = Stretch(at, i, end - i)
-        if ringing.driven or pressed or begins(b, at + end, bank):
+        if ringing.driven or forced or begins(b, at + end, bank):
             # driven motion begins with the poles of the free ringing
             if bank.body[b].bent and (not ringing.driven or (at + i) % DRIVEN == 0):
                 poles.bend_poles(b, np.int64(DRIVEN), bank)
@@ -297,9 +299,9 @@ def _advance_modes(at, n, b, bank, scratch, work):  # pragma: no cover - compile
 
 @uncounted
 def advance(at, n, sr, progress, bank, scratch, work):  # pragma: no cover - compiled
-    """Compute samples at … at + n - 1 into scratch: source (W, b, n or more) and pushed (b, 3, n or more).
+    """Compute samples at … at + n - 1 into scratch: source (W, b, n or more) and dipole (b, 3, n or more).
 
-    scratch.sounds (b, 2): 1 where a body's rows of source, of pushed are not zero. On entry it must hold for the rows
+    scratch.sounds (b, 2): 1 where a body's rows of source, of dipole are not zero. On entry it must hold for the rows
     passed in: rows that stay silent are cleared only where it is 1. progress (n,): where between its gains each sample
     of a drive lies. See layout.py for the tables; all in place.
     """
@@ -317,7 +319,7 @@ def advance(at, n, sr, progress, bank, scratch, work):  # pragma: no cover - com
         sounds[b, 0] = 1 if loud else 0
         moves = body.rigid != 0 and translate(at, n, b, bank, scratch, work)
         if not moves and sounds[b, 1]:
-            scratch.pushed[b, :, :] = 0.0
+            scratch.dipole[b, :, :] = 0.0
         sounds[b, 1] = 1 if moves else 0
         if ringing.strike >= 0:
             release_done(b, bank)

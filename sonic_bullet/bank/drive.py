@@ -1,12 +1,12 @@
 """Driven modes of the bank, some tens of samples at a time, as vector instructions (`vector`).
 
-    forces      push[n] = (1 + i d/ω) Σ (a0 g0 + a1 g1)                    a0 = F·period·(1 - x), a1 = F·period·x
-    strikes     push[n] += r Σ_k J_k D^(K-k),   r <- r E                   `strike_pool`
-    modes       f <- f p + push[n],   partial[n] += Re(w f)                state in registers, 16 modes side by side
+    forces      impulse[n] = (1 + i d/ω) Σ (a0 g0 + a1 g1)                 a0 = F·period·(1 - x), a1 = F·period·x
+    strikes     impulse[n] += r Σ_k J_k D^(K-k),   r <- r E                `strike_pool`
+    modes       f <- f p + impulse[n],   partial[n] += Re(w f)             state in registers, 16 modes side by side
     sound       y[n] = Σ over lanes of partial[n]
 
-State, poles and weights are flat (2·modes), real parts first. A body's lanes come in whole groups of 16. push: of each
-16 lanes ROOM samples of four vectors, real parts of both halves, then imaginary ones. partial (samples, 8).
+State, poles and weights are flat (2·modes), real parts first. A body's lanes come in whole groups of 16. impulse: of
+each 16 lanes ROOM samples of four vectors, real parts of both halves, then imaginary ones. partial (samples, 8).
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -56,10 +56,10 @@ class DrivenModes(NamedTuple):
     pole: Any
 
 
-class Pushes(NamedTuple):
+class LaneImpulses(NamedTuple):
     """Impulses by lane and sample; filled 0: one sample of zeros stands for all."""
 
-    push: Any
+    impulse: Any
     filled: int
 
 
@@ -89,11 +89,11 @@ def part_force(typingctx, force, progress, period, count, signal, early, late):
         scale = e.spread(period)
 
         def vector(k: Value, _: list[Value]) -> list[Value]:
-            push, x = builder.fmul(e.load(force_n, builder.add(at, k)), scale), e.load(progress, k)
-            large = builder.fcmp_ordered(">=", builder.fmul(push, push), constant(FLUSH**2))
-            push = builder.select(large, push, constant(0))
-            e.store(builder.fmul(push, builder.fsub(constant(1), x)), signal, builder.add(early, k))
-            e.store(builder.fmul(push, x), signal, builder.add(late, k))
+            impulse, x = builder.fmul(e.load(force_n, builder.add(at, k)), scale), e.load(progress, k)
+            large = builder.fcmp_ordered(">=", builder.fmul(impulse, impulse), constant(FLUSH**2))
+            impulse = builder.select(large, impulse, constant(0))
+            e.store(builder.fmul(impulse, builder.fsub(constant(1), x)), signal, builder.add(early, k))
+            e.store(builder.fmul(impulse, x), signal, builder.add(late, k))
             return []
 
         e.loop(count, LANES, [], vector)
@@ -103,17 +103,18 @@ def part_force(typingctx, force, progress, period, count, signal, early, late):
 
 
 @intrinsic
-def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
-    """Set push to all forces of a body on ``lanes`` lanes, ``count`` samples from ``at`` on.
+def project_forces(typingctx, impulse, gains, forces, at, quadrature, lanes, count):
+    """Set impulse to all forces of a body on ``lanes`` lanes, ``count`` samples from ``at`` on.
 
     gains: `Gains`; forces: `Forces`; quadrature: `At`, d/ω of the first lane.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        push, gain0, gain1, columns, column, side, first, last, signal, stride, at, law, quadrature_at, lanes, count = (
-            e.args
-        )
+        (
+            impulse, gain0, gain1, columns, column, side, first, last, signal, stride, at, law, quadrature_at, lanes,
+            count,
+        ) = e.args  # fmt: skip
         forces, both = builder.sub(last, first), builder.shl(stride, e.index(1))
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
@@ -138,8 +139,8 @@ def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
                     place = builder.add(base, builder.mul(e.shifted(k, i), e.index(SAMPLE_NUMBERS)))
                     for h in range(2):
                         real = total[2 * i + h]
-                        e.store(real, push, e.shifted(place, h * LANES))
-                        e.store(builder.fmul(real, quadrature[h]), push, e.shifted(place, (2 + h) * LANES))
+                        e.store(real, impulse, e.shifted(place, h * LANES))
+                        e.store(builder.fmul(real, quadrature[h]), impulse, e.shifted(place, (2 + h) * LANES))
                 return []
 
             e.loop(count, TILE, [], tile)
@@ -148,22 +149,22 @@ def press(typingctx, push, gains, forces, at, quadrature, lanes, count):
         e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(push, gains, forces, at, quadrature, lanes, count), codegen
+    return types.void(impulse, gains, forces, at, quadrature, lanes, count), codegen
 
 
 @intrinsic
-def clear(typingctx, push, lanes, count):
-    """Set push of ``lanes`` lanes and ``count`` samples to 0."""
+def clear(typingctx, impulse, lanes, count):
+    """Set impulse of ``lanes`` lanes and ``count`` samples to 0."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        push, lanes, count = e.args
+        impulse, lanes, count = e.args
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
             base = builder.mul(p, e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR))
 
             def vector(k: Value, _: list[Value]) -> list[Value]:
-                e.store(constant(0), push, builder.add(base, k))
+                e.store(constant(0), impulse, builder.add(base, k))
                 return []
 
             e.loop(builder.mul(count, e.index(SAMPLE_NUMBERS)), LANES, [], vector)
@@ -172,12 +173,12 @@ def clear(typingctx, push, lanes, count):
         e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(push, lanes, count), codegen
+    return types.void(impulse, lanes, count), codegen
 
 
 @intrinsic
-def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
-    """Add a strike's impulses of the samples of a `NodePlan`: r <- r·E, push += r·Horner(due, D).
+def strike_nodes(typingctx, impulse, rows, width, lanes, plan, keep):
+    """Add a strike's impulses of the samples of a `NodePlan`: r <- r·E, impulse += r·Horner(due, D).
 
     rows: `At`, phasors r, D, E0, E1 of ``lanes`` lanes, real and imaginary in turn, ``width`` apart. keep: False leaves
     r as it was.
@@ -185,7 +186,7 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        push, rows, at, width, lanes, plan, due, first, last, keep = e.args
+        impulse, rows, at, width, lanes, plan, due, first, last, keep = e.args
         span = builder.sub(last, first)
 
         def planned(k: Value, what: int) -> Value:
@@ -220,8 +221,8 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
                     ]
 
                 def horner(i: Value, total: list[Value]) -> list[Value]:
-                    impulse, new = e.broadcast(due, builder.add(node, i)), turned(total)
-                    return [builder.fadd(new[0], impulse), new[1], builder.fadd(new[2], impulse), new[3]]
+                    due_now, new = e.broadcast(due, builder.add(node, i)), turned(total)
+                    return [builder.fadd(new[0], due_now), new[1], builder.fadd(new[2], due_now), new[3]]
 
                 total = e.loop(nodes, 1, [constant(0)] * 4, horner)
                 total = e.loop(empty, 1, total, lambda i, total: turned(total))
@@ -230,7 +231,7 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
                     hit = e.product((total[2 * h], total[2 * h + 1]), (r[2 * h], r[2 * h + 1]))
                     for part in range(2):
                         spot = e.shifted(place, (2 * part + h) * LANES)
-                        e.store(builder.fadd(e.load(push, spot), hit[part]), push, spot)
+                        e.store(builder.fadd(e.load(impulse, spot), hit[part]), impulse, spot)
                 return [*r, builder.add(node, nodes)]
 
             start = [phasor[0][0], phasor[1][0], phasor[0][1], phasor[1][1], e.index(0)]
@@ -242,19 +243,19 @@ def strike_nodes(typingctx, push, rows, width, lanes, plan, keep):
         e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(push, rows, width, lanes, plan, keep), codegen
+    return types.void(impulse, rows, width, lanes, plan, keep), codegen
 
 
 @intrinsic
-def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
-    """Advance lanes (`layout.Lanes`) of a `DrivenModes` by ``count`` samples: f <- f p + push, partial += Re(w f).
+def run(typingctx, motion, lanes, weight, used, count, partial, keep):
+    """Advance lanes (`layout.Lanes`) of a `DrivenModes` by ``count`` samples: f <- f p + impulse, partial += Re(w f).
 
-    weight: `At`, that of the first lane. pushes: `Pushes`. keep: False leaves the state as it was.
+    weight: `At`, that of the first lane. used: `LaneImpulses`. keep: False leaves the state as it was.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        state, pole, modes, start, lanes, weight, weight_at, push, pushes, count, partial, keep = e.args
+        state, pole, modes, start, lanes, weight, weight_at, impulse, used, count, partial, keep = e.args
 
         def pair(p: Value, _: list[Value]) -> list[Value]:
             re, at = builder.add(start, p), builder.add(weight_at, p)
@@ -263,18 +264,18 @@ def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
             p_re, p_im = _halves(e, pole, re), _halves(e, pole, im)
             w_re = _halves(e, weight, at)
             w_im = [builder.fneg(value) for value in _halves(e, weight, builder.add(at, modes))]
-            base = builder.mul(builder.mul(p, pushes), e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR))
+            base = builder.mul(builder.mul(p, used), e.index(ROOM * SAMPLE_NUMBERS // LANE_PAIR))
 
             def sample(k: Value, f: list[Value]) -> list[Value]:
-                place = builder.add(base, builder.mul(builder.mul(k, pushes), e.index(SAMPLE_NUMBERS)))
+                place = builder.add(base, builder.mul(builder.mul(k, used), e.index(SAMPLE_NUMBERS)))
                 spot = builder.mul(k, e.index(LANES))
                 real, imag = [], []
                 total = e.load(partial, spot)
                 for h in range(2):
                     x, y = f[h], f[2 + h]
-                    pushed = [e.load(push, e.shifted(place, (2 * part + h) * LANES)) for part in range(2)]
-                    real.append(e.fma(x, p_re[h], e.fma(builder.fneg(y), p_im[h], pushed[0])))
-                    imag.append(e.fma(y, p_re[h], e.fma(x, p_im[h], pushed[1])))
+                    added = [e.load(impulse, e.shifted(place, (2 * part + h) * LANES)) for part in range(2)]
+                    real.append(e.fma(x, p_re[h], e.fma(builder.fneg(y), p_im[h], added[0])))
+                    imag.append(e.fma(y, p_re[h], e.fma(x, p_im[h], added[1])))
                     total = e.fma(imag[h], w_im[h], e.fma(real[h], w_re[h], total))
                 e.store(total, partial, spot)
                 return [*real, *imag]
@@ -287,12 +288,12 @@ def run(typingctx, motion, lanes, weight, pushes, count, partial, keep):
         e.loop(lanes, LANE_PAIR, [], pair)
         return context.get_dummy_value()
 
-    return types.void(motion, lanes, weight, pushes, count, partial, keep), codegen
+    return types.void(motion, lanes, weight, used, count, partial, keep), codegen
 
 
 @intrinsic
-def shove(typingctx, kick, width, forces, direction0, direction1, count):
-    """Sum the impulses of all forces along each axis: rows 0, 2, 4 of kick (6, width) = Σ ± (a0 d0 + a1 d1).
+def sum_impulses(typingctx, axis_impulse, width, forces, direction0, direction1, count):
+    """Sum the impulses of all forces along each axis: rows 0, 2, 4 of axis_impulse (6, width) = Σ ± (a0 d0 + a1 d1).
 
     In whole vectors. forces: `Forces`; direction0, direction1: flat (drives, 3), on the lower body, the
     negative on the higher.
@@ -300,7 +301,7 @@ def shove(typingctx, kick, width, forces, direction0, direction1, count):
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        kick, width, side, first, last, signal, stride, direction0, direction1, count = e.args
+        axis_impulse, width, side, first, last, signal, stride, direction0, direction1, count = e.args
         forces = builder.sub(last, first)
 
         def vector(k: Value, _: list[Value]) -> list[Value]:
@@ -320,13 +321,13 @@ def shove(typingctx, kick, width, forces, direction0, direction1, count):
                 return new
 
             for axis, value in enumerate(e.loop(forces, 1, [constant(0)] * 3, force)):
-                e.store(value, kick, builder.add(k, builder.mul(width, e.index(2 * axis))))
+                e.store(value, axis_impulse, builder.add(k, builder.mul(width, e.index(2 * axis))))
             return []
 
         e.loop(count, LANES, [], vector)
         return context.get_dummy_value()
 
-    return types.void(kick, width, forces, direction0, direction1, count), codegen
+    return types.void(axis_impulse, width, forces, direction0, direction1, count), codegen
 
 
 @intrinsic

@@ -92,7 +92,7 @@ BANK_STRIKE = np.dtype(
         ("cell_stop", "i8"),
         ("cell_turn", "f8", (2,)),  # e^{s/cells} of the translations
         ("cell_onset", "f8", (2,)),  # response to a cell's impulse at the cell's end
-        ("shove_n_s", "f8", (3,)),
+        ("rigid_impulse_n_s", "f8", (3,)),
     ],
     align=True,
 )
@@ -130,7 +130,7 @@ class ScratchTables(NamedTuple):
 
     count: Array  # type: ignore[assignment]
     pulse: Array
-    push: Array
+    modal_impulse: Array
     force: Array
     gain0: Array
     gain1: Array
@@ -140,7 +140,7 @@ class ScratchTables(NamedTuple):
     slot: Array
     source: Array
     passed: Array
-    pushed: Array
+    dipole: Array
     sounds: Array
 
 
@@ -148,13 +148,14 @@ class BankWork(NamedTuple):
     """Scratch of one call of the bank, for d drives and n samples.
 
     first (b + 1,), side (2·d,): forces by body; signal (d, 2, n + LANES): their impulses at both ends of the gains;
-    kick (6, n + LANES): of a translation; plan (DRIVEN, 3): of a strike; flat: DRIVE_SCRATCH or RING_SCRATCH numbers.
+    axis_impulse (6, n + LANES): of a translation; plan (DRIVEN, 3): of a strike; flat: DRIVE_SCRATCH or RING_SCRATCH
+    numbers.
     """
 
     first: Array
     side: Array
     signal: Array
-    kick: Array
+    axis_impulse: Array
     plan: Array
     flat: Array
 

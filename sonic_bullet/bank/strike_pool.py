@@ -97,7 +97,7 @@ def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
     if rigid:
         _enter_cells(slot, b, bank)
         for axis in range(3):
-            strikes[slot].shove_n_s[axis] = share * pulse.impulse_n_s[axis]
+            strikes[slot].rigid_impulse_n_s[axis] = share * pulse.impulse_n_s[axis]
     _link(slot, b, bank)
     return 0
 
@@ -225,9 +225,9 @@ def plan_nodes(slot, at, count, bank, plan, due, final):  # pragma: no cover - c
 def enter_pulses(begin_s, after_s, at, sr, bank, scratch):  # pragma: no cover - compiled
     """Enter a step's pulses on both bodies of each, in order; return how many, fewer where the pool is full.
 
-    They stand in scratch: pulse, PULSE rows of runtime.tables, and push (pulses, 2, columns), Uᵀj of the whole impulse.
-    begin_s, after_s: of the rendered step, absolute: those found in the step after it count from there. at: the next
-    sample.
+    They stand in scratch: pulse, PULSE rows of runtime.tables, and modal_impulse (pulses, 2, columns), Uᵀj of the
+    whole impulse. begin_s, after_s: of the rendered step, absolute: those found in the step after it count from there.
+    at: the next sample.
     """
     count = scratch.count[0]
     for i in range(count):
@@ -239,6 +239,8 @@ def enter_pulses(begin_s, after_s, at, sr, bank, scratch):  # pragma: no cover -
         for side in range(2):
             sign, j = 1.0 - 2.0 * side, pulse.impulse_n_s
             impulse = sign * j[0], sign * j[1], sign * j[2]
-            one = BodyPulse(start, pulse.length_s * sr, pulse.flat, pulse.share, scratch.push[i, side], impulse)
+            one = BodyPulse(
+                start, pulse.length_s * sr, pulse.flat, pulse.share, scratch.modal_impulse[i, side], impulse
+            )
             enter_strike(pulse.body[side], one, at, bank)
     return count

@@ -1,6 +1,6 @@
 """Translations of a rigid body: one pole, three axes, forces and cells of pulses in, far pressure out.
 
-    z <- z p + (1 + i d/ω) (e^s - 1)/s · F period + Σ strikes,    pushed = weight Re z
+    z <- z p + (1 + i d/ω) (e^s - 1)/s · F period + Σ strikes,    dipole = weight Re z
     force: acts evenly over the sample before its instant; strike: even over the cells of the sample grid,
         at each sample   j (1 + i d/ω) (D - 1)/(s/c) Σ_i ΔQ_i D^i    over the c cells before it,  D = e^{s/c}
         (its own impulses, evenly over the cells, as such a mode responds to the slope of a slow force)
@@ -20,10 +20,10 @@ from sonic_bullet.contact.force_pulse import cumulated
 
 
 @uncounted
-def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
-    """Turn the impulses in rows 0, 2, 4 of kick (6, n or more) into real and imaginary part of each axis."""
+def _gather_forces(n, onset_re, onset_im, axis_impulse):  # pragma: no cover - compiled
+    """Turn the impulses in rows 0, 2, 4 of axis_impulse (6, n or more) into real and imaginary part of each axis."""
     for axis in range(3):
-        real, imag = kick[2 * axis], kick[2 * axis + 1]
+        real, imag = axis_impulse[2 * axis], axis_impulse[2 * axis + 1]
         for k in range(n):
             impulse = real[k]
             impulse = impulse if abs(impulse) >= FLUSH else 0.0
@@ -32,7 +32,7 @@ def _gather_forces(n, onset_re, onset_im, kick):  # pragma: no cover - compiled
 
 
 @uncounted
-def _strike_cells(at, n, slot, bank, kick):  # pragma: no cover - compiled
+def _strike_cells(at, n, slot, bank, axis_impulse):  # pragma: no cover - compiled
     """Add the cells of a strike that end by the samples at … at + n - 1. It is done after its last."""
     strike, hertz = bank.strikes[slot], bank.hertz
     cells = strike.cells
@@ -49,14 +49,14 @@ def _strike_cells(at, n, slot, bank, kick):  # pragma: no cover - compiled
             before = after
         total *= onset
         for axis in range(3):
-            kick[2 * axis, sample - at] += strike.shove_n_s[axis] * total.real
-            kick[2 * axis + 1, sample - at] += strike.shove_n_s[axis] * total.imag
+            axis_impulse[2 * axis, sample - at] += strike.rigid_impulse_n_s[axis] * total.real
+            axis_impulse[2 * axis + 1, sample - at] += strike.rigid_impulse_n_s[axis] * total.imag
     if last < at + n:
         strike.rigid = 0
 
 
 @uncounted
-def _run_axes(at, n, b, bank, kick, pushed):  # pragma: no cover - compiled
+def _run_axes(at, n, b, bank, axis_impulse, dipole):  # pragma: no cover - compiled
     """Run the recursion on all axes through the samples at … at + n - 1."""
     body, motion = bank.body[b], bank.ringing[b].motion
     p_re, p_im, weight = body.rigid_pole[0], body.rigid_pole[1], body.rigid_weight
@@ -73,15 +73,15 @@ def _run_axes(at, n, b, bank, kick, pushed):  # pragma: no cover - compiled
                 z, zi = 0.0, 0.0
         end = min(n, k + DRIVEN - (at + k) % DRIVEN)
         for i in range(k, end):
-            x, xi = x * p_re + (kick[0, i] - xi * p_im), xi * p_re + (kick[1, i] + x * p_im)
-            y, yi = y * p_re + (kick[2, i] - yi * p_im), yi * p_re + (kick[3, i] + y * p_im)
-            z, zi = z * p_re + (kick[4, i] - zi * p_im), zi * p_re + (kick[5, i] + z * p_im)
-            pushed[0, i] = x * weight
-            pushed[1, i] = y * weight
-            pushed[2, i] = z * weight
+            x, xi = x * p_re + (axis_impulse[0, i] - xi * p_im), xi * p_re + (axis_impulse[1, i] + x * p_im)
+            y, yi = y * p_re + (axis_impulse[2, i] - yi * p_im), yi * p_re + (axis_impulse[3, i] + y * p_im)
+            z, zi = z * p_re + (axis_impulse[4, i] - zi * p_im), zi * p_re + (axis_impulse[5, i] + z * p_im)
+            dipole[0, i] = x * weight
+            dipole[1, i] = y * weight
+            dipole[2, i] = z * weight
         k = end
     for axis in range(3):
-        row = pushed[axis]
+        row = dipole[axis]
         for i in range(n):
             if abs(row[i]) < FLUSH:
                 row[i] = 0.0
@@ -92,11 +92,11 @@ def _run_axes(at, n, b, bank, kick, pushed):  # pragma: no cover - compiled
 
 @uncounted
 def translate(at, n, b, bank, scratch, work):  # pragma: no cover - compiled
-    """Compute samples at … at + n - 1 of body b's translations into scratch.pushed[b]. False where they rest.
+    """Compute samples at … at + n - 1 of body b's translations into scratch.dipole[b]. False where they rest.
 
     work: its forces are listed (`bank_kernel.list_forces`).
     """
-    strikes, kick, first, last = bank.strikes, work.kick, work.first[b], work.first[b + 1]
+    strikes, axis_impulse, first, last = bank.strikes, work.axis_impulse, work.first[b], work.first[b + 1]
     struck = False
     slot = bank.ringing[b].strike
     while slot >= 0:
@@ -105,12 +105,12 @@ def translate(at, n, b, bank, scratch, work):  # pragma: no cover - compiled
     if not (struck or last > first or bank.ringing[b].moving):
         return False
     forces = drive.Forces(work.side, first, last, work.signal, work.signal.shape[2])
-    drive.shove(kick, kick.shape[1], forces, scratch.direction0, scratch.direction1, n)
-    _gather_forces(n, bank.body[b].rigid_onset[0], bank.body[b].rigid_onset[1], kick)
+    drive.sum_impulses(axis_impulse, axis_impulse.shape[1], forces, scratch.direction0, scratch.direction1, n)
+    _gather_forces(n, bank.body[b].rigid_onset[0], bank.body[b].rigid_onset[1], axis_impulse)
     slot = bank.ringing[b].strike
     while struck and slot >= 0:
         if strikes[slot].rigid:
-            _strike_cells(at, n, slot, bank, kick)
+            _strike_cells(at, n, slot, bank, axis_impulse)
         slot = strikes[slot].next
-    _run_axes(at, n, b, bank, kick, scratch.pushed[b])
+    _run_axes(at, n, b, bank, axis_impulse, scratch.dipole[b])
     return True

@@ -1,6 +1,6 @@
 """Location of a contact on both bodies' true surfaces, and its force on their modes: for strikes and friction.
 
-    row of ROW -> touch: nearest triangle, weights, curvature, once a row -> add_push: Uᵀj on either body's columns
+    row of ROW -> touch: nearest triangle, weights, curvature, once a row -> add_modal_impulse: Uᵀj of either body
     1/m* = Σ [1/m + (r×n)·I⁻¹(r×n)]    [Johnson 1985, sec. 11.1]
 
 Plain functions on the tables of `sonic_bullet.runtime.tables`, called by the stages of the run time. Triangles are
@@ -62,7 +62,7 @@ def touch(rows, r, table):
 
 
 @njit(nogil=True, error_model="numpy")
-def add_push(rows, r, side, factor, table, out):
+def add_modal_impulse(rows, r, side, factor, table, out):
     """Add factor·Uᵀj of row r on the body of a side, of its free modes, to out (columns,).
 
     Uᵀj: the shapes, linear in the triangle, times the row's impulse in N·s (with factor 1: N·s/√kg). `touch` the row
@@ -72,8 +72,12 @@ def add_push(rows, r, side, factor, table, out):
     body = table.bodies[row.body[side]]
     if row.face[side] < 0:
         return
-    push, weight, vertex = row.push_n_s[side], row.barycentric[side], table.faces[body.face_at + row.face[side]].vertex
-    x, y, z = factor * push[0], factor * push[1], factor * push[2]
+    impulse, weight, vertex = (
+        row.local_impulse_n_s[side],
+        row.barycentric[side],
+        table.faces[body.face_at + row.face[side]].vertex,
+    )
+    x, y, z = factor * impulse[0], factor * impulse[1], factor * impulse[2]
     columns = body.columns
     for corner in range(3):
         at = body.shape_at + 3 * vertex[corner] * columns
@@ -88,7 +92,7 @@ def add_push(rows, r, side, factor, table, out):
 
 
 @njit(nogil=True, error_model="numpy")
-def turn_push(body, turns, out):
+def turn_modal_impulse(body, turns, out):
     """Turn Uᵀj in out (columns,), of a body's free modes, to its modes as they are: Rᵀ Uᵀj of each of its pairs."""
     for q in range(body.turns):
         pair = turns[body.turn_at + q]

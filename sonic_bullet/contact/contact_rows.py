@@ -73,13 +73,13 @@ def _turn(contact, quaternion, turn, row):
             u, v, t = q[x] / norm, q[y] / norm, q[z] / norm
             turn[x, x], turn[x, y], turn[y, x] = 1 - 2 * (v * v + t * t), 2 * (u * v - t * w), 2 * (u * v + t * w)
         for x in range(3):
-            arm_m, outward, push_n_s = 0.0, 0.0, 0.0
+            arm_m, outward, local_impulse_n_s = 0.0, 0.0, 0.0
             for y in range(3):
                 arm_m += turn[x, y] * point[y]
                 outward -= turn[y, x] * (sign * normal[y])
-                push_n_s += turn[y, x] * (sign * impulse[y])
+                local_impulse_n_s += turn[y, x] * (sign * impulse[y])
             row.point_m[side, x], row.arm_m[side, x] = point[x], arm_m
-            row.outward[side, x], row.push_n_s[side, x] = outward, push_n_s
+            row.outward[side, x], row.local_impulse_n_s[side, x] = outward, local_impulse_n_s
 
 
 @njit(nogil=True, error_model="numpy")

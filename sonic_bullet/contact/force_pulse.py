@@ -88,7 +88,7 @@ def rough_share(mass_kg, modulus_pa, relative_curvature_per_m, approach_m_s, lay
 
 
 @njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-def compliance(push, frequency_hz, first, modes, tau_s, spectrum):
+def compliance(modal_impulse, frequency_hz, first, modes, tau_s, spectrum):
     """Compute Σ (Uᵀj |F̂(fτ)|)² over one body's modes.
 
     The first contact of compliant bodies transmits 1/(1 + m*/j² · this sum, of both bodies) of a rigid body's impulse.
@@ -99,7 +99,7 @@ def compliance(push, frequency_hz, first, modes, tau_s, spectrum):
 
     Parameters
     ----------
-    push : (m, …) Uᵀj of the whole impulse j
+    modal_impulse : (m, …) Uᵀj of the whole impulse j
     frequency_hz : of the modes, from ``first`` on
     spectrum : (cells + 1,) a row of `spectrum_table`
     """
@@ -108,7 +108,7 @@ def compliance(push, frequency_hz, first, modes, tau_s, spectrum):
         cell = frequency_hz[first + m] * tau_s * SPECTRUM_CELLS_PER_F_TAU
         at = int(cell)
         if at < len(spectrum) - 1:
-            moved = push[m] * (spectrum[at] + (cell - at) * (spectrum[at + 1] - spectrum[at]))
+            moved = modal_impulse[m] * (spectrum[at] + (cell - at) * (spectrum[at + 1] - spectrum[at]))
             total += moved * moved
     return total
 

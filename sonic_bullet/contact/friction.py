@@ -16,7 +16,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.contact.contact_place import add_push, effective_mass, flat_area_m2, touch, turn_push
+from sonic_bullet.contact.contact_place import (
+    add_modal_impulse,
+    effective_mass,
+    flat_area_m2,
+    touch,
+    turn_modal_impulse,
+)
 from sonic_bullet.contact.hertz import contact_modulus
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.contact.octave_heights import (
@@ -98,8 +104,8 @@ def advance_friction(number, x, sr, window, table, pairs, voices, scratch):
             for c in range(columns):
                 aim[c] = 0.0
             for r in range(begin, end):
-                add_push(rows, r, side, 1.0 / voice.total_n_s, table, aim)
-            turn_push(table.bodies[pair.body[side]], table.turns, aim)
+                add_modal_impulse(rows, r, side, 1.0 / voice.total_n_s, table, aim)
+            turn_modal_impulse(table.bodies[pair.body[side]], table.turns, aim)
             for c in range(columns):
                 start[c] = kept[c] if pair.gains else aim[c]
                 aim[c] = start[c] + follow * (aim[c] - start[c]) if end > begin else start[c]

@@ -14,7 +14,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.contact.contact_place import add_push, effective_mass, flat_area_m2, touch, turn_push
+from sonic_bullet.contact.contact_place import (
+    add_modal_impulse,
+    effective_mass,
+    flat_area_m2,
+    touch,
+    turn_modal_impulse,
+)
 from sonic_bullet.contact.contact_rows import opening
 from sonic_bullet.contact.coupling.springs import PERSSON
 from sonic_bullet.contact.force_pulse import compliance, pulse_length, rough_share
@@ -69,10 +75,10 @@ STRIKE = np.dtype(
 def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
     """Find the strikes that begin in step ``number``, ``ahead`` steps (0 or 1) after the one being rendered.
 
-    They are written to scratch.pulse and push (pulses, 2, columns) from ``found`` on; returns the new number. Loads
-    that they use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving volume)
-    are skipped, and those of which neither moves. A strike is dated by gap and approach (`_gather`), else
-    by `date_strikes`; where the bodies overlap as the step starts, back into the step being rendered.
+    They are written to scratch.pulse and modal_impulse (pulses, 2, columns) from ``found`` on; returns the new number.
+    Loads that they use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving
+    volume) are skipped, and those of which neither moves. A strike is dated by gap and approach (`_gather`), else by
+    `date_strikes`; where the bodies overlap as the step starts, back into the step being rendered.
 
     Parameters
     ----------
@@ -110,7 +116,9 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
         for q in range(struck):
             strike, pulse = strikes[q], scratch.pulse[found]
             strike.pulse, strike.length_s = -1, 0.0
-            if strike.accepted_n_s > 0 and _make(strike, turned, window.row, table, pulse, scratch.push[found]):
+            if strike.accepted_n_s > 0 and _make(
+                strike, turned, window.row, table, pulse, scratch.modal_impulse[found]
+            ):
                 strike.pulse, strike.length_s = found, pulse.length_s
                 found += 1
         date_strikes(strikes, struck, bodies, held, back_s, dt_s)
@@ -279,8 +287,8 @@ def _roughened(bodies, low, high, mass_kg, modulus_pa, curvature_per_m, speed_m_
 
 
 @njit(nogil=True, error_model="numpy")
-def _make(strike, quaternion, rows, table, pulse, push):
-    """Make a strike's pulse, but for its start, and its Uᵀj in push (2, columns); False where it is not audible."""
+def _make(strike, quaternion, rows, table, pulse, modal_impulse):
+    """Make a strike's pulse, but for its start, and its modal_impulse Uᵀj (2, columns); False where it is inaudible."""
     low, high, bodies = strike.body[0], strike.body[1], table.bodies
     j, raw, accepted = strike.impulse_n_s, max(strike.raw_n_s, 1e-300), strike.accepted_n_s
     mass = effective_mass(bodies, low, high, quaternion, strike.arm_m[0], strike.arm_m[1], strike.normal)
@@ -289,8 +297,8 @@ def _make(strike, quaternion, rows, table, pulse, push):
     if not sounds or steep or mass <= 0 or not accepted > LEAST_JUMP_M_S * mass:
         return False
     for side in range(2):
-        for c in range(push.shape[1]):
-            push[side, c] = 0.0
+        for c in range(modal_impulse.shape[1]):
+            modal_impulse[side, c] = 0.0
     scale, most, bent, spread = accepted / raw, -1.0, 0.0, 0.0
     for delay in range(STEPS):
         share = strike.share[delay]
@@ -298,7 +306,7 @@ def _make(strike, quaternion, rows, table, pulse, push):
             for r in range(strike.row[delay, 0], strike.row[delay, 1]):
                 touch(rows, r, table)
                 for side in range(2):
-                    add_push(rows, r, side, share * scale, table, push[side])
+                    add_modal_impulse(rows, r, side, share * scale, table, modal_impulse[side])
                 load = rows[r].load_n_s * share
                 if load > most:
                     most, bent = load, rows[r].curvature_per_m[0] + rows[r].curvature_per_m[1]
@@ -314,8 +322,10 @@ def _make(strike, quaternion, rows, table, pulse, push):
     given = 0.0
     for side in range(2):
         body = bodies[strike.body[side]]
-        turn_push(body, table.turns, push[side])
-        given += compliance(push[side], table.frequency_hz, body.frequency_at, body.modes, length, table.spectrum[flat])
+        turn_modal_impulse(body, table.turns, modal_impulse[side])
+        given += compliance(
+            modal_impulse[side], table.frequency_hz, body.frequency_at, body.modes, length, table.spectrum[flat]
+        )
         pulse.body[side] = strike.body[side]
     pulse.length_s, pulse.flat = length, flat
     # the square of an impulse below 1e-162 N·s is zero; it is inaudible

@@ -94,7 +94,7 @@ def move(typingctx, values, start, memory, at, count):
 
 
 @intrinsic
-def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
+def greatest(typingctx, source, source_at, dipole, dipole_at, stride, count):
     """Find the greatest magnitude of ``count`` values of a source and its three rigid axes, as the bits of a double.
 
     0 where all are zero, from INFINITE on where one is not finite. Arrays as in `emit`.
@@ -102,7 +102,7 @@ def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        source, source_at, pushed, pushed_at, stride, count = e.args
+        source, source_at, dipole, dipole_at, stride, count = e.args
         integers = ir.VectorType(I64, LANES)
         whole = builder.and_(count, e.index(-LANES))
 
@@ -112,11 +112,11 @@ def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
             return builder.select(builder.icmp_signed(">", size, most), size, most)
 
         def row(r: Value, carried: list[Value]) -> list[Value]:
-            axis = builder.add(pushed_at, builder.mul(builder.sub(r, e.index(1)), stride))
+            axis = builder.add(dipole_at, builder.mul(builder.sub(r, e.index(1)), stride))
             values = builder.select(
                 builder.icmp_signed("==", r, e.index(0)),
                 builder.gep(source, [source_at]),
-                builder.gep(pushed, [axis]),
+                builder.gep(dipole, [axis]),
             )
             groups = e.loop(whole, LANES, [carried[0]], lambda k, now: [more(e.load(values, k), integers, now[0])])
             single = e.loop(
@@ -131,7 +131,7 @@ def greatest(typingctx, source, source_at, pushed, pushed_at, stride, count):
         lanes = _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
         return builder.select(builder.icmp_signed(">", lanes, single), lanes, single)
 
-    return types.int64(source, source_at, pushed, pushed_at, stride, count), codegen
+    return types.int64(source, source_at, dipole, dipole_at, stride, count), codegen
 
 
 @intrinsic
@@ -216,16 +216,16 @@ def emit(typingctx, arrays, stride, tail, count, geometry, emitted, delay):
 
     Parameters
     ----------
-    arrays : source, pushed and x, each an `At`, the axes of pushed ``stride`` elements apart
-    tail : (5, 8) flat, source, pushed and x after the last whole group
+    arrays : source, dipole and x, each an `At`, the axes of dipole ``stride`` elements apart
+    tail : (5, 8) flat, source, dipole and x after the last whole group
     geometry : (8,) microphone - start, end - start (m), samples per metre, 1/radius
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
-        source, source_at, pushed, pushed_at, x, x_at, stride, tail, count, geometry, emitted, delay = e.args
+        source, source_at, dipole, dipole_at, x, x_at, stride, tail, count, geometry, emitted, delay = e.args
         known = [e.broadcast(geometry, e.index(k)) for k in range(8)]
-        axes = [pushed_at, builder.add(pushed_at, stride), builder.add(pushed_at, builder.add(stride, stride))]
+        axes = [dipole_at, builder.add(dipole_at, stride), builder.add(dipole_at, builder.add(stride, stride))]
 
         def body(k: Value, carried: list[Value]) -> list[Value]:
             last = builder.icmp_signed(">", builder.add(k, e.index(LANES)), count)
@@ -236,11 +236,11 @@ def emit(typingctx, arrays, stride, tail, count, geometry, emitted, delay):
 
             between = given(4, x, x_at)
             from_here = [e.fma(builder.fneg(known[3 + axis]), between, known[axis]) for axis in range(3)]
-            push = [given(1 + axis, pushed, axes[axis]) for axis in range(3)]
-            square, dot = builder.fmul(from_here[0], from_here[0]), builder.fmul(from_here[0], push[0])
+            along = [given(1 + axis, dipole, axes[axis]) for axis in range(3)]
+            square, dot = builder.fmul(from_here[0], from_here[0]), builder.fmul(from_here[0], along[0])
             for axis in (1, 2):
                 square = e.fma(from_here[axis], from_here[axis], square)
-                dot = e.fma(from_here[axis], push[axis], dot)
+                dot = e.fma(from_here[axis], along[axis], dot)
             r = _called(e, "llvm.sqrt.v8f64", VEC, square)
             inverse = builder.fdiv(constant(1.0), _greater(e, r, constant(1e-12)))
             spread = builder.select(builder.fcmp_ordered("<", inverse, known[7]), inverse, known[7])

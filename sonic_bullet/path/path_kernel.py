@@ -1,6 +1,6 @@
 """Sound path of one step, or a part of it, as one compiled call: `hear`.
 
-    source, pushed, poses -> is each number finite, does every history reach far enough?  (`path_places.survey`: nothing
+    source, dipole, poses -> is each number finite, does every history reach far enough?  (`path_places.survey`: nothing
         has changed so far)
       -> a teleported body gets a new place, its old one fades out over the step
       -> each body's places, by when it came there, and microphones: emitted (`fractional_delay.emit`) -> histories
@@ -185,14 +185,14 @@ def _emit(b, w, first, n, emission, x, fade, work):  # pragma: no cover - compil
 
     fade: 0 none, 1 in, -1 out, 2 silent from now on. work.tail (5·LANES,): samples after the last whole group.
     """
-    source, pushed, tail = emission.source, emission.pushed, work.tail
+    source, dipole, tail = emission.source, emission.dipole, work.tail
     whole, bodies, long = n & -LANES, source.shape[1], source.shape[2]
     for k in range(n - whole):
         i = first + whole + k
         tail[k], tail[4 * LANES + k] = source[w, b, i], x[i]
         for axis in range(3):
-            tail[(1 + axis) * LANES + k] = pushed[b, axis, i]
-    arrays = At(source, (w * bodies + b) * long + first), At(pushed, 3 * b * long + first), At(x, first)
+            tail[(1 + axis) * LANES + k] = dipole[b, axis, i]
+    arrays = At(source, (w * bodies + b) * long + first), At(dipole, 3 * b * long + first), At(x, first)
     steep = emit(arrays, long, tail, n, work.geometry, work.emitted, work.delay)
     if fade != 0:
         begin, slope = 1.0 if fade == -1 else 0.0, 0.0 if fade == 2 else float(fade)

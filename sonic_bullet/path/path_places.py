@@ -76,11 +76,11 @@ class PathTables(NamedTuple):
 class Emission(NamedTuple):
     """What bodies emit, from column ``first`` on, in Pa·m.
 
-    source (W, ≥ b, ·): of each weight set; pushed (≥ b, 3, ·): along each axis; sets (c,): which each microphone hears.
+    source (W, ≥ b, ·): of each weight set; dipole (≥ b, 3, ·): along each axis; sets (c,): which each microphone hears.
     """
 
     source: Array
-    pushed: Array
+    dipole: Array
     first: int | np.int64
     sets: Array
 
@@ -184,7 +184,7 @@ def survey(step, n, emission, course, path):  # pragma: no cover - compiled
     free, wrong = np.int64(0), DONE  # a plain 0 has its own type, and each callee would be compiled for it too
     for b in range(len(sources)):
         body = sources[b]
-        most = greatest(emission.source, b * long + first, emission.pushed, 3 * b * long + first, long, n)
+        most = greatest(emission.source, b * long + first, emission.dipole, 3 * b * long + first, long, n)
         if most >= INFINITE:
             return NOT_FINITE
         body.sounds, body.fresh, body.away_m = 1 if most > 0 else 0, -1, 0.0

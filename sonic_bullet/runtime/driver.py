@@ -3,7 +3,7 @@
     CONTACT rows, poses of a step -> take: ROW, load histories, into a window of SPAN steps
         -> excite: PULSE (strikes), drives (friction) of the step LOOKAHEAD before
         -> track_supports: contact patches, and bodies whose poles they change, as Python computes them (pole_updates)
-        -> ring: modes and translations of all bodies -> source (W, b, n), pushed (b, 3, n)
+        -> ring: modes and translations of all bodies -> source (W, b, n), dipole (b, 3, n)
         -> hear: through the air to the microphones; other sensors sum their weight set over the bodies
 
 Live listening is this driver with one step, a replay the same with many: the result of a step depends on nothing else.
@@ -118,7 +118,7 @@ def track_supports(number, window, table, pairs, supports, bank, scratch):  # pr
 
 @njit(nogil=True, error_model="numpy")
 def ring(step, x, sr, bank, scratch):  # pragma: no cover - compiled
-    """Apply the step's pulses and drives to the bank: source (W, b, n or more) and pushed (b, 3, n or more).
+    """Apply the step's pulses and drives to the bank: source (W, b, n or more) and dipole (b, 3, n or more).
 
     False where a pulse found no place.
     """
@@ -210,7 +210,7 @@ def finish(i, number, x, given, frames, window, scratch, path):  # pragma: no co
     """
     step, here, there = given.steps[i], number % SPAN, (number + 1) % SPAN
     at, aim_m, out, reads = step.sample - frames.start, given.aim_m, frames.out, frames.reads
-    emission = Emission(scratch.source, scratch.pushed, np.int64(0), frames.sets)
+    emission = Emission(scratch.source, scratch.dipole, np.int64(0), frames.sets)
     aim_m = aim_m[i : i + 2] if len(aim_m) > 0 else aim_m
     gain = image_gains((here, there), window, aim_m, path.microphone_m)
     course = Course(window.position_m[here], window.position_m[there], window.teleported[there], x, aim_m, gain)

@@ -103,11 +103,11 @@ def pulses_of(
     begin_s, after_s: start of the step and of the one after it, for which a strike may have been found already.
     """
     pulses = []
-    for row, push in zip(scratch.pulse[:found], scratch.push[:found], strict=True):
+    for row, modal_impulse in zip(scratch.pulse[:found], scratch.modal_impulse[:found], strict=True):
         low, high = (int(body) for body in row["body"])
         one = ForcePulse(
             low, high, float(row["start_s"]), float(row["length_s"]), bool(row["flat"]), row["impulse_n_s"].copy(),
-            push[0, : modes[low]].copy(), push[1, : modes[high]].copy(), float(row["share"]),
+            modal_impulse[0, : modes[low]].copy(), modal_impulse[1, : modes[high]].copy(), float(row["share"]),
         )  # fmt: skip
         pulses.append((after_s if row["ahead"] else begin_s, one))
     return pulses
@@ -211,10 +211,10 @@ def pulse(f_tau: Array, flat: bool) -> Array:
     return np.asarray(np.interp(f_tau, *_pulse_table(flat), right=0.0))
 
 
-def struck_power(voice: ResidualVoice, weight: Array, push: Array) -> Array:
+def struck_power(voice: ResidualVoice, weight: Array, modal_impulse: Array) -> Array:
     """Compute a² (p,) at the onset of the pairs' modes, for Uᵀj (m,) of an impulse and the modes' weights (m,)."""
     used = voice.group >= 0
-    return np.bincount(voice.group[used], (np.abs(weight * push) ** 2)[used], len(voice.voice.pairs.target_hz))
+    return np.bincount(voice.group[used], (np.abs(weight * modal_impulse) ** 2)[used], len(voice.voice.pairs.target_hz))
 
 
 def impact_grains(
@@ -229,7 +229,7 @@ def impact_grains(
     """Make the grains of one strike on both bodies."""
     start = max((step_start_s + impact.start_s) * sr, float(earliest))
     first, grains = int(np.ceil(start)), []
-    for body, push in ((impact.low, impact.modes_low), (impact.high, impact.modes_high)):
+    for body, modal_impulse in ((impact.low, impact.modes_low), (impact.high, impact.modes_high)):
         mine = voice[body]
         if mine is None:
             continue
@@ -238,7 +238,11 @@ def impact_grains(
         for w, weight in enumerate(resonators[body].weight):
             if weight.any():
                 pair, level = placed(
-                    mine.voice, struck_power(mine, weight, impact.share * push), impact.length_s, impact.flat, pulse
+                    mine.voice,
+                    struck_power(mine, weight, impact.share * modal_impulse),
+                    impact.length_s,
+                    impact.flat,
+                    pulse,
                 )
                 if level > 0:
                     grains.append(Grain(first, w, body, varied(pair, level, number)))

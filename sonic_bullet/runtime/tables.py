@@ -82,7 +82,7 @@ ROW = np.dtype(
         ("load_n_s", "f8"),  # normal part of the impulse
         ("point_m", "f8", (2, 3)),  # in either body's frame
         ("outward", "f8", (2, 3)),  # the surface's normal there, body frame
-        ("push_n_s", "f8", (2, 3)),  # impulse on that body, body frame
+        ("local_impulse_n_s", "f8", (2, 3)),  # impulse on that body, body frame
         ("arm_m", "f8", (2, 3)),  # from its centre, world frame
         ("sweep_m_s", "f8", (2,)),
         ("approach_m_s", "f8"),
@@ -151,14 +151,14 @@ PULSE = np.dtype(
 class StepScratch:
     """Scratch of one step.
 
-    count (2,): its pulses and drives. pulse (p,) PULSE with push (p, 2, columns); drives d: force (d·n,), gain0, gain1
-    (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), pushed (b, 3, n), sounds
-    (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
+    count (2,): its pulses and drives. pulse (p,) PULSE with modal_impulse (p, 2, columns); drives d: force (d·n,),
+    gain0, gain1 (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), dipole
+    (b, 3, n), sounds (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
     """
 
     count: Array = field(default_factory=lambda: np.zeros(2, np.int64))
     pulse: Array = field(default_factory=lambda: np.zeros(0, PULSE))
-    push: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    modal_impulse: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
     force: Array = field(default_factory=lambda: np.zeros(0))
     gain0: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
     gain1: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
@@ -168,21 +168,21 @@ class StepScratch:
     slot: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     passed: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
-    pushed: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
+    dipole: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
     sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     samples: int = -1  # capacity in samples
 
     def fit(self, drives: int, columns: int, samples: int, shape: tuple[int, int]) -> None:
         """Enlarge what is too small for so many drives and twice as many pulses. shape: weight sets and bodies."""
         samples = self.samples = max(self.samples, samples)  # steps of no whole number of samples differ by one
-        if len(self.slot) < drives or self.push.shape[2] != columns:
+        if len(self.slot) < drives or self.modal_impulse.shape[2] != columns:
             drives = max(drives, 2 * len(self.slot))
-            self.pulse, self.push = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
+            self.pulse, self.modal_impulse = np.zeros(2 * drives, PULSE), np.zeros((2 * drives, 2, columns))
             self.gain0, self.gain1 = np.zeros((2, drives, 2, columns))
             self.direction0, self.direction1 = np.zeros((2, drives, 3))
             self.body, self.slot = np.zeros((drives, 2), np.int64), np.zeros(drives, np.int64)
         if len(self.force) < len(self.slot) * samples:
             self.force = np.zeros(len(self.slot) * samples)
         if self.source.shape[:2] != shape or self.source.shape[2] < samples:
-            self.source, self.pushed = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
+            self.source, self.dipole = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
             self.sounds, self.passed = np.zeros((shape[1], 2), np.int64), np.zeros((*shape, samples))

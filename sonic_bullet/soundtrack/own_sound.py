@@ -55,11 +55,13 @@ class OwnSound:
         for side, voice in enumerate(voices):
             modes = len(voice.pole) - 1
             shape = _spectrum(np.angle(voice.pole[:modes]) * sr / (2 * np.pi) * length_s, flat)
-            push = float(pulse["share"]) * state.scratch.push[at, side, :modes]
+            modal_impulse = float(pulse["share"]) * state.scratch.modal_impulse[at, side, :modes]
             late = round((voice.away_m - nearest_m) / self._speed_m_s * sr)
-            sound = _free(voice.pole[:modes], voice.weight[:modes] * voice.onset[:modes] * push * shape, frames - late)
-            shove = (1 - 2 * side) * float(pulse["share"]) * float(pulse["impulse_n_s"] @ voice.toward)
-            click = _free(voice.pole[modes:], voice.weight[modes:] * voice.onset[modes:] * shove, frames - late)
+            sound = _free(
+                voice.pole[:modes], voice.weight[:modes] * voice.onset[:modes] * modal_impulse * shape, frames - late
+            )
+            rigid_impulse = (1 - 2 * side) * float(pulse["share"]) * float(pulse["impulse_n_s"] @ voice.toward)
+            click = _free(voice.pole[modes:], voice.weight[modes:] * voice.onset[modes:] * rigid_impulse, frames - late)
             total[late:] += sound + np.convolve(click, force)[: frames - late]
         return total
 

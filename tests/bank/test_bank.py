@@ -101,19 +101,19 @@ def test_strikes_are_the_sampled_continuous_response_wherever_their_nodes_fall(
 @pytest.mark.parametrize(("start", "length"), [(100.0, 0.96), (137.71, 7.3), (355.2, 361.0), (100.9, 0.01)])
 def test_translations_hear_a_pulse_as_forces_even_over_its_cells(start: float, length: float, flat: bool) -> None:
     """y = w Re Σ_cells j (1 + i d/ω) (1/c) ∫ over the cell of e^{s (n - u)} du, at all samples that end one."""
-    rate, shove = 9000.0, np.array([1.0, -2.0, 0.0])
+    rate, rigid_impulse = 9000.0, np.array([1.0, -2.0, 0.0])
     s = rate * (-1 + 1j) / SR
     bank, state = empty_bank(SR, at=100)
     bank, state = append(bank, state, [translating(rate, 3.0)])
-    pushed = np.zeros((1, 3, 600))
-    advance(bank, state, 600, [Strike(0, start, length / SR, np.zeros(0), flat, shove)], pushed=pushed)
+    dipole = np.zeros((1, 3, 600))
+    advance(bank, state, 600, [Strike(0, start, length / SR, np.zeros(0), flat, rigid_impulse)], dipole=dipole)
     first, spacing, impulse = pulse_cells(start, length / SR, SR, int(np.ceil(4 * rate / SR)), flat=flat)
     sample, wanted = np.arange(100, 700), np.zeros(600)
     for j, part in enumerate(impulse):
         late = sample - (first + (j + 0.5) * spacing)
         even = np.exp(s * np.maximum(late, 0.0)) * np.expm1(s * spacing) / (s * spacing)
         wanted += part * ((1 + 1j) * even).real * (late > -1e-6)
-    assert np.abs(pushed[0] - 3.0 * shove[:, None] * wanted).max() < 1e-12 * np.abs(wanted).max()
+    assert np.abs(dipole[0] - 3.0 * rigid_impulse[:, None] * wanted).max() < 1e-12 * np.abs(wanted).max()
     assert np.abs(wanted).max() > 0
     advance(bank, state, 600)
     assert state.free[0] == len(state.strikes)
@@ -129,8 +129,8 @@ def test_translations_follow_forces_that_are_even_over_a_sample_and_lie_along_di
     signal, direction, progress = rng.normal(size=(2, n)), rng.normal(size=(2, 2, 3)), np.linspace(0.1, 0.9, n)
     none = np.zeros(0)
     forces = [Force(0, signal[i], none, none, direction[i, 0], direction[i, 1]) for i in range(2)]
-    pushed = np.zeros((2, 3, n))
-    advance(bank, state, n, (), forces, progress, pushed)
+    dipole = np.zeros((2, 3, n))
+    advance(bank, state, n, (), forces, progress, dipole)
     total = sum(
         signal[i] * (direction[i, 0][:, None] * (1 - progress) + direction[i, 1][:, None] * progress) for i in range(2)
     )
@@ -138,8 +138,8 @@ def test_translations_follow_forces_that_are_even_over_a_sample_and_lie_along_di
     for k in range(n):
         z = z * np.exp(s) + onset * total[:, k] / SR
         wanted[:, k] = 2.0 * z.real
-    assert np.abs(pushed[0] - wanted).max() < 1e-12 * np.abs(wanted).max()
-    assert not pushed[1].any()
+    assert np.abs(dipole[0] - wanted).max() < 1e-12 * np.abs(wanted).max()
+    assert not dipole[1].any()
 
 
 def translating(rate: float, weight: float) -> ModeSet:

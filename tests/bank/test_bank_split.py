@@ -69,9 +69,9 @@ def render(seed: int, length: int, cuts: list[int]) -> bytes:
             Force(int(body[0]), signal[lo:hi], gains[0], gains[1], TURNS[0], TURNS[1])
             for body, signal, gains in forces.values()
         ]
-        shoved = np.zeros((len(SIZES), 3, hi - lo))
-        sound = advance(bank, state, hi - lo, now, pushes, progress[lo:hi], shoved)
-        parts.append(np.concatenate([*sound, *shoved]))
+        rigid = np.zeros((len(SIZES), 3, hi - lo))
+        sound = advance(bank, state, hi - lo, now, pushes, progress[lo:hi], rigid)
+        parts.append(np.concatenate([*sound, *rigid]))
     whole = np.concatenate(parts, axis=1)
     assert whole[-3 * len(SIZES) :].any()
     assert np.isfinite(whole).all()

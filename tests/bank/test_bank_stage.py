@@ -36,40 +36,42 @@ def pulses(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return table, rng.normal(size=(count, 2, 48))
 
 
-def enter(bank: Bank, state: BankState, table: Array, push: Array) -> int:
-    scratch = step_scratch(bank, 0)._replace(count=np.array([len(table), 0]), pulse=table, push=push)
+def enter(bank: Bank, state: BankState, table: Array, modal_impulse: Array) -> int:
+    scratch = step_scratch(bank, 0)._replace(count=np.array([len(table), 0]), pulse=table, modal_impulse=modal_impulse)
     return int(enter_pulses(0.0, 1 / 240, 0, float(SR), tables(bank, state), scratch))
 
 
 def test_a_table_of_pulses_strikes_both_bodies_as_strikes_do_one_by_one() -> None:
     rng = np.random.default_rng(2)
     bank, state = bodies(rng)
-    table, push = pulses(rng, 20)
+    table, modal_impulse = pulses(rng, 20)
     strikes = []
-    for pulse, gain in zip(table, push, strict=True):
+    for pulse, gain in zip(table, modal_impulse, strict=True):
         start = (pulse["start_s"] + (1 / 240 if pulse["ahead"] else 0.0)) * SR
         for side, m in enumerate((40, 9)):
-            shove = (1.0, -1.0)[side] * pulse["share"] * pulse["impulse_n_s"]
+            rigid_impulse = (1.0, -1.0)[side] * pulse["share"] * pulse["impulse_n_s"]
             strikes.append(
-                Strike(side, start, pulse["length_s"], pulse["share"] * gain[side, :m], bool(pulse["flat"]), shove)
+                Strike(
+                    side, start, pulse["length_s"], pulse["share"] * gain[side, :m], bool(pulse["flat"]), rigid_impulse
+                )
             )
-    single, table_pushed, single_pushed = state.copy(), np.zeros((2, 3, 900)), np.zeros((2, 3, 900))
+    single, table_dipole, single_dipole = state.copy(), np.zeros((2, 3, 900)), np.zeros((2, 3, 900))
     state.with_room(40)
-    assert enter(bank, state, table, push) == 20
+    assert enter(bank, state, table, modal_impulse) == 20
     assert np.array_equal(
-        advance(bank, state, 900, pushed=table_pushed), advance(bank, single, 900, strikes, pushed=single_pushed)
+        advance(bank, state, 900, dipole=table_dipole), advance(bank, single, 900, strikes, dipole=single_dipole)
     )
-    assert np.array_equal(table_pushed, single_pushed)
-    assert table_pushed.any()
+    assert np.array_equal(table_dipole, single_dipole)
+    assert table_dipole.any()
 
 
 def test_a_full_pool_is_said_and_takes_whole_pulses_alone() -> None:
     rng = np.random.default_rng(3)
     bank, state = bodies(rng)
-    table, push = pulses(rng, 5)
+    table, modal_impulse = pulses(rng, 5)
     state.with_room(5)
     free = int(state.free[0])
-    assert enter(bank, state, table, push) == free // 2
+    assert enter(bank, state, table, modal_impulse) == free // 2
     assert state.free[0] == free % 2
 
 
@@ -79,20 +81,20 @@ def test_rows_of_silent_bodies_are_zero_and_are_told_from_those_that_sound(dirty
     rng = np.random.default_rng(4)
     bank, state = bodies(rng)
     state.with_room(2)
-    table, push = pulses(rng, 1)
+    table, modal_impulse = pulses(rng, 1)
     table["body"], table["start_s"] = [0, 0], 0.0
-    enter(bank, state, table, push)
-    source, pushed = np.full((1, 2, 300), float(dirty)), np.full((2, 3, 300), float(dirty))
+    enter(bank, state, table, modal_impulse)
+    source, dipole = np.full((1, 2, 300), float(dirty)), np.full((2, 3, 300), float(dirty))
     sounds, work, group = np.full((2, 2), dirty), room(2, 0, 300), tables(bank, state)
-    scratch = step_scratch(bank, 300)._replace(source=source, pushed=pushed, sounds=sounds)
+    scratch = step_scratch(bank, 300)._replace(source=source, dipole=dipole, sounds=sounds)
     loud = []
     for step in range(600):
         bank_kernel.advance(step * 300, 300, float(SR), np.zeros(300), group, scratch, work)
         loud.append(sounds[0].copy())
         assert not source[0, 1].any()
-        assert not pushed[1].any()
+        assert not dipole[1].any()
         assert not sounds[1].any()
     assert loud[0].all()
     assert not loud[-1].any()
     assert not source.any()
-    assert not pushed.any()
+    assert not dipole.any()

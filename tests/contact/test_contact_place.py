@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sonic_bullet.contact import force_pulse as pulse
-from sonic_bullet.contact.contact_place import add_push, effective_mass, flat_area_m2, touch
+from sonic_bullet.contact.contact_place import add_modal_impulse, effective_mass, flat_area_m2, touch
 from sonic_bullet.contact.hertz import contact_modulus
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.machine.compiled import njit
@@ -30,7 +30,7 @@ def pulse_length(*arguments: float) -> Any:
 def rows_at(point: Any, outward: Any, push: Any = (0, 0, 0), body: int = 0, other: int = 1) -> np.ndarray:
     """One row that touches ``body`` on side 0."""
     rows = np.zeros(1, ROW)
-    rows["body"], rows["point_m"], rows["push_n_s"] = (body, other), point, push
+    rows["body"], rows["point_m"], rows["local_impulse_n_s"] = (body, other), point, push
     rows["outward"] = np.asarray(outward) / np.linalg.norm(outward)
     return rows
 
@@ -79,12 +79,14 @@ def test_pushes_are_the_shapes_linear_in_the_triangle_times_the_force() -> None:
     rows = rows_at((0.04, -0.02, 0.05), (0, 0, 1), (0.2, -1.0, 3.0), body=3, other=0)
     touch(rows, 0, gather(BodyTables, table))
     face, weight = table.faces[table.bodies["face_at"][3] + rows["face"][0, 0]], rows["barycentric"][0, 0]
-    expected = np.einsum("c,cxm,x->m", weight, resonator.shape[face["vertex"]].astype(float), rows["push_n_s"][0, 0])
+    expected = np.einsum(
+        "c,cxm,x->m", weight, resonator.shape[face["vertex"]].astype(float), rows["local_impulse_n_s"][0, 0]
+    )
     out = np.ones(table.columns)
-    add_push(rows, 0, 0, 0.5, gather(BodyTables, table), out)
+    add_modal_impulse(rows, 0, 0, 0.5, gather(BodyTables, table), out)
     assert out[:21] == pytest.approx(1 + 0.5 * expected, rel=1e-12)
     assert (out[21:] == out[follows]).all()
-    add_push(rows, 0, 1, 0.5, gather(BodyTables, table), out[:0])  # a wall has no modes
+    add_modal_impulse(rows, 0, 1, 0.5, gather(BodyTables, table), out[:0])  # a wall has no modes
 
 
 def test_a_table_grows_and_what_was_in_it_stays() -> None:

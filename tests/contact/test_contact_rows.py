@@ -92,7 +92,7 @@ def test_either_body_sees_its_own_side() -> None:
     turn = Rotation.from_quat(turned).as_matrix()[rows["body"]]
     sign = np.array([1.0, -1.0])[:, None]
     back = np.einsum("ksji,ksj->ksi", turn, sign * rows["impulse_n_s"][:, None])
-    assert np.abs(rows["push_n_s"] - back).max() < 1e-14
+    assert np.abs(rows["local_impulse_n_s"] - back).max() < 1e-14
     back = np.einsum("ksji,ksj->ksi", turn, -sign * rows["normal"][:, None])
     assert np.abs(rows["outward"] - back).max() < 1e-14
     assert np.abs(rows["arm_m"] - np.einsum("ksij,ksj->ksi", turn, rows["point_m"])).max() < 1e-14

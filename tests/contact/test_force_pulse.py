@@ -12,8 +12,8 @@ from tests.made.pulses import cumulated_force, pulse_nodes
 
 
 @njit(nogil=True)
-def compliance(push: Array, freq_hz: Array, first: int, modes: int, tau_s: float, spectrum: Array) -> float:
-    return pulse.compliance(push, freq_hz, first, modes, tau_s, spectrum)  # type: ignore[no-any-return]
+def compliance(modal_impulse: Array, freq_hz: Array, first: int, modes: int, tau_s: float, spectrum: Array) -> float:
+    return pulse.compliance(modal_impulse, freq_hz, first, modes, tau_s, spectrum)  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(("flat", "half_power", "zero"), [(False, 0.67, 1.8), (True, 0.594, 1.5)])

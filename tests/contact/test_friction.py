@@ -43,7 +43,7 @@ class Table:
         rows["key"], rows["body"], rows["normal"] = 1, (0, 1), (0, 0, -1)
         impulse = np.array([friction * load_n, 0, -load_n]) * DT_S
         rows["impulse_n_s"], rows["load_n_s"], rows["sweep_m_s"] = impulse, load_n * DT_S, sweep_m_s
-        rows["push_n_s"] = impulse, -impulse
+        rows["local_impulse_n_s"] = impulse, -impulse
         rows["touched"], rows["curvature_per_m"] = 1, 20.0
         rows["barycentric"][:, :, corner] = 1.0
         return rows

@@ -278,10 +278,10 @@ def test_a_pulse_is_its_rows_sum() -> None:
     pulses, pushes = [], []
     for number in range(8):
         rows = steps[number - 4] if number in (4, 5) else None
-        found, push = stages.take(step([(0, 0, 0), (0, 0, 0)], rows))
+        found, modal_impulse = stages.take(step([(0, 0, 0), (0, 0, 0)], rows))
         pulses += list(found)
-        pushes += list(push)
-    (pulse,), (push,) = pulses, pushes
+        pushes += list(modal_impulse)
+    (pulse,), (modal_impulse,) = pulses, pushes
     table, impulses = stages.table, [(j, p) for k in loads for j, p in zip(k, places, strict=True)]
     raw = sum(j for j, _ in impulses)
     arm = sum(j / raw * np.array(p) for j, p in impulses)
@@ -296,11 +296,11 @@ def test_a_pulse_is_its_rows_sum() -> None:
     for r in stages.window.row[stages.window.row["key"] == 1]:
         weight, face = r["barycentric"][0], table.faces[table.bodies["face_at"][0] + r["face"][0]]
         shape = box.model.shape[face["vertex"]].astype(float)
-        expected += scale * np.einsum("c,cxm,x->m", weight, shape, r["push_n_s"][0])
-    assert push[0] == pytest.approx(expected, rel=1e-9)
+        expected += scale * np.einsum("c,cxm,x->m", weight, shape, r["local_impulse_n_s"][0])
+    assert modal_impulse[0] == pytest.approx(expected, rel=1e-9)
     freq = table.frequency_hz[table.bodies["frequency_at"][0] :][:12]
     spectrum = np.interp(freq * pulse["length_s"], np.arange(321) / 40, spectrum_table()[pulse["flat"]])
-    given = np.sum((push[0] * spectrum) ** 2)
+    given = np.sum((modal_impulse[0] * spectrum) ** 2)
     assert pulse["share"] == pytest.approx(1 / (1 + mass * given / (scale * raw) ** 2), rel=1e-12)
 
 

@@ -26,7 +26,7 @@ class Strike:
     """A finite force pulse on one body (contact.force_pulse).
 
     start: absolute time of its begin in samples (any fraction). length_s, flat (half-sine, else Hertz'): its shape.
-    gain (m,): φᵀĵ of the body's modes in N·s/√kg. shove_n_s (3,): the impulse, for its translations.
+    gain (m,): φᵀĵ of the body's modes in N·s/√kg. rigid_impulse_n_s (3,): the impulse, for its translations.
     """
 
     body: int
@@ -34,7 +34,7 @@ class Strike:
     length_s: float
     gain: Array
     flat: bool = False
-    shove_n_s: Array = field(default_factory=lambda: NOWHERE)
+    rigid_impulse_n_s: Array = field(default_factory=lambda: NOWHERE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +60,9 @@ def advance(
     strikes: Sequence[Strike] = (),
     forces: Sequence[Force] = (),
     progress: Array | None = None,
-    pushed: Array | None = None,
+    dipole: Array | None = None,
 ) -> Array:
-    """The next n samples: y (W, b, n) of the modes, and into ``pushed`` (b, 3, n) of the translations. Changes
+    """The next n samples: y (W, b, n) of the modes, and into ``dipole`` (b, 3, n) of the translations. Changes
     ``state`` in place.
 
     strikes: those that become known now; each starts after the previous call's last sample, in any call before or at
@@ -72,10 +72,10 @@ def advance(
     along = np.zeros(n) if progress is None else np.ascontiguousarray(progress, float)
     _enter(bank, state, strikes)
     out = np.zeros((bank.weight.shape[0], bank.body_count, n))
-    if pushed is None:
-        pushed = np.zeros((bank.body_count, 3, n))
-    pushed[...] = 0.0
-    scratch = step_scratch(bank, n, forces)._replace(source=out, passed=passed(bank, state, n), pushed=pushed)
+    if dipole is None:
+        dipole = np.zeros((bank.body_count, 3, n))
+    dipole[...] = 0.0
+    scratch = step_scratch(bank, n, forces)._replace(source=out, passed=passed(bank, state, n), dipole=dipole)
     work = room(bank.body_count, len(forces), n)
     bank_kernel.advance(state.at, n, float(bank.sr), along, tables(bank, state), scratch, work)
     state.at += n
@@ -108,7 +108,7 @@ def _enter(bank: Bank, state: BankState, strikes: Sequence[Strike]) -> None:
     """Enter strikes into the pool."""
     state.with_room(len(strikes))
     for strike in strikes:
-        x, y, z = (float(value) for value in strike.shove_n_s)
+        x, y, z = (float(value) for value in strike.rigid_impulse_n_s)
         gain, length = _padded(bank, strike.gain), float(strike.length_s) * float(bank.sr)
         pulse = BodyPulse(float(strike.start), length, int(strike.flat), 1.0, gain, (x, y, z))
         enter_strike(strike.body, pulse, state.at, tables(bank, state))

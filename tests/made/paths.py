@@ -16,7 +16,7 @@ def propagate(
     state: PathState,
     step: int,
     source: Array,
-    pushed: Array,
+    dipole: Array,
     position0_m: Array,
     position1_m: Array,
     teleported: Array,
@@ -24,15 +24,15 @@ def propagate(
 ) -> Array:
     """Pressure (c, n) in Pa at the next n samples. Changes ``state`` in place.
 
-    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; pushed (b, 3, n) in
+    step ≥ 0: number of the physics step that these samples are (part of). source (b, n) in Pa·m; dipole (b, 3, n) in
     Pa·m, world frame. position0_m, position1_m (b, 3): at the step's start and end; progress (n,): where between them
     each sample lies, 0 … 1. teleported (b,): moved by hand, so both places sound and fade over the step. Bodies are
     summed in order. Below 1e-30 Pa: 0. Raises AudioError on numbers that are not finite, or a sounding body more than
     1 km from a microphone.
     """
     n = len(progress)
-    source, pushed, position0_m, position1_m, progress = (
-        np.ascontiguousarray(one, float) for one in (source, pushed, position0_m, position1_m, progress)
+    source, dipole, position0_m, position1_m, progress = (
+        np.ascontiguousarray(one, float) for one in (source, dipole, position0_m, position1_m, progress)
     )
     out, work = np.zeros((len(path.microphone_m), n)), np.zeros(WORK)
     moved = np.ascontiguousarray(teleported, bool)
@@ -43,7 +43,7 @@ def propagate(
             state.at,
             step,
             n,
-            Emission(source[None], pushed, 0, np.zeros(len(path.microphone_m), np.int64)),
+            Emission(source[None], dipole, 0, np.zeros(len(path.microphone_m), np.int64)),
             course,
             tables,
             work,

@@ -52,10 +52,10 @@ class Stages:
             np.zeros((pairs, 2, 0)), np.zeros(pairs, CONTACT_PATCH),
         )  # fmt: skip
         self.strikes, self.pulses = np.zeros(pairs, STRIKE), np.zeros(2 * pairs, PULSE)
-        self.push = np.zeros((2 * pairs, 2, self.table.columns))
+        self.modal_impulse = np.zeros((2 * pairs, 2, self.table.columns))
         none = np.zeros((0, 2, 0))
         self.scratch = ScratchTables(
-            np.zeros(2, np.int64), self.pulses, self.push, np.zeros(0), none, none, none[:, 0], none[:, 0],
+            np.zeros(2, np.int64), self.pulses, self.modal_impulse, np.zeros(0), none, none, none[:, 0], none[:, 0],
             np.zeros((0, 2), np.int64), np.zeros(0, np.int64), none, none, none, np.zeros((0, 2), np.int64),
         )  # fmt: skip
         self._steps: list[Step] = []
@@ -90,8 +90,8 @@ class Stages:
         """
         self.enter(step)
         if len(self._steps) <= LOOKAHEAD:
-            return self.pulses[:0].copy(), self.push[:0].copy()
+            return self.pulses[:0].copy(), self.modal_impulse[:0].copy()
         moved = np.flatnonzero(self._steps[1].teleported)
         self.table.bodies["placed"][moved] = self.number - LOOKAHEAD
         found = self.pulses_of(1, self.pulses_of(0))
-        return self.pulses[:found].copy(), self.push[:found].copy()
+        return self.pulses[:found].copy(), self.modal_impulse[:found].copy()

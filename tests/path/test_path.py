@@ -26,7 +26,7 @@ def path_of(
 
 
 def still(
-    path: Path, state: PathState, source: Array, place: object, pushed: Array | None = None, step: int = 0
+    path: Path, state: PathState, source: Array, place: object, dipole: Array | None = None, step: int = 0
 ) -> Array:
     """One body that stays."""
     n = source.shape[-1]
@@ -38,7 +38,7 @@ def still(
         state,
         step,
         source,
-        np.zeros((count, 3, n)) if pushed is None else pushed,
+        np.zeros((count, 3, n)) if dipole is None else dipole,
         here,
         here,
         np.zeros(count, bool),
@@ -136,7 +136,7 @@ def test_a_push_radiates_as_a_dipole() -> None:
     away *= 2.0 / np.linalg.norm(away, axis=1)[:, None]
     direction = np.array([0.6, 0.0, 0.8])
     path, state = path_of(1, away)
-    sound = still(path, state, np.zeros((1, 2000)), [0, 0, 0], pushed=0.3 * direction[None, :, None] * tone(500, 2000))
+    sound = still(path, state, np.zeros((1, 2000)), [0, 0, 0], dipole=0.3 * direction[None, :, None] * tone(500, 2000))
     for c in range(5):
         got = fitted(sound[c], 500, 600) / (-1j) * np.exp(2j * np.pi * 500 * 2.0 / C)
         assert got == pytest.approx(0.3 * (away[c] / 2.0) @ direction / 2.0, abs=2e-4)
@@ -151,11 +151,11 @@ def random_steps(seed: int, bodies: int, steps: int, n: int) -> list[tuple[Array
         by_hand = rng.uniform(size=bodies) < 0.2
         after = place + rng.normal(size=(bodies, 3)) * np.where(by_hand, 3.0, 0.02)[:, None]
         on ^= rng.uniform(size=bodies) < 0.3
-        source, pushed = rng.normal(size=(bodies, n)) * on[:, None], rng.normal(size=(bodies, 3, n)) * on[:, None, None]
+        source, dipole = rng.normal(size=(bodies, n)) * on[:, None], rng.normal(size=(bodies, 3, n)) * on[:, None, None]
         gate = int(rng.integers(n))
         source[:, :gate] *= rng.uniform(size=bodies)[:, None] < 0.6
-        pushed[:, :, :gate] = 0.0
-        out.append((source, pushed, place, after, by_hand))
+        dipole[:, :, :gate] = 0.0
+        out.append((source, dipole, place, after, by_hand))
         place = after
     return out
 
@@ -171,16 +171,16 @@ def play(
     progress = (np.arange(n) + 0.3) / n
     parts = []
     turn = np.eye(3) if turn is None else turn
-    for number, ((source, pushed, before, after, by_hand), cut) in enumerate(zip(steps, cuts, strict=True)):
+    for number, ((source, dipole, before, after, by_hand), cut) in enumerate(zip(steps, cuts, strict=True)):
         for lo, hi in zip([0, *cut], [*cut, n], strict=True):
-            push = 0.2 * np.einsum("ij,bjn->bin", turn, pushed[:, :, lo:hi])
+            turned = 0.2 * np.einsum("ij,bjn->bin", turn, dipole[:, :, lo:hi])
             parts.append(
                 propagate(
                     path,
                     state,
                     number,
                     source[:, lo:hi],
-                    push,
+                    turned,
                     before @ turn.T,
                     after @ turn.T,
                     by_hand,

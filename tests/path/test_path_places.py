@@ -44,20 +44,20 @@ def called(
     begin_m: Array,
     end_m: Array,
     moved: bool = False,
-    pushed: Array | None = None,
+    dipole: Array | None = None,
     step: int = 0,
 ) -> tuple[int, Array]:
     """One call for one body, as the run time makes it: nothing grows by itself."""
     n = source.shape[1]
     out = np.zeros((2, n))
-    push = np.zeros((1, 3, n)) if pushed is None else pushed
+    dipole = np.zeros((1, 3, n)) if dipole is None else dipole
     course = Course(begin_m, end_m, np.array([moved]), np.arange(n) / n, AT_REST, ALL_ALIKE)
     tables, arrivals = gather(PathTables, path, state), Arrivals(out, 0, 0)
     status = hear(
         state.at,
         step,
         n,
-        Emission(source[None], push, 0, np.zeros(2, np.int64)),
+        Emission(source[None], dipole, 0, np.zeros(2, np.int64)),
         course,
         tables,
         np.zeros(WORK),
@@ -69,13 +69,13 @@ def called(
 def test_a_body_at_rest_is_a_windowed_sinc_of_its_delay() -> None:
     """The equations in plain numpy, one sample at a time; the taps' polynomials are fitted to 1e-8."""
     rng = np.random.default_rng(0)
-    source, pushed, place = rng.normal(size=(1, 500)), rng.normal(size=(1, 3, 500)), np.array([[0.3, 0.4, -0.2]])
+    source, dipole, place = rng.normal(size=(1, 500)), rng.normal(size=(1, 3, 500)), np.array([[0.3, 0.4, -0.2]])
     path, state = path_of(1)
-    sound = propagate(path, state, 0, source, pushed, place, place, np.zeros(1, bool), np.zeros(500))
+    sound = propagate(path, state, 0, source, dipole, place, place, np.zeros(1, bool), np.zeros(500))
     for c, microphone in enumerate(MICROPHONES):
         away = microphone - place[0]
         r = np.linalg.norm(away)
-        emitted = np.concatenate([np.zeros(TAPS), (source[0] + away / r @ pushed[0]) / r])
+        emitted = np.concatenate([np.zeros(TAPS), (source[0] + away / r @ dipole[0]) / r])
         late = r / C * SR
         whole, fraction = int(np.ceil(late)), np.ceil(late) - late
         distance = np.arange(TAPS) - (AHEAD - 1) - fraction
@@ -154,8 +154,8 @@ def test_each_number_is_looked_at(n: int) -> None:
             values = np.zeros(4 * n)
             values[place] = wrong
             path, state = path_of(1)
-            source, pushed = values[None, :n].copy(), values[n:].reshape(1, 3, n).copy()
-            assert called(path, state, source, here, here, pushed=pushed)[0] == NOT_FINITE
+            source, dipole = values[None, :n].copy(), values[n:].reshape(1, 3, n).copy()
+            assert called(path, state, source, here, here, dipole=dipole)[0] == NOT_FINITE
             assert not state.lines["awake"].any()
     for place in range(n):  # and a single one of them wakes
         source = np.zeros((1, n))
@@ -180,13 +180,13 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
     """A chunk of steps lies in one array: each call takes its columns and writes its own."""
     rng = np.random.default_rng(4)
     bodies, steps, n = 3, 5, 203
-    source, pushed = rng.normal(size=(bodies, steps * n)), rng.normal(size=(bodies, 3, steps * n))
+    source, dipole = rng.normal(size=(bodies, steps * n)), rng.normal(size=(bodies, 3, steps * n))
     place = rng.uniform(-2, 2, (steps + 1, bodies, 3)) * 0.01 + np.arange(bodies)[:, None]
     x, still = np.arange(n) / n, np.zeros(bodies, bool)
     path, state = path_of(bodies)
     parts = [
         propagate(
-            path, state, k, source[:, k * n :][:, :n], pushed[:, :, k * n :][:, :, :n], place[k], place[k + 1], still, x
+            path, state, k, source[:, k * n :][:, :n], dipole[:, :, k * n :][:, :, :n], place[k], place[k + 1], still, x
         )
         for k in range(steps)
     ]
@@ -199,7 +199,7 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
             k * n,
             k,
             n,
-            Emission(source[None], pushed, k * n, np.zeros(len(path.microphone_m), np.int64)),
+            Emission(source[None], dipole, k * n, np.zeros(len(path.microphone_m), np.int64)),
             course,
             tables,
             work,
@@ -224,8 +224,8 @@ def test_any_speed_gives_the_same_bits_for_any_cuts(speed: float) -> None:
             begin, end = (np.array([[-10.0 + speed * n / SR * j, 1.0, 0.0]]) for j in (k, k + 1))
             for lo in range(0, n, size):
                 now = source[:, k * n + lo : k * n + min(lo + size, n)]
-                push = np.zeros((1, 3, now.shape[1]))
-                parts.append(propagate(path, state, k, now, push, begin, end, np.zeros(1, bool), x[lo : lo + size]))
+                dipole = np.zeros((1, 3, now.shape[1]))
+                parts.append(propagate(path, state, k, now, dipole, begin, end, np.zeros(1, bool), x[lo : lo + size]))
         sounds.append(np.concatenate(parts, axis=1))
     assert sounds[0].any()
     assert sounds[0].tobytes() == sounds[1].tobytes() == sounds[2].tobytes()

@@ -134,9 +134,9 @@ def test_the_place_decides_as_it_does_for_the_modes() -> None:
     assert beside is not None and body.model is not None
     for face in (0, 5):
         corners = resonator.shape[body.model.face[face]].astype(float)
-        push = np.einsum("c,cxm,x->m", [0.2, 0.3, 0.5], corners, [0.0, 0.0, 0.01])
-        power = struck_power(beside, resonator.weight[1], push)
-        assert power == pytest.approx(np.abs(resonator.weight[1] * push) ** 2, rel=1e-9)
+        modal_impulse = np.einsum("c,cxm,x->m", [0.2, 0.3, 0.5], corners, [0.0, 0.0, 0.01])
+        power = struck_power(beside, resonator.weight[1], modal_impulse)
+        assert power == pytest.approx(np.abs(resonator.weight[1] * modal_impulse) ** 2, rel=1e-9)
         pair, level = placed(beside.voice, power, 20e-6, False, lambda f_tau, _: np.ones(len(f_tau)))
         exact = filtered(beside.voice, response(beside.voice, power))
         assert 10 * abs(np.log10((level**2 * (pair.astype(float) ** 2).sum()) / (exact.astype(float) ** 2).sum())) < 1.0

@@ -122,7 +122,7 @@ def only_pulse(body: Any, contacts: Contacts) -> Pulse:
     stages, found = Stages((body, wall_body())), []
     for one in one_strike((body, wall_body()), contacts, [(0, 0, 0), (0, 0, 0.01)], at=4, steps=8):
         found += list(zip(*stages.take(one), strict=True))
-    ((pulse, push),) = found
+    ((pulse, modal_impulse),) = found
     start_s = float(pulse["start_s"])
     modes = stages.table.bodies["modes"][0]
     return Pulse(
@@ -131,7 +131,7 @@ def only_pulse(body: Any, contacts: Contacts) -> Pulse:
         bool(pulse["flat"]),
         float(pulse["share"]),
         pulse["impulse_n_s"],
-        push[0, :modes],
+        modal_impulse[0, :modes],
     )
 
 

@@ -71,7 +71,7 @@ def _turn_state(state: State, b: int, pairs: Array, step: Array) -> None:
         struck = np.flatnonzero(scratch.pulse["body"][:found, side] == b)
         driven = np.flatnonzero(scratch.body[:drives, side] == b)
         slots = active[touching.pair["body"][active, side] == b]
-        mine = (scratch.push, struck), (scratch.gain0, driven), (scratch.gain1, driven), (touching.gain, slots)
+        mine = (scratch.modal_impulse, struck), (scratch.gain0, driven), (scratch.gain1, driven), (touching.gain, slots)
         for gains, rows in mine:
             for row in rows.tolist():
                 turn_lanes(gains[row, side], pairs, step)
