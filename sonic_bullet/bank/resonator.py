@@ -19,7 +19,7 @@ import numpy as np
 
 from sonic_bullet.bank import Translation, audible
 from sonic_bullet.bank.rigid_motion import rigid_columns, rigid_rows
-from sonic_bullet.contact.coupling import ContactSide, Moving
+from sonic_bullet.contact.coupling import BodyMobility, ContactSide
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_index
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.radiation.far_field import jerk_coefficient
@@ -60,7 +60,7 @@ class Resonator:
     radius_m: float
     translation: Translation | None
     dropped: int
-    moving: Moving
+    mobility: BodyMobility
     side: ContactSide
     bend: Array | None = None
     damping_growth: Array | None = None
@@ -136,7 +136,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
             0.0,
             None,
             0,
-            Moving(none, none, body.mass_kg, body.inertia_kg_m2),
+            BodyMobility(none, none, body.mass_kg, body.inertia_kg_m2),
             side,
         )
     keep, omega, decay, pressure, shape, most, index, radius = _played(model, air, sr, body.mounting)
@@ -173,7 +173,7 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
         radius,
         translation,
         dropped,
-        Moving(omega, decay, body.mass_kg, body.inertia_kg_m2),
+        BodyMobility(omega, decay, body.mass_kg, body.inertia_kg_m2),
         side,
         bend,
         damping_growth,

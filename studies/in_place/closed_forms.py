@@ -9,22 +9,22 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 
 from sonic_bullet.contact.coupling import (
+    BodyMobility,
+    BodyPoint,
+    ContactPoint,
     ContactSide,
     ContactSpring,
-    InPlace,
-    Moving,
-    Place,
+    CoupledModes,
     Region,
-    Touch,
     contact_spring,
     first_order,
 )
 from sonic_bullet.records import Array
 from studies.in_place.lines import Line
 from tests.made.bars import AXES, bar, exact_poles, stood
-from tests.made.newton import in_place
+from tests.made.newton import newton_modes
 
-NOTHING = Moving(np.zeros(0), np.zeros(0))
+NOTHING = BodyMobility(np.zeros(0), np.zeros(0))
 STRENGTHS = np.geomspace(1e1, 1e10, 19)
 """N/m: from 1e-5 of the first mode's own stiffness to a wall."""
 DASHPOTS = (0.0, 1e-4, 1 / 2000, 1 / 200, 1 / 20)
@@ -32,7 +32,7 @@ DASHPOTS = (0.0, 1e-4, 1 / 2000, 1 / 200, 1 / 20)
 DRAWS = 10_000
 
 
-def poles_of(found: InPlace) -> Array:
+def poles_of(found: CoupledModes) -> Array:
     return -found.decay_per_s + 1j * found.omega_rad_s
 
 
@@ -41,15 +41,15 @@ def spring_and_dashpot() -> Iterator[Line]:
     worst, compared, possible, near = 0.0, 0, 0, []
     for node in (0, 3):
         for plate in DASHPOTS:
-            under = [Moving(np.zeros(0), np.zeros(0), plate_m_n_s=plate)]
+            under = [BodyMobility(np.zeros(0), np.zeros(0), plate_m_n_s=plate)]
             for k in STRENGTHS * (1 + 0.02j):
                 touches = stood(steel, (node,), k)
                 want = exact_poles(steel, node, k, plate)
-                found = in_place(steel.moving(), under, touches)
+                found = newton_modes(steel.mobility(), under, touches)
                 got = poles_of(found)[found.newton]
                 worst = max(worst, (np.abs(got[:, None] - want).min(axis=1) / np.abs(got)).max())
                 compared, possible = compared + len(got), possible + len(steel.lam) - 2
-                fast = first_order(steel.moving(), under, touches)
+                fast = first_order(steel.mobility(), under, touches)
                 got = poles_of(fast)[fast.newton]
                 nearest = want[np.abs(got[:, None] - want).argmin(axis=1)]
                 near += np.abs(np.log(got.real / nearest.real)).tolist()
@@ -69,20 +69,20 @@ def spring_and_dashpot() -> Iterator[Line]:
 
 def limits() -> Iterator[Line]:
     steel = bar()
-    body = steel.moving()
+    body = steel.mobility()
     worst = 0.0
-    for solve in (in_place, first_order):
+    for solve in (newton_modes, first_order):
         found = solve(body, [NOTHING], stood(steel, (0, 5), 1e-6 * (1 + 0.1j)))
-        worst = max(worst, np.abs(poles_of(found) / poles_of(in_place(body, [], [])) - 1).max())
+        worst = max(worst, np.abs(poles_of(found) / poles_of(newton_modes(body, [], [])) - 1).max())
     yield Line("K → 0: free poles", "<= 1e-6", f"{worst:.1e}", bool(worst <= 1e-6))
-    body, touches = steel.moving(0.0), stood(steel, (3,), 1e15)
+    body, touches = steel.mobility(0.0), stood(steel, (3,), 1e15)
     basis = null_space(body.moves([touches[0].own])[:1])
     held = np.sqrt(np.abs(eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True)))  # rigid: 0, nearly
     free = np.delete(np.arange(len(steel.lam)), 6)
     elements = np.sqrt(
         np.abs(eigh(steel.stiffness[np.ix_(free, free)], steel.mass[np.ix_(free, free)], eigvals_only=True))
     )
-    for name, solve in (("", in_place), (", as they run", first_order)):
+    for name, solve in (("", newton_modes), (", as they run", first_order)):
         found = solve(body, [NOTHING], touches)
         got = found.omega_rad_s[found.newton]
         for what, want in (
@@ -93,7 +93,7 @@ def limits() -> Iterator[Line]:
             yield Line(f"K = 1e15 N/m, all modes: {what}{name}", "<= 1e-6", f"{off:.1e}", bool(off <= 1e-6))
     offs, counts = [], (4, 6, 8, 12, 16)
     for modes in counts:
-        found = in_place(steel.moving(0.0, modes), [NOTHING], stood(steel, (3,), 1e14, modes))
+        found = newton_modes(steel.mobility(0.0, modes), [NOTHING], stood(steel, (3,), 1e14, modes))
         got = found.omega_rad_s[found.newton]
         offs.append(np.abs(got[:, None] / elements[1:3] - 1).min(axis=0).max())
     yield Line(
@@ -106,27 +106,27 @@ def limits() -> Iterator[Line]:
 
 def pair(
     rng: np.random.Generator, spring_n_m: complex, touches: int, mass_kg: float, counts: tuple[int, int] = (6, 3)
-) -> tuple[list[Moving], list[Touch], list[Touch]]:
+) -> tuple[list[BodyMobility], list[ContactPoint], list[ContactPoint]]:
     """Two free bodies of random modes, and the touches between them as either sees them."""
-    moving = []
+    mobility = []
     for count, kg in zip(counts, (0.2, mass_kg), strict=True):
         root = np.sort(rng.uniform(500, 5e4, count))
-        moving.append(Moving(root, rng.uniform(1e-4, 1e-2, count) * root, kg, kg * 1e-3 * np.diag([1, 2, 2.5])))
+        mobility.append(BodyMobility(root, rng.uniform(1e-4, 1e-2, count) * root, kg, kg * 1e-3 * np.diag([1, 2, 2.5])))
     there, back = [], []
     for _ in range(touches):
         own, other = (
-            Place(rng.normal(size=(3, count)) / np.sqrt(kg), rng.normal(size=3) * 0.05, AXES)
+            BodyPoint(rng.normal(size=(3, count)) / np.sqrt(kg), rng.normal(size=3) * 0.05, AXES)
             for count, kg in zip(counts, (0.2, mass_kg), strict=True)
         )
         spring = ContactSpring(spring_n_m, 0.8 * spring_n_m)
-        there.append(Touch(0, own, other, spring))
-        back.append(Touch(0, other, own, spring))
-    return moving, there, back
+        there.append(ContactPoint(0, own, other, spring))
+        back.append(ContactPoint(0, other, own, spring))
+    return mobility, there, back
 
 
 def reciprocity() -> Iterator[Line]:
     """Mode j's answer to mode k is minus that of k to j, K φ_j φ_k/(λ_j − λ_k), up to second order in K."""
-    for name, solve in (("Newton", in_place), ("as they run", first_order)):
+    for name, solve in (("Newton", newton_modes), ("as they run", first_order)):
         offs = []
         for k in (1.0, 10.0, 100.0):
             (a, b), there, back = pair(np.random.default_rng(5), k, 1, 0.5, (4, 3))
@@ -145,7 +145,7 @@ def passive() -> Iterator[Line]:
     """Each draw another body's contacts: none to four points, 10 to 1e9 N/m, loss 1e-4 to 1, a partner of 0.01 to
     100 kg. ½|z|² is the body's energy and that of its springs.
     """
-    for name, solve in (("Newton", in_place), ("as they run", first_order)):
+    for name, solve in (("Newton", newton_modes), ("as they run", first_order)):
         rng = np.random.default_rng(0)
         body = pair(rng, 1.0, 0, 0.5)[0][0]
         z = rng.normal(size=6) + 1j * rng.normal(size=6)

@@ -26,7 +26,7 @@ def taken_per_s(stands: Stands, k: ContactSpring) -> float:
     """Part of the first mode's decay that board and contact take, by the eigenvector of all: −Re s qᴴq = qᴴDq +
     Im(uᴴKu)/2ω, u the stretch of the spring.
     """
-    one, on = stands.thing.moving, stands.board.moving
+    one, on = stands.thing.mobility, stands.board.mobility
     s, at = stands.s, np.abs(stands.s.imag - stands.newton.omega_rad_s[0]).argmin()
     q, m = stands.q[:, at], len(one.lam)
     top = float(stands.board.model.vertex_m[:, 2].max())
@@ -47,7 +47,7 @@ def fork_on_board() -> Iterator[Line]:
             own = one.resonator.weight[0, 0]
             whole = own + passed_weight(on.resonator, how.passes[0], how.omega_rad_s)[0, 0]
             louder.append(20 * np.log10(abs(whole) / abs(own)))
-            grown.append((how.decay_per_s[0] - one.moving.decay_per_s[0]) / taken)
+            grown.append((how.decay_per_s[0] - one.mobility.decay_per_s[0]) / taken)
         name = f"fork {one.hz[0]:.0f} Hz, its foot's motion {foot_over_tip(one):.2%} of its tip's, on 24 mm of wood"
         yield Line(
             f"{name}: louder at equal speed of its tines",
@@ -68,7 +68,7 @@ def matched_board() -> Iterator[Line]:
     k = ContactSpring(complex(POINT_N_M), MINDLIN * complex(POINT_N_M))
     for yoke in YOKES_M:
         one = fork(yoke)
-        impedance = one.moving.mass_kg * one.moving.omega_rad_s[0]
+        impedance = one.mobility.mass_kg * one.mobility.omega_rad_s[0]
         shape = one.place(FOOT_M[0]).shape[2, 0]
         most = shape**2 * impedance / 4  # ½|v|² mω/2 of ½|z|², v what the foot would do if free
         figures, holds = [f"{one.moving.decay_per_s[0] / (one.moving.decay_per_s[0] + most):.0%} by hand"], True

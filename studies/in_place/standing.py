@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from sonic_bullet.contact.coupling import ContactSide, ContactSpring, InPlace, Region, contact_spring, pad_spring
+from sonic_bullet.contact.coupling import ContactSide, ContactSpring, CoupledModes, Region, contact_spring, pad_spring
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Array
 from studies.in_place.lines import Line
@@ -51,7 +51,7 @@ def rod_on_two_points() -> Iterator[Line]:
         for name, t60, _ in both(placed):
             figures.append(f"{name} {t60[low].max():.2f}, {t60[one.hz < 15e3].max():.2f} s")
             holds &= bool(t60[low].max() <= 0.5 and t60[one.hz < 15e3].max() <= 1.3)
-        free = np.log(1000) / one.moving.decay_per_s
+        free = np.log(1000) / one.mobility.decay_per_s
         yield Line(
             f"rod on two smooth points at {where}: T60 of vertical bending < 8 kHz, of all < 15 kHz "
             f"(free {free[one.hz < 15e3].min():.0f} to {free.max():.0f} s)",
@@ -98,10 +98,10 @@ def heard_s(decay: Array) -> float:
     return float(brentq(lambda t: np.log10(np.mean(np.exp(-2 * decay * t))) + 6, 0.99 * low, 1.01 * high))
 
 
-def of_pairs(one: Thing, how: InPlace, waves: tuple[int, ...]) -> tuple[Array, str]:
+def of_pairs(one: Thing, how: CoupledModes, waves: tuple[int, ...]) -> tuple[Array, str]:
     """T60 kept of the lowest pair of each number of waves, both struck alike; in words, with that of either alone."""
     pairs = [lowest_pair(one, n) for n in waves]
-    free, here = one.moving.decay_per_s, how.decay_per_s
+    free, here = one.mobility.decay_per_s, how.decay_per_s
     kept = np.array([heard_s(here[pair]) / heard_s(free[pair]) for pair in pairs])
     either = [
         f"{100 * x:.3g} ({' '.join(f'{100 * y:.3g}' for y in free[p] / here[p])})"
@@ -126,7 +126,7 @@ def bowl_on_its_foot() -> Iterator[Line]:
                 bool(kept[0] <= 0.25 and kept[1:].min() >= 0.85) if judged else None,
             )
     side = ContactSide.of(load_material("steel")), ContactSide.of(load_material("wood"))
-    load_n = one.moving.mass_kg * 9.81
+    load_n = one.mobility.mass_kg * 9.81
     whole = contact_spring(Region((0.03, 0.03), (0.0, 0.0)), side, load_n)
     placed = stand(one, on, ring_of(0.03, foot, 24), [whole.share(1 / 24)] * 24, AT_M, eigen=False)
     for name, how in (("Newton", placed.newton), ("run", placed.runs)):
@@ -160,7 +160,7 @@ def glass_on_its_foot() -> Iterator[Line]:
     """On smooth points of 5 mm, as its own weight makes them: on isotropic wood, and across a board's grain."""
     one, on = with_loss(asset("tumbler", lossless("glass")), 1e-3), board()
     foot = float(one.model.vertex_m[:, 2].min())
-    load_n = one.moving.mass_kg * 9.81 / 3
+    load_n = one.mobility.mass_kg * 9.81 / 3
     for wood in ("wood", "spruce"):
         k = point_spring("glass", wood, load_n)
         placed = stand(one, on, ring_of(0.03, foot, 3), [k] * 3, AT_M, eigen=False)

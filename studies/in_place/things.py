@@ -1,6 +1,6 @@
 """Bodies that stand on a board, as the run time has them: modes from geometry and material, decays with the air's.
 
-    Shape + material -> analyse -> build_resonator -> Thing: what it yields (Moving), where it is touched (Place)
+    Shape + material -> analyse -> build_resonator -> Thing: BodyMobility, and BodyPoint where it is touched
     Thing, springs at its points -> stand -> Stands: first order, as it runs, beside Newton's pole and the eigenproblem
 
 Axes of all bodies are those of the board: z up, the normal.
@@ -15,13 +15,20 @@ from typing import cast
 import numpy as np
 
 from sonic_bullet.bank.resonator import Resonator, build_resonator
-from sonic_bullet.contact.coupling import ContactSpring, InPlace, Moving, Place, Touch, first_order
+from sonic_bullet.contact.coupling import (
+    BodyMobility,
+    BodyPoint,
+    ContactPoint,
+    ContactSpring,
+    CoupledModes,
+    first_order,
+)
 from sonic_bullet.geometry.nearest_point import nearest
 from sonic_bullet.modal import analyse, read_mesh
 from sonic_bullet.presets import load_material
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel, Shape
 from studies.thin_walls.blocks import cartesian, welded
-from tests.made.newton import in_place
+from tests.made.newton import newton_modes
 
 AXES = np.eye(3)[[2, 0, 1]]
 SR = 48_000
@@ -36,22 +43,22 @@ class Thing:
     resonator: Resonator
     model: ModalModel
     centre_m: Array
-    moving: Moving
+    mobility: BodyMobility
 
-    def place(self, point_m: Array) -> Place:
+    def place(self, point_m: Array) -> BodyPoint:
         """Where it is touched: at the point of its surface nearest to this one."""
         index = self.resonator.index
         assert index is not None
         face, weight, _ = nearest(index, np.asarray(point_m, float)[None])
         corner = self.model.face[face[0]]
         at = weight[0] @ self.model.vertex_m[corner]
-        return Place(
+        return BodyPoint(
             np.einsum("c,cxm->xm", weight[0], self.resonator.shape[corner].astype(float)), at - self.centre_m, AXES
         )
 
     @property
     def hz(self) -> Array:
-        return np.asarray(self.moving.omega_rad_s / 2 / np.pi)
+        return np.asarray(self.mobility.omega_rad_s / 2 / np.pi)
 
 
 def thing(shape: Shape, material: Material, *, stands: bool = False, to_hz: float = 20_000.0) -> Thing:
@@ -67,7 +74,7 @@ def thing(shape: Shape, material: Material, *, stands: bool = False, to_hz: floa
         mounting="placed" if stands else "free",
     )  # fmt: skip
     made = build_resonator(body, (), SR, Air())
-    return Thing(made, model, np.asarray(mesh.center_mass), made.moving)
+    return Thing(made, model, np.asarray(mesh.center_mass), made.mobility)
 
 
 def asset(name: str, material: Material, *, upside_down: bool = False) -> Thing:
@@ -86,13 +93,13 @@ def lossless(name: str) -> Material:
 
 def with_loss(one: Thing, loss: float) -> Thing:
     """η ω/2 more of each mode."""
-    decay = one.moving.decay_per_s + loss * one.moving.omega_rad_s / 2
-    return replace(one, moving=replace(one.moving, decay_per_s=decay))
+    decay = one.mobility.decay_per_s + loss * one.mobility.omega_rad_s / 2
+    return replace(one, mobility=replace(one.mobility, decay_per_s=decay))
 
 
 def with_plate(one: Thing, mobility_m_n_s: float) -> Thing:
     """A board that yields as a wide plate, and not as its modes."""
-    return replace(one, moving=replace(one.moving, plate_m_n_s=mobility_m_n_s))
+    return replace(one, mobility=replace(one.mobility, plate_m_n_s=mobility_m_n_s))
 
 
 @cache
@@ -146,19 +153,19 @@ class Stands:
 
     thing: Thing
     board: Thing
-    runs: InPlace
-    newton: InPlace
+    runs: CoupledModes
+    newton: CoupledModes
     s: Array
     q: Array
 
-    def kept(self, how: InPlace) -> Array:
+    def kept(self, how: CoupledModes) -> Array:
         """(m,) T60 here over T60 free."""
-        return np.asarray(self.thing.moving.decay_per_s / np.maximum(how.decay_per_s, 1e-12))
+        return np.asarray(self.thing.mobility.decay_per_s / np.maximum(how.decay_per_s, 1e-12))
 
-    def t60_s(self, how: InPlace) -> Array:
+    def t60_s(self, how: CoupledModes) -> Array:
         return np.asarray(np.log(1000) / np.maximum(how.decay_per_s, 1e-12))
 
-    def off(self, how: InPlace) -> Array:
+    def off(self, how: CoupledModes) -> Array:
         """(m,) distance of each pole that stands from the nearest exact one, over |s|; NaN where it does not stand."""
         s = -how.decay_per_s + 1j * how.omega_rad_s
         near = np.abs(s[:, None] - self.s).min(axis=1) / np.abs(s)
@@ -179,19 +186,19 @@ def stand(
     """
     top = float(on.model.vertex_m[:, 2].max())
     touches = [
-        Touch(0, one.place(p), on.place(np.array([p[0] + at_m[0], p[1] + at_m[1], top])), k)
+        ContactPoint(0, one.place(p), on.place(np.array([p[0] + at_m[0], p[1] + at_m[1], top])), k)
         for p, k in zip(points_m, springs, strict=True)
     ]
-    if on.moving.plate_m_n_s:  # and nothing else is known of it
-        still = replace(on.moving, omega_rad_s=np.zeros(0), decay_per_s=np.zeros(0))
+    if on.mobility.plate_m_n_s:  # and nothing else is known of it
+        still = replace(on.mobility, omega_rad_s=np.zeros(0), decay_per_s=np.zeros(0))
         touches = [replace(t, other=replace(t.other, shape=np.zeros((3, 0)))) for t in touches]
-        on = replace(on, moving=still)
-    parts = one.moving, [on.moving], touches
+        on = replace(on, mobility=still)
+    parts = one.mobility, [on.mobility], touches
     s, q = eigenproblem(*parts) if eigen else (np.zeros(0), np.zeros((0, 0)))
-    return Stands(one, on, first_order(*parts), in_place(*parts), s, q)
+    return Stands(one, on, first_order(*parts), newton_modes(*parts), s, q)
 
 
-def eigenproblem(body: Moving, partners: list[Moving], touches: list[Touch]) -> tuple[Array, Array]:
+def eigenproblem(body: BodyMobility, partners: list[BodyMobility], touches: list[ContactPoint]) -> tuple[Array, Array]:
     """S and q of q̈ + 2Dq̇ + (Λ + BᵀKB)q = 0 of all bodies at once, their rigid motions among them, B = (Φ, −Φ_p)."""
     (partner,) = partners
     both = np.hstack([body.moves([t.own for t in touches]), -partner.moves([t.other for t in touches])])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eig, eigh
 
-from sonic_bullet.contact.coupling import ContactSpring, Moving, Place, Touch
+from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring
 from sonic_bullet.records import Array
 
 AXES = np.eye(3)[[2, 0, 1]]
@@ -31,12 +31,12 @@ class Bar:
         """B (2n,): what picks w of a node."""
         return np.asarray(np.eye(len(self.lam))[2 * node])
 
-    def place(self, node: int, modes: int | None = None) -> Place:
+    def place(self, node: int, modes: int | None = None) -> BodyPoint:
         shape = np.zeros((3, len(self.lam[2:][:modes])))
         shape[2] = self.shape[2 * node, 2:][:modes]
-        return Place(shape, np.array([self.x_m[node], 0.0, 0.0]), AXES)
+        return BodyPoint(shape, np.array([self.x_m[node], 0.0, 0.0]), AXES)
 
-    def moving(self, loss: float = 1e-3, modes: int | None = None) -> Moving:
+    def mobility(self, loss: float = 1e-3, modes: int | None = None) -> BodyMobility:
         """The bar free in the air, d = ηω₀/2 of each mode; modes: how many, all of them by default."""
         root = np.sqrt(self.lam[2:][:modes])
         ones = np.ones(len(self.x_m) * 2)
@@ -46,7 +46,7 @@ class Bar:
         turn[::2], turn[1::2] = self.x_m, 1
         about_y = float(turn @ self.mass @ turn)
         decay = loss * root / 2
-        return Moving(np.sqrt(root**2 - decay**2), decay, mass, np.diag([1.0, about_y, 1.0]))
+        return BodyMobility(np.sqrt(root**2 - decay**2), decay, mass, np.diag([1.0, about_y, 1.0]))
 
     def damping(self, loss: float = 1e-3) -> Array:
         """The matrix (2n, 2n) with which each mode has d = ηω₀/2."""
@@ -74,10 +74,10 @@ def bar(
     return Bar(np.linspace(-length_m / 2, length_m / 2, elements + 1), stiffness, mass, lam, shape)
 
 
-def stood(bar: Bar, nodes: tuple[int, ...], spring_n_m: complex, modes: int | None = None) -> list[Touch]:
+def stood(bar: Bar, nodes: tuple[int, ...], spring_n_m: complex, modes: int | None = None) -> list[ContactPoint]:
     """Touches of a bar at these nodes with a partner without motions of its own; they slide."""
-    nowhere = Place(np.zeros((3, 0)), np.zeros(3), AXES)
-    return [Touch(0, bar.place(node, modes), nowhere, ContactSpring(spring_n_m, 0.0)) for node in nodes]
+    nowhere = BodyPoint(np.zeros((3, 0)), np.zeros(3), AXES)
+    return [ContactPoint(0, bar.place(node, modes), nowhere, ContactSpring(spring_n_m, 0.0)) for node in nodes]
 
 
 def exact_poles(bar: Bar, node: int, spring_n_m: complex, plate_m_n_s: float) -> Array:

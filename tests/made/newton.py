@@ -20,8 +20,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from sonic_bullet.contact.coupling import InPlace, Moving, Touch, first_order
-from sonic_bullet.contact.coupling.coupled_modes import STIFFEST_RATIO, STOPPED_RATIO, Touched, touched_rows
+from sonic_bullet.contact.coupling import BodyMobility, ContactPoint, CoupledModes, first_order
+from sonic_bullet.contact.coupling.coupled_modes import STIFFEST_RATIO, STOPPED_RATIO, CoupledSystem, collect_springs
 from sonic_bullet.contact.coupling.first_order import likest
 from sonic_bullet.records import Array
 
@@ -41,19 +41,21 @@ LOST = 0.05
 """Of a new mode's motion, in the lane it is given: below this nothing of it is transmitted."""
 
 
-def in_place(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
+def newton_modes(body: BodyMobility, partners: Sequence[BodyMobility], touches: Sequence[ContactPoint]) -> CoupledModes:
     """Compute the coupled modes of a body at these touches. Without touches: its free modes."""
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
         return first_order(body, partners, touches)
-    x, row = touched_rows(body, partners, touches)
+    x, row = collect_springs(body, partners, touches)
     found = _described(x, m, partners, *poles(x, *start(x, m)))
     force = np.zeros((3 * len(touches), m))
     force[row] = found.force_n_s
     return replace(found, force_n_s=force[::3])
 
 
-def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Array, stands: Array) -> InPlace:
+def _described(
+    x: CoupledSystem, m: int, partners: Sequence[BodyMobility], s: Array, q: Array, stands: Array
+) -> CoupledModes:
     """Make the record of poles s (m,) and motions q (m, N)."""
     modes = q[:, :m]
     q = q / np.exp(0.5j * np.angle((modes * modes).sum(axis=1)))[:, None]  # rotated to be as real as possible
@@ -73,7 +75,7 @@ def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Arra
     passed = at * (force @ x.other) / (at**2 + 2 * x.other_decay * at + x.other_lam)
     passed /= 1 + (np.abs(passed) ** 2).sum(axis=1, keepdims=True)
     ends = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
-    return InPlace(
+    return CoupledModes(
         s.imag,
         decay,
         turn,
@@ -84,7 +86,7 @@ def _described(x: Touched, m: int, partners: Sequence[Moving], s: Array, q: Arra
     )
 
 
-def _shares(x: Touched, m: int, omega: Array, decay: Array, v: Array, force: Array) -> Array:
+def _shares(x: CoupledSystem, m: int, omega: Array, decay: Array, v: Array, force: Array) -> Array:
     """Split the decays (m, 3) by the mean powers Σ d|v|², ½ F* Re(jω/K) F and ½ F* Re(Y_p) F."""
     spring = 0.5 * (np.abs(force) ** 2 * (1j * omega[:, None] / x.spring).real).sum(axis=1)
     both = 0.5 * np.einsum("ki,kij,kj->k", force.conj(), inverse_w(x, 1j * omega)[0].real, force).real
@@ -94,7 +96,7 @@ def _shares(x: Touched, m: int, omega: Array, decay: Array, v: Array, force: Arr
     return np.asarray(decay[:, None] * np.where(whole > 0, power / np.where(whole > 0, whole, 1), [1.0, 0.0, 0.0]))
 
 
-def start(x: Touched, m: int) -> tuple[Array, Array]:
+def start(x: CoupledSystem, m: int) -> tuple[Array, Array]:
     """Compute s (m,) and q (m, N) of the undamped body on springs: for each old mode the new one with most of it."""
     rigid = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     both = np.hstack([x.own, -x.other[:, rigid]])
@@ -116,7 +118,7 @@ def _apart(square: Array, s: Array) -> Array:
     return np.asarray(np.where(np.abs(square) < least, least, square))
 
 
-def inverse_w(x: Touched, s: Array) -> tuple[Array, Array]:
+def inverse_w(x: CoupledSystem, s: Array) -> tuple[Array, Array]:
     """Compute W⁻¹(s) and its derivative, (k, r, r) of s (k,)."""
     at = s[:, None]
     below = _apart(at**2 + 2 * x.other_decay * at + x.other_lam, at)
@@ -128,7 +130,7 @@ def inverse_w(x: Touched, s: Array) -> tuple[Array, Array]:
     return yields, slope
 
 
-def _step(x: Touched, s: Array, q: Array) -> tuple[Array, Array]:
+def _step(x: CoupledSystem, s: Array, q: Array) -> tuple[Array, Array]:
     """Compute Newton's next s and q, of s (k,) and q (k, N)."""
     at = s[:, None]
     inverse, slope = inverse_w(x, s)
@@ -156,7 +158,7 @@ def _solved(whole: Array, right: Array) -> Array:
         return np.asarray(np.linalg.solve(whole + off, right))
 
 
-def _newton(x: Touched, start: Array, q_start: Array) -> tuple[Array, Array, Array]:
+def _newton(x: CoupledSystem, start: Array, q_start: Array) -> tuple[Array, Array, Array]:
     """Iterate s (m,), q (m, N) from each start; also return whether Newton's pole has converged."""
     s, q, moving = start.copy(), q_start.copy(), np.ones(len(start), bool)
     for _ in range(STEPS):
@@ -169,7 +171,7 @@ def _newton(x: Touched, start: Array, q_start: Array) -> tuple[Array, Array, Arr
     return s, q, ~moving & (s.imag > 0)
 
 
-def poles(x: Touched, s_start: Array, q_start: Array) -> tuple[Array, Array, Array]:
+def poles(x: CoupledSystem, s_start: Array, q_start: Array) -> tuple[Array, Array, Array]:
     """Find the poles by Newton; where they do not converge, or one is found twice, from the coupled eigenproblem."""
     s, q, stands = _newton(x, s_start, q_start)
     again = ~stands
@@ -187,7 +189,7 @@ def poles(x: Touched, s_start: Array, q_start: Array) -> tuple[Array, Array, Arr
     return np.where(stands, s, first), np.where(stands[:, None], q, q_start), stands
 
 
-def _coupled(x: Touched) -> tuple[Array, Array]:
+def _coupled(x: CoupledSystem) -> tuple[Array, Array]:
     """Find s (k,) that oscillate and q (k, N) of all bodies at once, radiation into half-spaces left out.
 
     q̈ + 2Dq̇ + Λq + Bᵀ K (Bq − p) = 0,  ṗ = y₀ K (Bq − p),  B = (Φ, −Φ_p)         [Tisseur & Meerbergen 2001, sec. 3.4]

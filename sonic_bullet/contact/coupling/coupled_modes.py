@@ -1,6 +1,6 @@
 """Coupled modes of a body in contact with others, and what it transmits to them.
 
-    Moving (body, partners) + Touch (points, springs) -> Touched -> first_order -> InPlace
+    BodyMobility (body, partners) + ContactPoint (points, springs) -> CoupledSystem -> first_order -> CoupledModes
 
 One body is solved at a time, its partners as they are free of other contacts: a body on a body on a table moves as if
 on the table's own modes alone; longer chains are not claimed.
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sonic_bullet.contact.coupling.mobility import Moving, Place
+from sonic_bullet.contact.coupling.mobility import BodyMobility, BodyPoint
 from sonic_bullet.contact.coupling.springs import ContactSpring
 from sonic_bullet.records import Array
 
@@ -29,20 +29,20 @@ STIFFEST_RATIO = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Touch:
+class ContactPoint:
     """One point at which a body touches partner number ``partner``.
 
     own, other: the point on either, or its rows of Φ; spring: of this point alone.
     """
 
     partner: int
-    own: Place | Array
-    other: Place | Array
+    own: BodyPoint | Array
+    other: BodyPoint | Array
     spring: ContactSpring
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class InPlace:
+class CoupledModes:
     """A body in contact: m modes as before, mixed.
 
     Attributes
@@ -68,7 +68,7 @@ class InPlace:
     newton: Array
 
 
-class Touched(NamedTuple):
+class CoupledSystem(NamedTuple):
     """Matrices of a body and its partners at r springs.
 
     Attributes
@@ -90,10 +90,12 @@ class Touched(NamedTuple):
     half_space: Array
 
 
-def free_modes(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> InPlace:
+def uncoupled_modes(
+    body: BodyMobility, partners: Sequence[BodyMobility], touches: Sequence[ContactPoint]
+) -> CoupledModes:
     """Return a body's modes as they are without contacts."""
     m = len(body.omega_rad_s)
-    return InPlace(
+    return CoupledModes(
         body.omega_rad_s,
         body.decay_per_s,
         np.eye(m),
@@ -104,7 +106,9 @@ def free_modes(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch
     )
 
 
-def touched_rows(body: Moving, partners: Sequence[Moving], touches: Sequence[Touch]) -> tuple[Touched, Array]:
+def collect_springs(
+    body: BodyMobility, partners: Sequence[BodyMobility], touches: Sequence[ContactPoint]
+) -> tuple[CoupledSystem, Array]:
     """Collect all springs of all touches, and which of their (3c,) directions those are.
 
     A sliding touch has no tangential one.
@@ -120,7 +124,7 @@ def touched_rows(body: Moving, partners: Sequence[Moving], touches: Sequence[Tou
             other[here, begin[p] : begin[p + 1]] = partner.moves([touches[i].other for i in at.tolist()])
     spring = np.array([(t.spring.normal_n_m, *2 * (t.spring.tangential_n_m,)) for t in touches], complex).ravel()
     row = np.flatnonzero(spring)
-    made = Touched(
+    made = CoupledSystem(
         own[row],
         other[row],
         spring[row],

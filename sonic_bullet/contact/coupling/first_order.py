@@ -22,18 +22,18 @@ import numpy as np
 from sonic_bullet.contact.coupling.coupled_modes import (
     STIFFEST_RATIO,
     STOPPED_RATIO,
-    InPlace,
-    Touch,
-    free_modes,
-    touched_rows,
+    ContactPoint,
+    CoupledModes,
+    collect_springs,
+    uncoupled_modes,
 )
-from sonic_bullet.contact.coupling.mobility import Moving
+from sonic_bullet.contact.coupling.mobility import BodyMobility
 from sonic_bullet.records import Array
 
 
 def first_order(
-    body: Moving, partners: Sequence[Moving], touches: Sequence[Touch], before: Array | None = None
-) -> InPlace:
+    body: BodyMobility, partners: Sequence[BodyMobility], touches: Sequence[ContactPoint], before: Array | None = None
+) -> CoupledModes:
     """Compute the coupled modes of a body at these touches; without touches, its free modes.
 
     `turn` turns the pairs of one frequency, and they alone, to the contact's axes.
@@ -49,8 +49,8 @@ def first_order(
     """
     m = len(body.omega_rad_s)
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
-        return free_modes(body, partners, touches)
-    x, row = touched_rows(body, partners, touches)
+        return uncoupled_modes(body, partners, touches)
+    x, row = collect_springs(body, partners, touches)
     light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
     yields = np.flatnonzero(x.other_lam > 0)
     modes = x.other[:, yields]
@@ -99,7 +99,7 @@ def first_order(
     power[:, 1:] *= (np.abs(part) ** 2 / np.maximum(2 * omega, 1e-300))[:, None]
     power = np.maximum(power, 0.0)
     whole = np.maximum(power.sum(axis=1, keepdims=True), 1e-300)
-    return InPlace(
+    return CoupledModes(
         new.imag,
         decay,
         turn,

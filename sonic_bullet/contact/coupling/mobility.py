@@ -20,7 +20,7 @@ a round body by less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moving:
+class BodyMobility:
     """Data of a body's mobility.
 
     Attributes
@@ -55,12 +55,12 @@ class Moving:
         object.__setattr__(self, "lam", np.append(self.omega_rad_s**2 + self.decay_per_s**2, np.zeros(6)))
         object.__setattr__(self, "decay", np.append(self.decay_per_s, np.zeros(6)))
 
-    def moves(self, places: Sequence[Place | Array]) -> Array:
+    def moves(self, places: Sequence[BodyPoint | Array]) -> Array:
         """Compute Φ (3c, m + 6): motion along each place's axes of each mode and rigid motion; 0 where it has none.
 
         places: or, where they are known, these rows (3, m + 6) themselves.
         """
-        points = [one for one in places if isinstance(one, Place)]
+        points = [one for one in places if isinstance(one, BodyPoint)]
         if not points:
             return np.concatenate([np.asarray(one) for one in places])
         rigid = np.zeros((len(points), 3, 6))
@@ -75,7 +75,7 @@ class Moving:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class BodyPoint:
     """A point of a body, in its frame.
 
     Attributes

@@ -2,7 +2,7 @@
 
     n, t₁, t₂ of the patch -> axes of either body's frame;   Φ = (axes · Σ_c w_c φ_c,  axes · (1/√M, (r ×) J^{−1/2}))
 
-The rows of `coupling.Moving.moves`, from the run time's tables: one call a pair, since new poles come while it sounds.
+Rows of `BodyMobility.moves`, from the run time's tables: one call a pair, since new poles come while it sounds.
 """
 # mypy: disable-error-code="no-untyped-def"
 

@@ -24,14 +24,14 @@ from sonic_bullet import bank
 from sonic_bullet.bank.resonator import Resonator
 from sonic_bullet.contact.contact_place import FLAT_CURVATURE, SIZELESS_M
 from sonic_bullet.contact.coupling import (
+    ContactPoint,
     ContactSpring,
-    InPlace,
+    CoupledModes,
     Region,
-    Touch,
     contact_spring,
     first_order,
 )
-from sonic_bullet.contact.coupling.mobility import Moving
+from sonic_bullet.contact.coupling.mobility import BodyMobility
 from sonic_bullet.contact.coupling.springs import ContactSide
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.contact.strike_pulses import STRUCK_FLAT
@@ -69,9 +69,9 @@ def prepare_supports(state: State) -> None:
     """Load, or compile, what the first resting contact would wait for, of a body with one mode on one spring."""
     make_ready()
     bank.prepare_poles(state.ringing)
-    body, side = Moving(np.ones(1), np.zeros(1)), ContactSide(1.0, 0.3, 0.0, 0.0)
+    body, side = BodyMobility(np.ones(1), np.zeros(1)), ContactSide(1.0, 0.3, 0.0, 0.0)
     spring = contact_spring(Region((1.0, 1.0), (0.0, 0.0)), (side, side), 1.0)
-    first_order(body, [body], [Touch(0, np.ones((3, 7)), np.zeros((3, 7)), spring)])
+    first_order(body, [body], [ContactPoint(0, np.ones((3, 7)), np.zeros((3, 7)), spring)])
     _blas()
 
 
@@ -84,14 +84,15 @@ def update_poles(state: State, number: int) -> None:
             _update_body(state, b, state.window.quaternion_xyzw[number % SPAN])
 
 
-def couple_body(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array, InPlace]:
+def couple_body(state: State, b: int, quaternion: Array) -> tuple[list[int], list[ContactPoint], Array, CoupledModes]:
     """Compute a body's partners, its touches, the load (c,) on each, and its coupled modes.
 
     quaternion (b, 4): all bodies'.
     """
     partners, touches, load_n = _touches(state, b, quaternion)
-    moving = [state.resonators[p].moving for p in partners]
-    return partners, touches, load_n, first_order(state.resonators[b].moving, moving, touches, state.table.turn_of(b))
+    mobility = [state.resonators[p].mobility for p in partners]
+    modes = first_order(state.resonators[b].mobility, mobility, touches, state.table.turn_of(b))
+    return partners, touches, load_n, modes
 
 
 def _update_body(state: State, b: int, quaternion: Array) -> None:
@@ -129,7 +130,9 @@ def _audible(new: Array, free: Array) -> Array:
     return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
 
 
-def _passed(state: State, b: int, partners: list[int], placed: InPlace, columns: int) -> Iterator[tuple[int, Array]]:
+def _passed(
+    state: State, b: int, partners: list[int], placed: CoupledModes, columns: int
+) -> Iterator[tuple[int, Array]]:
     """Yield weights (W, columns) of the transmission to each audible partner.
 
     Audible: more than LEAST_PASSED of the body's own sound in some mode, of those within FAINTEST of its loudest, both
@@ -157,7 +160,7 @@ def passed_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
     return weight
 
 
-def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[Touch], Array]:
+def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[ContactPoint], Array]:
     """Return a body's partners, its touches, and the load on each (c,)."""
     partners: list[int] = []
     touches, loads = [], []
@@ -172,12 +175,12 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[T
             partners.append(other)
         if not sum(state.resonators[one].side.compliance_per_pa for one in both):
             continue  # both rigid: their materials are unknown
-        turns = np.stack([state.resonators[one].moving.turn for one in both])
+        turns = np.stack([state.resonators[one].mobility.turn for one in both])
         placed = placed_points(state.table, quaternion, patch, pairs.pair["body"][slot], turns)
         own, there = placed.moves[side], placed.moves[1 - side]
         load = patch["load_n"][: patch["count"]]
         for i, spring in enumerate(_springs(state, both, patch, placed.curvature_per_m, placed.off_m, load)):
-            touches.append(Touch(partners.index(other), own[i], there[i], spring))
+            touches.append(ContactPoint(partners.index(other), own[i], there[i], spring))
             loads.append(load[i])
     return partners, touches, np.array(loads)
 

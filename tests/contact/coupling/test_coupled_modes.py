@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, null_space
 
-from sonic_bullet.contact.coupling import ContactSpring, InPlace, Moving, Place, Touch
+from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring, CoupledModes
 from sonic_bullet.records import Array
 from tests.made.bars import AXES, Bar, bar, exact_poles, stood
-from tests.made.newton import in_place
+from tests.made.newton import newton_modes
 
-NOTHING = Moving(np.zeros(0), np.zeros(0))
+NOTHING = BodyMobility(np.zeros(0), np.zeros(0))
 STRENGTHS = np.geomspace(1e1, 1e10, 10)  # N/m: from 1e-5 of the first mode's own stiffness to a wall
 
 
@@ -20,7 +20,7 @@ def steel() -> Bar:
     return bar()
 
 
-def poles_of(found: InPlace) -> Array:
+def poles_of(found: CoupledModes) -> Array:
     return -found.decay_per_s + 1j * found.omega_rad_s
 
 
@@ -30,8 +30,10 @@ def test_a_spring_and_a_dashpot_at_a_point(steel: Bar, node: int, plate_m_n_s: f
     """A spring with loss, a dashpot behind it: the exact complex eigenvalues, each once, at any strength."""
     compared = 0
     for k in STRENGTHS * (1 + 0.02j):
-        found = in_place(
-            steel.moving(), [Moving(np.zeros(0), np.zeros(0), plate_m_n_s=plate_m_n_s)], stood(steel, (node,), k)
+        found = newton_modes(
+            steel.mobility(),
+            [BodyMobility(np.zeros(0), np.zeros(0), plate_m_n_s=plate_m_n_s)],
+            stood(steel, (node,), k),
         )
         want, got = exact_poles(steel, node, k, plate_m_n_s), poles_of(found)[found.newton]
         off = np.abs(got[:, None] - want) / np.abs(got)[:, None]
@@ -42,25 +44,25 @@ def test_a_spring_and_a_dashpot_at_a_point(steel: Bar, node: int, plate_m_n_s: f
 
 
 def test_no_strength_is_free(steel: Bar) -> None:
-    body = steel.moving()
-    found = in_place(body, [NOTHING], stood(steel, (0, 5), 1e-6 * (1 + 0.1j)))
+    body = steel.mobility()
+    found = newton_modes(body, [NOTHING], stood(steel, (0, 5), 1e-6 * (1 + 0.1j)))
     np.testing.assert_allclose(found.omega_rad_s, body.omega_rad_s, rtol=1e-9)
     np.testing.assert_allclose(found.decay_per_s, body.decay_per_s, rtol=1e-6)
     np.testing.assert_allclose(found.turn, np.eye(len(found.turn)), atol=1e-6)
 
 
 def test_without_touches_nothing_changes(steel: Bar) -> None:
-    body = steel.moving()
-    found = in_place(body, [], [])
-    assert np.array_equal(poles_of(found), poles_of(in_place(body, [NOTHING], stood(steel, (0,), 0.0))))
+    body = steel.mobility()
+    found = newton_modes(body, [], [])
+    assert np.array_equal(poles_of(found), poles_of(newton_modes(body, [NOTHING], stood(steel, (0,), 0.0))))
     assert np.array_equal(found.omega_rad_s, body.omega_rad_s) and np.array_equal(found.turn, np.eye(len(found.turn)))
 
 
 def test_a_wall_constrains(steel: Bar) -> None:
     """K -> ∞: the modes in the null space of BΦ; with all of them, the elements with that node held."""
-    body = steel.moving(loss=0.0)
+    body = steel.mobility(loss=0.0)
     touches = stood(steel, (3,), 1e16)
-    found = in_place(body, [NOTHING], touches)
+    found = newton_modes(body, [NOTHING], touches)
     motions = body.moves([touches[0].own])[:1]
     basis = null_space(motions)
     held = eigh(basis.T @ np.diag(body.lam) @ basis, eigvals_only=True)
@@ -78,7 +80,7 @@ def test_more_modes_come_nearer_to_the_held_node(steel: Bar) -> None:
     want = np.sqrt(eigh(steel.stiffness[np.ix_(free, free)], steel.mass[np.ix_(free, free)], eigvals_only=True)[1:3])
     off = []
     for modes in (4, 6, 8, 12, 16):
-        found = in_place(steel.moving(0.0, modes), [NOTHING], stood(steel, (3,), 1e14, modes))
+        found = newton_modes(steel.mobility(0.0, modes), [NOTHING], stood(steel, (3,), 1e14, modes))
         got = found.omega_rad_s[found.newton]
         off.append(np.abs(got[:, None] / want - 1).min(axis=0).max())
     assert (np.diff(off) < 0).all() and off[-1] < 1e-5 < off[0]
@@ -86,27 +88,27 @@ def test_more_modes_come_nearer_to_the_held_node(steel: Bar) -> None:
 
 def pair(rng: np.random.Generator, ours: int, theirs: int, spring_n_m: complex, touches: int = 1, mass: float = 0.5):
     """Two free bodies of random modes, and the touches between them as either sees them."""
-    moving = []
+    mobility = []
     for count, kg in ((ours, 0.2), (theirs, mass)):
         root = np.sort(rng.uniform(500, 5e4, count))
-        moving.append(Moving(root, rng.uniform(1e-4, 1e-2, count) * root, kg, kg * 1e-3 * np.diag([1, 2, 2.5])))
+        mobility.append(BodyMobility(root, rng.uniform(1e-4, 1e-2, count) * root, kg, kg * 1e-3 * np.diag([1, 2, 2.5])))
     there, back = [], []
     for _ in range(touches):
         spot = [
-            Place(rng.normal(size=(3, count)) / np.sqrt(kg), rng.normal(size=3) * 0.05, AXES)
+            BodyPoint(rng.normal(size=(3, count)) / np.sqrt(kg), rng.normal(size=3) * 0.05, AXES)
             for count, kg in ((ours, 0.2), (theirs, mass))
         ]
         spring = ContactSpring(spring_n_m, 0.8 * spring_n_m)
-        there.append(Touch(0, spot[0], spot[1], spring))
-        back.append(Touch(0, spot[1], spot[0], spring))
-    return moving, there, back
+        there.append(ContactPoint(0, spot[0], spot[1], spring))
+        back.append(ContactPoint(0, spot[1], spot[0], spring))
+    return mobility, there, back
 
 
 @pytest.mark.parametrize("k", [1e3, 1e5, 1e7])
 def test_two_bodies_at_once(k: float) -> None:
     """Poles and what passes against the eigenproblem of both, in their modes and rigid motions."""
     (a, b), there, _ = pair(np.random.default_rng(3), 5, 4, k * (1 + 0.03j), touches=2)
-    found = in_place(a, [b], there)
+    found = newton_modes(a, [b], there)
     both = np.hstack([a.moves([t.own for t in there]), -b.moves([t.other for t in there])])
     spring = np.array([[t.spring.normal_n_m, *2 * [t.spring.tangential_n_m]] for t in there]).ravel()
     lam, decay = np.append(a.lam, b.lam), np.append(a.decay, b.decay)
@@ -134,8 +136,8 @@ def test_what_passes_is_reciprocal() -> None:
     off = []
     for k in (1.0, 10.0, 100.0):
         (a, b), there, back = pair(np.random.default_rng(5), 4, 3, k)
-        a, b = (Moving(x.omega_rad_s, 0 * x.decay_per_s, x.mass_kg, x.inertia_kg_m2) for x in (a, b))
-        one, other = in_place(a, [b], there).passes[0], in_place(b, [a], back).passes[0]
+        a, b = (BodyMobility(x.omega_rad_s, 0 * x.decay_per_s, x.mass_kg, x.inertia_kg_m2) for x in (a, b))
+        one, other = newton_modes(a, [b], there).passes[0], newton_modes(b, [a], back).passes[0]
         assert np.abs(one).min() > 0
         off.append(np.abs(one / other.T + 1).max())
     assert off[0] < 1e-4
@@ -145,17 +147,19 @@ def test_what_passes_is_reciprocal() -> None:
 def test_two_of_one_frequency_share_by_halves() -> None:
     """Equal oscillators on a weak spring move alike and against each other: half of one's sound is the other's."""
     root, shape = np.array([6000.0]), np.array([[0.0], [0.0], [1.0]])
-    body = Moving(root, np.zeros(1))
-    spot = Place(shape, np.zeros(3), AXES)
-    found = in_place(body, [body], [Touch(0, spot, spot, ContactSpring(1e3, 0.0))])
+    body = BodyMobility(root, np.zeros(1))
+    spot = BodyPoint(shape, np.zeros(3), AXES)
+    found = newton_modes(body, [body], [ContactPoint(0, spot, spot, ContactSpring(1e3, 0.0))])
     np.testing.assert_allclose(np.abs(found.passes[0]), 0.5, rtol=1e-9)
 
 
 def test_a_touch_of_more_force_than_load() -> None:
     """force_n_s: a mode's velocity on a spring against a wall, F = K φ z/ω."""
     root, shape = np.array([6000.0]), np.array([[0.0], [0.0], [3.0]])
-    spot, wall = Place(shape, np.zeros(3), AXES), Place(np.zeros((3, 0)), np.zeros(3), AXES)
-    found = in_place(Moving(root, np.zeros(1)), [NOTHING], [Touch(0, spot, wall, ContactSpring(1e5, 0.0))])
+    spot, wall = BodyPoint(shape, np.zeros(3), AXES), BodyPoint(np.zeros((3, 0)), np.zeros(3), AXES)
+    found = newton_modes(
+        BodyMobility(root, np.zeros(1)), [NOTHING], [ContactPoint(0, spot, wall, ContactSpring(1e5, 0.0))]
+    )
     assert found.omega_rad_s[0] == pytest.approx(np.sqrt(6000.0**2 + 9 * 1e5), rel=1e-12)
     assert found.force_n_s[0, 0] == pytest.approx(3 * 1e5 / found.omega_rad_s[0], rel=1e-12)
 
@@ -163,11 +167,11 @@ def test_a_touch_of_more_force_than_load() -> None:
 def test_equal_frequencies_part_as_the_touch_wants() -> None:
     """Of a pair at one frequency, the combination with its node at the touch stays free, the other takes all loss."""
     angle = 0.7
-    body = Moving(np.full(2, 5000.0), np.full(2, 1.0))
+    body = BodyMobility(np.full(2, 5000.0), np.full(2, 1.0))
     shape = np.zeros((3, 2))
     shape[2] = 2 * np.cos(angle), 2 * np.sin(angle)
-    spot, wall = Place(shape, np.zeros(3), AXES), Place(np.zeros((3, 0)), np.zeros(3), AXES)
-    found = in_place(body, [NOTHING], [Touch(0, spot, wall, ContactSpring(1e4 * (1 + 0.1j), 0.0))])
+    spot, wall = BodyPoint(shape, np.zeros(3), AXES), BodyPoint(np.zeros((3, 0)), np.zeros(3), AXES)
+    found = newton_modes(body, [NOTHING], [ContactPoint(0, spot, wall, ContactSpring(1e4 * (1 + 0.1j), 0.0))])
     still, moved = np.argsort(found.decay_per_s)
     assert found.decay_per_s[still] == pytest.approx(1.0, rel=1e-9)
     assert found.omega_rad_s[still] == pytest.approx(5000.0, rel=1e-9)
@@ -178,12 +182,12 @@ def test_equal_frequencies_part_as_the_touch_wants() -> None:
 def test_energy_never_grows_whatever_comes_and_goes() -> None:
     """10 000 changes among random touches of random partners: ½|z|² after each, decays between them."""
     rng = np.random.default_rng(0)
-    moving, _, _ = pair(rng, 6, 3, 1.0)
-    body, states = moving[0], []
+    mobility, _, _ = pair(rng, 6, 3, 1.0)
+    body, states = mobility[0], []
     for _ in range(150):
         k = 10 ** rng.uniform(1, 9) * (1 + 10 ** rng.uniform(-4, 0) * 1j)
         (_, partner), there, _ = pair(rng, 6, 3, k, int(rng.integers(1, 5)), 10 ** rng.uniform(-2, 2))
-        states.append(in_place(body, [partner], there))
+        states.append(newton_modes(body, [partner], there))
     assert all((one.decay_per_s >= 0).all() and (one.shares >= 0).all() for one in states)
     turns = np.array([np.eye(6), *(one.turn for one in states)])
     decays = np.array([np.zeros(6), *(one.decay_per_s for one in states)])

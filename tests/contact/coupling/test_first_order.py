@@ -7,32 +7,34 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.contact.coupling import ContactSpring, Moving, Place, Touch, first_order
+from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring, first_order
 from sonic_bullet.contact.coupling.first_order import likest
 from sonic_bullet.records import Array
-from tests.made.newton import in_place
+from tests.made.newton import newton_modes
 
 
-def body(rng: np.random.Generator, modes: int, mass_kg: float, lowest_hz: float) -> Moving:
+def body(rng: np.random.Generator, modes: int, mass_kg: float, lowest_hz: float) -> BodyMobility:
     """A body of some modes whose spacing is that of a plate's, near enough: even."""
     omega = 2 * np.pi * lowest_hz * (1 + np.arange(modes) + rng.uniform(-0.2, 0.2, modes))
     inertia = mass_kg * np.diag(rng.uniform(1e-4, 1e-3, 3))
-    return Moving(omega, rng.uniform(1, 20, modes), mass_kg, inertia)
+    return BodyMobility(omega, rng.uniform(1, 20, modes), mass_kg, inertia)
 
 
-def place(rng: np.random.Generator, one: Moving) -> Place:
+def place(rng: np.random.Generator, one: BodyMobility) -> BodyPoint:
     size = 1 / np.sqrt(one.mass_kg) if one.mass_kg > 0 else 0.5
     shape = size * rng.normal(size=(3, len(one.omega_rad_s)))
-    return Place(shape, rng.uniform(-0.05, 0.05, 3), np.eye(3))
+    return BodyPoint(shape, rng.uniform(-0.05, 0.05, 3), np.eye(3))
 
 
-def scene(seed: int, spring_n_m: complex, modes: int = 16) -> tuple[Moving, list[Moving], list[Touch]]:
+def scene(
+    seed: int, spring_n_m: complex, modes: int = 16
+) -> tuple[BodyMobility, list[BodyMobility], list[ContactPoint]]:
     """A body of 0.2 kg on three points of a board that does not move as a whole, and one of a light partner."""
     rng = np.random.default_rng(seed)
     one = body(rng, modes, 0.2, 900.0)
     partners = [body(rng, 24, 0.0, 120.0), body(rng, 5, 0.1, 2300.0)]
     spring = ContactSpring(spring_n_m, 0.8 * spring_n_m)
-    touches = [Touch(p, place(rng, one), place(rng, partners[p]), spring) for p in (0, 0, 0, 1)]
+    touches = [ContactPoint(p, place(rng, one), place(rng, partners[p]), spring) for p in (0, 0, 0, 1)]
     return one, partners, touches
 
 
@@ -40,7 +42,7 @@ def test_it_is_near_the_exact_poles_where_contacts_are_as_stiff_as_contacts_are(
     """Over 20 draws: three quarters of the decays within 1 %, nine tenths of the frequencies within 0.1 %."""
     decay, omega = [], []
     for seed in range(20):
-        found, exact = (solve(*scene(seed, 3e5 * (1 + 0.03j))) for solve in (first_order, in_place))
+        found, exact = (solve(*scene(seed, 3e5 * (1 + 0.03j))) for solve in (first_order, newton_modes))
         kept = exact.newton & found.newton
         assert kept.mean() > 0.6
         decay.append(found.decay_per_s[kept] / exact.decay_per_s[kept])
@@ -74,10 +76,10 @@ def test_reciprocity_of_what_passes() -> None:
     other are the same both ways; far from each other's frequency the velocities go as 1/(λ − ω²).
     """
     rng = np.random.default_rng(3)
-    one, other = Moving(np.array([3e3]), np.array([1.0])), Moving(np.array([9e3]), np.array([2.0]))
+    one, other = BodyMobility(np.array([3e3]), np.array([1.0])), BodyMobility(np.array([9e3]), np.array([2.0]))
     spring, a, b = ContactSpring(2e3 + 0j, 1e3 + 0j), place(rng, one), place(rng, other)
-    there = first_order(one, [other], [Touch(0, a, b, spring)]).passes[0][0, 0]
-    back = first_order(other, [one], [Touch(0, b, a, spring)]).passes[0][0, 0]
+    there = first_order(one, [other], [ContactPoint(0, a, b, spring)]).passes[0][0, 0]
+    back = first_order(other, [one], [ContactPoint(0, b, a, spring)]).passes[0][0, 0]
     assert there * (9e3**2 - 3e3**2) == pytest.approx(back * (3e3**2 - 9e3**2), rel=0.02)
 
 
@@ -94,12 +96,12 @@ def test_what_passes_is_reciprocal_mode_by_mode() -> None:
     for stiff in (1.0, 10.0, 100.0):
         rng = np.random.default_rng(5)
         a, b = (
-            Moving(np.sort(rng.uniform(500, 5e4, n)), np.zeros(n), kg, 1e-3 * np.eye(3))
+            BodyMobility(np.sort(rng.uniform(500, 5e4, n)), np.zeros(n), kg, 1e-3 * np.eye(3))
             for n, kg in ((4, 0.2), (3, 0.5))
         )
         spring, own, other = ContactSpring(stiff + 0j, stiff + 0j), place(rng, a), place(rng, b)
-        there = first_order(a, [b], [Touch(0, own, other, spring)]).passes[0]
-        back = first_order(b, [a], [Touch(0, other, own, spring)]).passes[0]
+        there = first_order(a, [b], [ContactPoint(0, own, other, spring)]).passes[0]
+        back = first_order(b, [a], [ContactPoint(0, other, own, spring)]).passes[0]
         off.append(np.abs(there / back.T + 1).max())
     assert off[0] < 1e-3
     assert np.diff(np.log10(off)) == pytest.approx([1.0, 1.0], abs=0.1)
@@ -113,11 +115,11 @@ def test_a_foot_on_a_board_that_resonates() -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)
         fork, board = body(rng, 8, 0.1, 430.0), body(rng, 60, 0.0, 60.0)
-        fork = Moving(fork.omega_rad_s, np.full(8, 0.1), fork.mass_kg, fork.inertia_kg_m2)
-        board = Moving(board.omega_rad_s, 0.015 * board.omega_rad_s)
-        small = Place(0.005 * rng.normal(size=(3, 8)) / np.sqrt(0.025), np.array([0, 0, -0.085]), np.eye(3))
-        touch = Touch(0, small, place(rng, board), ContactSpring(1.9e6 * (1 + 0.02j), 0j))
-        fast, exact = (solve(fork, [board], [touch]).decay_per_s[0] for solve in (first_order, in_place))
+        fork = BodyMobility(fork.omega_rad_s, np.full(8, 0.1), fork.mass_kg, fork.inertia_kg_m2)
+        board = BodyMobility(board.omega_rad_s, 0.015 * board.omega_rad_s)
+        small = BodyPoint(0.005 * rng.normal(size=(3, 8)) / np.sqrt(0.025), np.array([0, 0, -0.085]), np.eye(3))
+        touch = ContactPoint(0, small, place(rng, board), ContactSpring(1.9e6 * (1 + 0.02j), 0j))
+        fast, exact = (solve(fork, [board], [touch]).decay_per_s[0] for solve in (first_order, newton_modes))
         found.append((fast - fork.decay_per_s[0]) / (exact - fork.decay_per_s[0]))
     assert found == pytest.approx(np.ones(20), abs=0.01)
 
@@ -125,18 +127,18 @@ def test_a_foot_on_a_board_that_resonates() -> None:
 @pytest.mark.parametrize(("plate", "half_space"), [(1e-3, 0.0), (0.0, 3e-12)])
 def test_what_lies_under_a_contact_and_has_neither_modes_nor_mass(plate: float, half_space: float) -> None:
     """A mode on a spring on a wide plate or a half-space: the root of s² + 2ds + λ + φ²s/(s/K + y₀ − y₂s²) = 0."""
-    one, spring, shape = Moving(np.array([9e3]), np.array([3.0])), 4e4 * (1 + 0.01j), 8.0
-    under = Moving(np.zeros(0), np.zeros(0), plate_m_n_s=plate, half_space_m_s_n=half_space)
-    touch = Touch(
+    one, spring, shape = BodyMobility(np.array([9e3]), np.array([3.0])), 4e4 * (1 + 0.01j), 8.0
+    under = BodyMobility(np.zeros(0), np.zeros(0), plate_m_n_s=plate, half_space_m_s_n=half_space)
+    touch = ContactPoint(
         0,
-        Place(np.array([[shape], [0.0], [0.0]]), np.zeros(3), np.eye(3)),
-        Place(np.zeros((3, 0)), np.zeros(3), np.eye(3)),
+        BodyPoint(np.array([[shape], [0.0], [0.0]]), np.zeros(3), np.eye(3)),
+        BodyPoint(np.zeros((3, 0)), np.zeros(3), np.eye(3)),
         ContactSpring(spring, 0j),
     )
     free = np.array([1, 2 * 3.0, 9e3**2 + 3.0**2])
     root = np.roots(np.polyadd(np.polymul(free, [-half_space, 1 / spring, plate]), [shape**2, 0]))
     exact = root[np.abs(root - 9e3j).argmin()]
-    newton, runs = in_place(one, [under], [touch]), first_order(one, [under], [touch])
+    newton, runs = newton_modes(one, [under], [touch]), first_order(one, [under], [touch])
     assert -newton.decay_per_s[0] + 1j * newton.omega_rad_s[0] == pytest.approx(exact, rel=1e-9)
     assert runs.decay_per_s[0] == pytest.approx(-exact.real, rel=0.01)
     assert -exact.real > 3.1
@@ -145,14 +147,16 @@ def test_what_lies_under_a_contact_and_has_neither_modes_nor_mass(plate: float, 
 def test_what_twins_pass_on_does_not_hang_on_the_choice_of_their_basis() -> None:
     """Two modes of one frequency and a third: told in a basis turned by an angle, the same turned by that angle."""
     rng = np.random.default_rng(8)
-    one = Moving(np.array([3e3, 3e3, 9e3]), np.array([2.0, 2.0, 5.0]))
+    one = BodyMobility(np.array([3e3, 3e3, 9e3]), np.array([2.0, 2.0, 5.0]))
     on, spring = body(rng, 12, 0.0, 200.0), ContactSpring(2e3 * (1 + 0.02j), 1e3 + 0j)
     places = [(place(rng, one), place(rng, on)) for _ in range(3)]
     angle = 0.7
     turn = np.eye(3)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     told, turned = (
-        first_order(one, [on], [Touch(0, Place(a.shape @ by, a.arm_m, a.axes), b, spring) for a, b in places])
+        first_order(
+            one, [on], [ContactPoint(0, BodyPoint(a.shape @ by, a.arm_m, a.axes), b, spring) for a, b in places]
+        )
         for by in (np.eye(3), turn)
     )
     told_free, turned_free = (found.passes[0] @ found.turn.T for found in (told, turned))
@@ -163,9 +167,9 @@ def test_what_twins_pass_on_does_not_hang_on_the_choice_of_their_basis() -> None
 def test_which_two_modes_a_pair_is_of_does_not_count(angle: float) -> None:
     """Poles and turned shapes are the same whatever the angle of the free pair, but for order and sign."""
     rng = np.random.default_rng(8)
-    one = Moving(np.array([3e3, 3e3, 7e3, 9e3]), np.full(4, 2.0), 0.4, np.diag([2e-4, 3e-4, 4e-4]))
+    one = BodyMobility(np.array([3e3, 3e3, 7e3, 9e3]), np.full(4, 2.0), 0.4, np.diag([2e-4, 3e-4, 4e-4]))
     other = body(rng, 12, 0.0, 120.0)
-    touches = [Touch(0, place(rng, one), place(rng, other), ContactSpring(4e5 + 2e4j, 0j))]
+    touches = [ContactPoint(0, place(rng, one), place(rng, other), ContactSpring(4e5 + 2e4j, 0j))]
     mix = np.eye(4)
     mix[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     found = []
