@@ -44,7 +44,7 @@ from sonic_bullet.storage.json_text import json_bytes
 from sonic_bullet.storage.reading import reading
 from sonic_bullet.storage.typed_json import decode_json
 
-FORMAT = "sonic-bullet-preset/1"
+PRESET_FORMAT = "sonic-bullet-preset/1"
 FOLDER = Path(__file__).parent / "materials"
 RECORDED_FOLDER = FOLDER / "recorded"
 MADE_FOLDER = FOLDER / "made"
@@ -221,9 +221,9 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
         if len(content) > bytes_max:
             raise MaterialError(f"preset {path} is over 1 MiB", "give a preset file")
         preset = decode_json(content, Preset, f"preset {path}", MaterialError, remedy)
-        if preset.format != FORMAT:
+        if preset.format != PRESET_FORMAT:
             raise MaterialError(
-                f"preset {path} has format '{preset.format}', wanted '{FORMAT}'",
+                f"preset {path} has format '{preset.format}', wanted '{PRESET_FORMAT}'",
                 "use a sonic_bullet that knows that format",
             )
         return preset

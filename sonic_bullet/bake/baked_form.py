@@ -18,7 +18,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.residual.code import ResidualForm, form_of, residual_of
 
-FORMAT = "sonic-bullet-baked/1"
+BAKED_FORMAT = "sonic-bullet-baked/1"
 
 Triple = tuple[float, float, float]
 Corners = tuple[int, int, int]
@@ -101,7 +101,7 @@ class BakedFile(_Part, frozen=True):
 
 
 ABOUT: dict[str, dict[str, str]] = {
-    "BakedFile": {"format": f"`{FORMAT}`", "bodies": "at least one"},
+    "BakedFile": {"format": f"`{BAKED_FORMAT}`", "bodies": "at least one"},
     "BodyForm": {
         "name": "the mesh's or the body's",
         "modes": "m of them",
@@ -218,4 +218,4 @@ def baked_schema() -> dict[str, Any]:
         properties = schema["$defs"][name]["properties"]
         for field, part in properties.items():
             part["description"] = about[field]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": FORMAT, **schema}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": BAKED_FORMAT, **schema}

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.bake.baked_form import FORMAT, ExtrasForm, common_form
+from sonic_bullet.bake.baked_form import BAKED_FORMAT, ExtrasForm, common_form
 from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties
 from sonic_bullet.files.gltf.gltf_writer import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GltfBuffer
 from sonic_bullet.session.gltf_in.own_words import EXTRAS, OwnSurface, finish_entry
@@ -110,7 +110,7 @@ class GltfAudio:
             primitive = {"attributes": {"POSITION": positions}, "indices": entry["indices"]}
         if model.mass is not None:
             entry["massProperties"] = mass_entry(model.mass)
-        entry["extras"] = {EXTRAS: ExtrasForm(format=FORMAT, **common_form(model))}
+        entry["extras"] = {EXTRAS: ExtrasForm(format=BAKED_FORMAT, **common_form(model))}
         return entry, primitive
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from sonic_bullet.bake.baked_form import FORMAT, ExtrasForm, model_of
+from sonic_bullet.bake.baked_form import BAKED_FORMAT, ExtrasForm, model_of
 from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties
 from sonic_bullet.bake.gltf_audio import BULK, EXTENSION, GltfAudio
 from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_values
@@ -100,7 +100,7 @@ def _extras(entry: Mapping[str, Any], freq_hz: Array, decay_per_s: Array, name: 
         form = msgspec.convert(said, ExtrasForm)
     except msgspec.ValidationError as error:
         raise FileError(f"{name}: extras.{EXTRAS}: {error}", "bake it again, or remove that field") from error
-    if form.format != FORMAT:
+    if form.format != BAKED_FORMAT:
         return None
     same = all(
         len(ours) == len(theirs) and np.array_equal(np.array(ours, np.float32), theirs.astype(np.float32))

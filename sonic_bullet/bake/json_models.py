@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.bake.baked_form import FORMAT, BakedFile, BodyForm, common_form, model_of
+from sonic_bullet.bake.baked_form import BAKED_FORMAT, BakedFile, BodyForm, common_form, model_of
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
@@ -32,7 +32,7 @@ def write_json_models(path: str | os.PathLike[str], models: Sequence[BakedModel]
         for model in models
     ]
     with replacing(path) as file:
-        file.write(json_bytes(BakedFile(format=FORMAT, bodies=bodies)) + b"\n")
+        file.write(json_bytes(BakedFile(format=BAKED_FORMAT, bodies=bodies)) + b"\n")
 
 
 def _shortest(values: Array) -> Array:
@@ -47,8 +47,8 @@ def read_json_models(path: str | os.PathLike[str]) -> tuple[BakedModel, ...]:
     if place.stat().st_size > largest_bytes:
         raise FileError(f"{path} is larger than a gigabyte", "bake fewer modes or points")
     form = decode_json(place.read_bytes(), BakedFile, f"baked model {path}", FileError, BAKED_REMEDY)
-    if form.format != FORMAT:
-        raise FileError(f"{path} has format '{form.format}', wanted '{FORMAT}'", "bake it again")
+    if form.format != BAKED_FORMAT:
+        raise FileError(f"{path} has format '{form.format}', wanted '{BAKED_FORMAT}'", "bake it again")
     return tuple(_model(body) for body in form.bodies)
 
 

@@ -20,7 +20,7 @@ from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
-from sonic_bullet.jobs.job_processes import TRIES, Failed, attempt
+from sonic_bullet.jobs.job_processes import ATTEMPTS, Failed, attempt
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.records.errors import FileError, exception_words
 from sonic_bullet.session.keeping import package_versions
@@ -119,7 +119,7 @@ def run_on_cluster(
                 continue
             item, nth, _ = running.pop(task.key)
             made = _received(client, task)
-            if isinstance(made, Failed) and task.status == "finished" and nth < TRIES:
+            if isinstance(made, Failed) and task.status == "finished" and nth < ATTEMPTS:
                 again.append((item, nth + 1))
             else:
                 yield item, made

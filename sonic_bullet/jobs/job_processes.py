@@ -24,7 +24,7 @@ from sonic_bullet.records.errors import SonicBulletError, exception_words
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
-TRIES = 3
+ATTEMPTS = 3
 _CONTEXT = "fork" if sys.platform == "linux" else "spawn"
 
 
@@ -44,7 +44,7 @@ class _Running:
 
 
 def run_jobs(
-    do: Callable[[Item], Made], items: Iterable[Item], workers: int, limit_s: float, *, tries: int = TRIES
+    do: Callable[[Item], Made], items: Iterable[Item], workers: int, limit_s: float, *, tries: int = ATTEMPTS
 ) -> Iterator[tuple[Item, Made | Failed]]:
     """Yield (item, do(item)) as they are done, or `Failed` after ``tries`` of at most limit_s seconds each.
 

@@ -15,7 +15,7 @@ from sonic_bullet.contact.force_pulse import pulse_spectrum
 from sonic_bullet.files import read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import analyse
-from sonic_bullet.path.surface.sensor_chain import TAPS, differentiator
+from sonic_bullet.path.surface.sensor_chain import DIFFERENTIATOR_TAPS, differentiator
 from sonic_bullet.records import Array, Body, ContactMicrophone, Microphone, Shape, Vibrometer
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.runtime.replay import render_blocks, render_log
@@ -75,7 +75,7 @@ def test_a_contact_microphone_gives_the_force_by_the_effective_mass() -> None:
     high_pass = -((f / LOWEST_HZ) ** 2) / (1 - (f / LOWEST_HZ) ** 2 + rate)
     law = IMPULSE_N_S * per_kg * pulse_spectrum(f * pulse.length_s, flat=pulse.flat) * high_pass
     band = (f > 40) & (f < 4000)
-    at_s = 2 / 240 + pulse.start_s + pulse.length_s / 2 + (TAPS - 1) / 2 / SR
+    at_s = 2 / 240 + pulse.start_s + pulse.length_s / 2 + (DIFFERENTIATOR_TAPS - 1) / 2 / SR
     error = measured * np.exp(2j * np.pi * f * at_s) / law - 1
     print(f"pulse {pulse.length_s * 1e6:.0f} µs, error to 4 kHz {np.abs(error[band]).max():.4f}")
     assert np.abs(error[band]).max() < 0.01
@@ -84,7 +84,11 @@ def test_a_contact_microphone_gives_the_force_by_the_effective_mass() -> None:
 def test_the_derivative_is_exact_in_the_band() -> None:
     taps = differentiator(SR)
     omega = np.linspace(0.005, 0.84, 200) * np.pi
-    response = np.exp(-1j * omega[:, None] * np.arange(TAPS)) @ taps * np.exp(1j * omega * (TAPS - 1) / 2)
+    response = (
+        np.exp(-1j * omega[:, None] * np.arange(DIFFERENTIATOR_TAPS))
+        @ taps
+        * np.exp(1j * omega * (DIFFERENTIATOR_TAPS - 1) / 2)
+    )
     assert np.abs(response / (1j * omega * SR) - 1).max() < 2e-3
 
 
@@ -130,7 +134,13 @@ def test_a_bar_held_at_one_end_is_the_closed_form_along_its_length(bar: Body) ->
     youngs = 1 / np.linalg.inv(material.stiffness_pa)[0, 0]
     law_hz = ROOTS**2 / (2 * np.pi * BAR_M[0] ** 2) * np.sqrt(youngs * BAR_M[2] ** 2 / 12 / material.density_kg_m3)
     pulse = pulse_on(bar, tip)
-    time = np.arange(heard.shape[1]) / SR - 2 / 240 - pulse.start_s - pulse.length_s / 2 - (TAPS - 1) / 2 / SR
+    time = (
+        np.arange(heard.shape[1]) / SR
+        - 2 / 240
+        - pulse.start_s
+        - pulse.length_s / 2
+        - (DIFFERENTIATOR_TAPS - 1) / 2 / SR
+    )
     late = slice(600, None)
     kept = np.flatnonzero(model.freq_hz < 2400)
     pole = -model.decay_per_s[kept] + 2j * np.pi * model.freq_hz[kept]

@@ -93,7 +93,7 @@ def test_a_held_body_and_an_open_surface_do_not_move_as_a_whole() -> None:
 def test_a_ratio_of_poisson_that_a_mass_had_bent_is_found_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every other mode goes with ν, which the fit had left 0.06 too high."""
     monkeypatch.setattr(added_mass, "POINTS", 16)
-    monkeypatch.setattr(added_mass, "TRIES", 3)
+    monkeypatch.setattr(added_mass, "SEARCH_RESTARTS", 3)
     true, fitted = 0.24, 0.30
     body = recorded(MASS)
     own = body.model.freq_hz

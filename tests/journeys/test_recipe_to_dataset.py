@@ -21,7 +21,7 @@ from sonic_bullet.dataset import sample_folder
 from sonic_bullet.dataset.object_splits import as_shares, splits_of
 from sonic_bullet.dataset.sample_folder import open_folder
 from sonic_bullet.files import read_audio
-from sonic_bullet.jobs.job_processes import TRIES, Failed, run_jobs
+from sonic_bullet.jobs.job_processes import ATTEMPTS, Failed, run_jobs
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage.atomic import cannot
 from tests.cli.test_commands import error_of, run
@@ -250,7 +250,7 @@ def test_a_job_is_tried_three_times(tmp_path: Path) -> None:
     def third(number: int) -> int:
         tried = tmp_path / f"{number}-{len(list(tmp_path.iterdir()))}"
         tried.touch()
-        if len(list(tmp_path.iterdir())) < TRIES:
+        if len(list(tmp_path.iterdir())) < ATTEMPTS:
             raise ValueError("not yet")
         return number
 

@@ -42,7 +42,7 @@ POINTS = 100
 # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own
 # imperfection may be what it stands for
 LIGHTEST = 0.005
-TRIES = 6
+SEARCH_RESTARTS = 6
 
 
 @dataclass(frozen=True)
@@ -152,11 +152,13 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
         for one in found:
             first[abs(one[4]) > far_off].setdefault((one[1], one[2] > 0.02 * x.mass_kg), one)
         best = min(
-            parallel_map(trial.refined, [start for some in first.values() for start in list(some.values())[:TRIES]])
+            parallel_map(
+                trial.refined, [start for some in first.values() for start in list(some.values())[:SEARCH_RESTARTS]]
+            )
         )
         # round bodies: as heavy, elsewhere
         again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
-        best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: TRIES // 2]))
+        best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: SEARCH_RESTARTS // 2]))
         bare = none[0] + trial.unlikely(trial.fitted)
         if best[0] > bare - max(better[0], better[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
             return None

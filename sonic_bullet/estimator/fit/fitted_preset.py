@@ -11,7 +11,7 @@ from sonic_bullet.estimator.fit.case_fit import CaseFit
 from sonic_bullet.estimator.fit.typical_strike import typical_strike
 from sonic_bullet.presets import (
     DAMPING_TAKEN,
-    FORMAT,
+    PRESET_FORMAT,
     Elasticity,
     Preset,
     Provenance,
@@ -87,7 +87,7 @@ def preset_of(found: CaseFit) -> Preset:
     used = {o.evidence.thing.name: o for o in found.objects}
     recordings = [r.file.name if r.file is not None else "features" for r in found.case.recordings if r.split == "fit"]
     return Preset(
-        format=FORMAT,
+        format=PRESET_FORMAT,
         name=f"{guess or 'fitted'} ({found.case.name})"[:100],
         density_kg_m3=found.density_kg_m3,
         elasticity=Elasticity(

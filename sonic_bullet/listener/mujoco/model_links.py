@@ -23,7 +23,7 @@ from sonic_bullet.records import Array, Body, Shape
 from sonic_bullet.records.coerce import as_whole, nearest, shown
 from sonic_bullet.records.errors import MeshError, SceneError
 
-GEOM, BODY = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_BODY
+GEOM_OBJECT, BODY_OBJECT = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_BODY
 
 
 class ModelLinks:
@@ -138,10 +138,10 @@ class ModelLinks:
 
     def _named(self, name: str) -> tuple[int, int | None]:
         """Find a body, or a geom of the world, of that name."""
-        body = mujoco.mj_name2id(self.model, BODY, name)
+        body = mujoco.mj_name2id(self.model, BODY_OBJECT, name)
         if body > 0:
             return body, None
-        geom = mujoco.mj_name2id(self.model, GEOM, name)
+        geom = mujoco.mj_name2id(self.model, GEOM_OBJECT, name)
         if geom >= 0 and self.model.geom_bodyid[geom] == 0:
             return 0, geom
         known = [self.name(*one) for one in zip(self.body.tolist(), self.geom.tolist(), strict=True)]
@@ -176,7 +176,7 @@ class ModelLinks:
 
     def name(self, body: int, link: int) -> str:
         """Return a link's own name; "body 2" or "geom 3" without any."""
-        kind, number, word = (BODY, body, "body") if body else (GEOM, link, "geom")
+        kind, number, word = (BODY_OBJECT, body, "body") if body else (GEOM_OBJECT, link, "geom")
         return mujoco.mj_id2name(self.model, kind, number) or f"{word} {number}"
 
     def described(self, body: int, link: int) -> Body:

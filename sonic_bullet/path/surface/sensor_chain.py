@@ -3,7 +3,7 @@
     ContactMicrophone: velocity -> d/dt -> acceleration -> its frequency response, minimum phase -> + white noise
 
 d/dt: antisymmetric taps of even number, least squares of the relative error to 0.85 of half the rate [Oppenheim,
-Schafer 2010, sec. 7.5: type IV]: within 0.1 %, and (TAPS - 1)/2 samples late. Noise of sample n depends on seed, sensor
+Schafer 2010, sec. 7.5: type IV]: within 0.1 %, and 7.5 samples late. Noise of sample n depends on seed, sensor
 and n alone.
 """
 
@@ -18,7 +18,7 @@ from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.path.minimum_phase import minimum_phase
 from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorResponse
 
-TAPS = 16
+DIFFERENTIATOR_TAPS = 16
 EXACT_REACH = 0.85
 """Fraction of half the rate up to which the derivative is exact to 0.1 %."""
 RESPONSE_TAPS = 2048
@@ -27,9 +27,9 @@ RESPONSE_TAPS = 2048
 
 @lru_cache(maxsize=8)
 def differentiator(sr: int) -> Array:
-    """Return taps (TAPS,) of d/dt at a rate in Hz, (TAPS - 1)/2 samples late."""
+    """Return taps (DIFFERENTIATOR_TAPS,) of d/dt at a rate in Hz, 7.5 samples late."""
     omega = np.linspace(0.001, EXACT_REACH, 400) * np.pi
-    lag = np.arange(TAPS // 2) + 0.5
+    lag = np.arange(DIFFERENTIATOR_TAPS // 2) + 0.5
     half = np.linalg.lstsq(2 * np.sin(omega[:, None] * lag) / omega[:, None], np.ones(len(omega)), rcond=None)[0]
     return np.asarray(sr * np.concatenate([half[::-1], -half]))
 
