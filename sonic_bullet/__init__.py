@@ -4,7 +4,10 @@
     listener = sb.attach(client)
     listener.add(body, material="porcelain")
 
-Packages are imported when first used.
+Packages are imported when first used. What a step becomes, and where:
+
+    listener (simulator) -> contact (forces) -> bank (modes in motion) -> path (pressure) -> files; runtime drives them
+    modal (modes of a shape), radiation (what the air adds) | effects (one file each), estimator, diagnosis (recordings)
 """
 
 from __future__ import annotations
