@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.contact.surface_kernel import _PATCH, _ROWS, VOICE, _law
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.scene import RenderResult, render_scene
 
@@ -69,7 +69,7 @@ class Observed:
     @cached_property
     def _watch(self) -> _Watch:
         watch = _Watch()
-        for _ in render_apart(self.log, witness=watch):
+        for _ in render_per_body(self.log, observer=watch):
             pass
         return watch
 

@@ -17,7 +17,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.runtime.body_lifetime import admit, release
 from sonic_bullet.runtime.channels.body_images import completed
 from sonic_bullet.runtime.ringing_on import ring_on
-from sonic_bullet.runtime.synthesis_state import Setup, Witness, start
+from sonic_bullet.runtime.synthesis_state import Setup, StepObserver, start
 from sonic_bullet.runtime.synthesizer import LOOK_EVERY, advance, clock_after, drained
 
 if TYPE_CHECKING:
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from sonic_bullet.records.contacts import Step
 
 
-def render_apart(
+def render_per_body(
     log: ContactLog,
     *,
     sr: int | None = None,
     frames: int | None = None,
-    witness: Witness | None = None,
+    observer: StepObserver | None = None,
     room: RoomPlan | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
@@ -44,7 +44,7 @@ def render_apart(
     ----------
     frames
         Number of samples in all, where a mix rings on after the last step (ringing_on.py); None: up to its end.
-    witness
+    observer
         Observer that is called with every step.
     room
         What it is in.
@@ -61,7 +61,7 @@ def render_apart(
     )
     setup = completed(setup, image=log.image)
     state = start(setup)
-    state.witness = witness
+    state.observer = observer
     quenches, done, looked, last = quenched_steps(log), 0, 0, None
     steps: list[Step]
     for steps in together(log.steps, quenches):

@@ -49,7 +49,7 @@ def ring_on(setup: Setup, state: State, last: Step) -> Iterator[Array]:
     from sonic_bullet.runtime.synthesizer import advance
 
     state = state.copy()
-    state.witness = None
+    state.observer = None
     still = replace(last, contacts=Contacts.none(), teleported=np.zeros(len(last.teleported), bool))
     advance(setup, state, [still] * LOOKAHEAD)  # up to the end of ``last``, which is rendered already
     state.credit_s = np.zeros(0)  # no new poles

@@ -172,7 +172,7 @@ class State:
     taken: steps taken in; clock: start of the step to be rendered next; waiting: lengths of those taken in and not
     rendered. body (b,): each body's index in the log, ascending; present: those of the step taken in last (the others
     have left, and ring on where they were); newest: the highest so far. quenches: steps before which all ringing stops.
-    voices (b): residuals; grains, rubs: their grains and sections under way. witness: called with every step once it
+    voices (b): residuals; grains, rubs: their grains and sections under way. observer: called with every step once it
     rings, then one at a time. support_state (b,) SUPPORT_STATE; credit_s (1,): time left for new poles, (0,)
     where nothing supports. space: of microphones that move, ambisonics and heads; surface: of sensors on surfaces;
     directions: of microphones with directivity; sets (c,): the weight set of each microphone. separations: of bodies
@@ -201,7 +201,7 @@ class State:
     scratch: StepScratch = field(default_factory=StepScratch)
     reads: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     has_residual: bool = False
-    witness: Witness | None = None
+    observer: StepObserver | None = None
     support_state: Array = field(default_factory=lambda: np.zeros(0, SUPPORT_STATE))
     credit_s: Array = field(default_factory=lambda: np.zeros(0))
     separations: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -244,14 +244,14 @@ class State:
             self.window.copy(), self.pairs.copy(), self.table.copy(), self.bank, self.ringing.copy(), self.path,
             self.travelling.copy(), self.taken, self.clock, self.waiting, self.resonators, self.voices, self.grains,
             dict(self.rubs), self.body, self.present, self.newest, self.quenches, StepScratch(),
-            self.reads, self.has_residual, self.witness, self.support_state.copy(), self.credit_s.copy(),
+            self.reads, self.has_residual, self.observer, self.support_state.copy(), self.credit_s.copy(),
             dict(self.separations),
             self.space and self.space.copy(), self.surface and self.surface.copy(),
             self.directions and self.directions.copy(), self.sets, self.images.copy(),
         )  # fmt: skip
 
 
-class Witness(Protocol):
+class StepObserver(Protocol):
     """Observer of what sounds in a step, and why: strikes and drives lie in the state's tables."""
 
     def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:

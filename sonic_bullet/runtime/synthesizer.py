@@ -56,7 +56,7 @@ def advance(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     while steps:
         if state.number in state.quenches and len(state.waiting) == LOOKAHEAD:
             quench(state)
-        count = 1 if state.has_residual or state.witness is not None else len(steps)
+        count = 1 if state.has_residual or state.observer is not None else len(steps)
         ahead = [q - state.number for q in state.quenches if q > state.number]  # the next group begins there
         count = min([count, *(q + LOOKAHEAD - len(state.waiting) for q in ahead), until_motions(steps)])
         count = min(count, until_turned(setup, state, steps[:count]))
@@ -99,7 +99,7 @@ def _load_code(setup: Setup, state: State, values: tuple[Any, ...]) -> None:
 
 def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     """Advance by steps without a quench between; by one alone where a body has a residual."""
-    sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.witness is not None
+    sr, begin, pause = setup.sr, state.ringing.at, state.has_residual or state.observer is not None
     enter_mobility(state.table.bodies, state.body, steps[0].motions)
     table, clock, waiting = _schedule(sr, state, steps)
     contacts, poses = _joined(steps)
@@ -135,8 +135,8 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
             found, drives = state.scratch.count.tolist()
             if state.has_residual:
                 add_residuals(setup, state, table[done], found, drives)
-            if state.witness is not None:
-                state.witness(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
+            if state.observer is not None:
+                state.observer(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
         elif status == driver.BROKEN:
             what = "the synthesizer made NaN or infinite samples, or lost a strike"
             raise AudioError(what, "report the contact log: this must not happen")

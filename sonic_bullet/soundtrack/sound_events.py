@@ -1,6 +1,6 @@
 """Sound events: impacts, rolling and sliding as the run time plays them, and silent contacts, with the reason.
 
-    ContactLog -> render_apart, step by step -> EventWitness: PULSE (strikes that are accepted), drives (friction), PAIR
+    ContactLog -> render_per_body, step by step -> EventObserver: PULSE (accepted strikes), drives (friction), PAIR
         -> one impact of all pulses of a strike; steps of one kind -> one span -> SoundEvent
         + the sound of each alone (own_sound.py) -> level at the first microphone
 
@@ -30,7 +30,7 @@ from sonic_bullet.path.fractional_delay import AHEAD
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.synthesis_state import State
 from sonic_bullet.soundtrack.own_sound import OwnSound
 
@@ -123,7 +123,7 @@ class _Run:
         self.own += other.own
 
 
-class EventWitness:
+class EventObserver:
     """Observer of every step of a log's run; `events` are what it observed."""
 
     def __init__(self, log: ContactLog) -> None:
@@ -316,12 +316,12 @@ def find_sound_events(
 ) -> tuple[SoundEvent, ...]:
     """Find all events of a log, whose sound is rendered for it and not kept.
 
-    Arguments, errors: as of `render_apart`.
+    Arguments, errors: as of `render_per_body`.
     """
-    witness = EventWitness(log)
-    for _ in render_apart(log, sr=sr, witness=witness, progress=progress, say=say):
+    observer = EventObserver(log)
+    for _ in render_per_body(log, sr=sr, observer=observer, progress=progress, say=say):
         pass
-    return witness.events()
+    return observer.events()
 
 
 def cues_of(

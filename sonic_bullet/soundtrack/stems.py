@@ -1,6 +1,6 @@
 """Stems: a sound a body, of the same contacts as the mix, whose sum it is.
 
-    ContactLog -> render_apart -> (b, channels, n) -> a KeptSound a body -> NN-NAME.wav, all with the mix's gain
+    ContactLog -> render_per_body -> (b, channels, n) -> a KeptSound a body -> NN-NAME.wav, all with the mix's gain
 
 A body without a model is silent and has no stem. The sum over all stems is the mix to rounding, of double numbers in
 memory and of 32-bit ones in files.
@@ -25,8 +25,8 @@ from sonic_bullet.path.room.room_convolution import keep_with_room
 from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.records import channels_of
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.runtime.body_stems import render_apart
-from sonic_bullet.runtime.synthesis_state import Witness
+from sonic_bullet.runtime.body_stems import render_per_body
+from sonic_bullet.runtime.synthesis_state import StepObserver
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
 
@@ -44,23 +44,23 @@ def render_stems(
     *,
     sr: int | None = None,
     frames: int | None = None,
-    witness: Witness | None = None,
+    observer: StepObserver | None = None,
     plan: RoomPlan | None = None,
     progress: Callable[[float], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> tuple[Stem, ...]:
     """Render the sound of every body with a model, all in one run; the sum is `render_log`'s.
 
-    Beyond a few seconds it lies in nameless temporary files. Arguments, errors: as of `render_apart`, and plan of the
-    room around it; AudioError where there is no microphone.
+    Beyond a few seconds it lies in nameless temporary files. Arguments, errors: as of `render_per_body`, and plan of
+    the room around it; AudioError where there is no microphone.
     """
     if not log.sensors:
         raise AudioError("there is no microphone, so there is no stem", "give one, such as --microphone 0,-1,0.5")
     who = [index for index, body in enumerate(log.bodies) if body.model is not None]
     sounding = log if plan is None else replace(log, sensors=plan.sensors)
     spools = {index: SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing)) for index in who}
-    for body, frame in render_apart(
-        sounding, sr=sr, frames=frames, witness=witness, room=plan, progress=progress, say=say
+    for body, frame in render_per_body(
+        sounding, sr=sr, frames=frames, observer=observer, room=plan, progress=progress, say=say
     ):
         there = dict(zip(body.tolist(), frame, strict=True))
         nothing = np.zeros(frame.shape[1:])

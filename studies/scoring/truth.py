@@ -101,7 +101,7 @@ def pulses(log: ContactLog) -> list[Impact]:
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
             made.append(Impact(low, high, begin + float(pulse["start_s"]), impulse))
 
-    state.witness = seen
+    state.observer = seen
     for step in log.steps:
         if step.body is not state.present:
             admit(setup, state, step, log.bodies)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from sonic_bullet.radiation.far_field import SurfaceTerms, spread_directions, surface_pressure, surface_terms
 from sonic_bullet.radiation.pattern import between, radiation_pattern, toward
 from sonic_bullet.records import Air, Array, Microphone, ModalModel, Sensor
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.replay import log_frames, render_log
 from tests.made.models import STEEL, box_model
 from tests.path.space.test_receivers import struck
@@ -80,5 +80,5 @@ def test_a_body_that_spins_sweeps_its_pattern_without_clicks() -> None:
     assert 20 * np.log10(np.abs(high).max() / np.abs(sound[0]).max()) < -70
     frames = np.concatenate(list(log_frames(log)), axis=1)
     np.testing.assert_array_equal(frames[:, 600:], sound[:, :-600])
-    apart = np.concatenate([block.sum(axis=0) for _, block in render_apart(log)], axis=1)
+    apart = np.concatenate([block.sum(axis=0) for _, block in render_per_body(log)], axis=1)
     np.testing.assert_allclose(apart, sound, atol=1e-12 * np.abs(sound).max())

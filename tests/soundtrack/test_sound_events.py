@@ -23,7 +23,7 @@ from sonic_bullet.soundtrack.sound_events import (
     SLIDE,
     SUPPORT,
     UNCAUSED,
-    EventWitness,
+    EventObserver,
     SoundEvent,
     cues_of,
 )
@@ -54,9 +54,9 @@ def run(setup: Callable[[Any, sb.Listener], object], seconds: float, step_s: flo
 
 
 def looked(log: ContactLog) -> tuple[tuple[SoundEvent, ...], tuple[Stem, ...]]:
-    witness = EventWitness(log)
-    stems = render_stems(log, witness=witness)
-    return witness.events(), stems
+    observer = EventObserver(log)
+    stems = render_stems(log, observer=observer)
+    return observer.events(), stems
 
 
 def falling(client: Any, listener: sb.Listener) -> None:
@@ -136,11 +136,11 @@ def test_what_rests_is_silent_and_said_to_carry_weight() -> None:
 def test_who_rests_takes_no_memory_for_it() -> None:
     """An hour of rest is one span that grows, and not a record a step."""
     log = run(resting, 1.0)
-    witness = EventWitness(log)
-    render_stems(log, witness=witness)
-    kept = len(witness._seen) + sum(len(runs) for runs in witness._runs.values())
+    observer = EventObserver(log)
+    render_stems(log, observer=observer)
+    kept = len(observer._seen) + sum(len(runs) for runs in observer._runs.values())
     assert kept < 0.1 * len(log.steps)
-    assert sum(one.end_s - one.start_s for one in witness.events() if one.kind == SUPPORT) > 0.8
+    assert sum(one.end_s - one.start_s for one in observer.events() if one.kind == SUPPORT) > 0.8
 
 
 def test_two_bodies_without_a_voice_are_said_to_have_none() -> None:
@@ -161,14 +161,14 @@ def test_events_are_those_that_the_run_time_plays() -> None:
     log = table_log()
     seen: list[float] = []
 
-    class Counting(EventWitness):
+    class Counting(EventObserver):
         def __call__(self, state: Any, number: int, step: Any, found: int, drives: int) -> None:
             super().__call__(state, number, step, found, drives)
             seen.extend(np.linalg.norm(state.scratch.pulse["impulse_n_s"][:found], axis=1).tolist())
 
-    witness = Counting(log)
-    render_stems(log, witness=witness)
-    events = witness.events()
+    observer = Counting(log)
+    render_stems(log, observer=observer)
+    events = observer.events()
     hits = [one for one in events if one.kind == IMPACT]
     assert len(hits) > 5
     assert sum(one.impulse_n_s for one in hits) == pytest.approx(sum(seen), rel=1e-12)

@@ -13,7 +13,7 @@ from sonic_bullet.files import read_audio, write_audio
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Microphone, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.soundtrack.stems import Stem, render_stems, stem_name, write_stems
 from tests.few_cases import parametrize_few
@@ -76,7 +76,7 @@ def test_a_body_that_comes_and_one_that_goes_are_silent_before_and_ring_on_after
 
 def test_pieces_name_their_bodies(log: ContactLog) -> None:
     frames = 0
-    for body, frame in render_apart(log):
+    for body, frame in render_per_body(log):
         assert frame.shape[:2] == (len(body), 2)
         assert (np.diff(body) > 0).all()
         frames += frame.shape[2]

@@ -114,19 +114,19 @@ class SoundtrackWish:
         wanted = self.events is not None or self.cues or drawn
         if self.stems is None and not wanted:
             return None
-        from sonic_bullet.soundtrack.sound_events import EventWitness, find_sound_events
+        from sonic_bullet.soundtrack.sound_events import EventObserver, find_sound_events
         from sonic_bullet.soundtrack.stems import render_stems
 
         log, sr = result.log, result.sr
         if self.stems is None:
             events = find_sound_events(log, sr=sr, progress=progress, say=say)
             return Soundtrack(self, log, sr, (), events, events_to)
-        witness = EventWitness(log) if wanted else None
+        observer = EventObserver(log) if wanted else None
         stems = render_stems(
-            log, sr=sr, frames=result.sound.shape[1], witness=witness, plan=getattr(result, "plan", None),
+            log, sr=sr, frames=result.sound.shape[1], observer=observer, plan=getattr(result, "plan", None),
             progress=progress, say=say,
         )  # fmt: skip
-        return Soundtrack(self, log, sr, stems, witness.events() if witness is not None else (), events_to)
+        return Soundtrack(self, log, sr, stems, observer.events() if observer is not None else (), events_to)
 
 
 @dataclass(slots=True)

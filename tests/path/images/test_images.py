@@ -11,7 +11,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.geometry.flat_faces import flat_faces
 from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Material, Microphone, MicrophonePath, Shape
 from sonic_bullet.records.contacts import Contacts
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.channels.body_images import specific_admittance
 from sonic_bullet.runtime.replay import LATENCY_STEPS, log_frames, render_log
 from tests.made import heads
@@ -133,7 +133,7 @@ def test_live_in_blocks_replayed_and_by_stems_it_is_the_same_sound() -> None:
     frames = np.concatenate([*log_frames(log)], axis=1)
     lag = LATENCY_STEPS * round(DT_S * SR)
     assert np.array_equal(frames[:, lag:], whole[:, : frames.shape[1] - lag])
-    stems = np.concatenate([frame for _, frame in render_apart(log)], axis=2).sum(axis=0)
+    stems = np.concatenate([frame for _, frame in render_per_body(log)], axis=2).sum(axis=0)
     assert np.abs(stems - whole).max() < 1e-12 * np.abs(whole).max()
     assert np.array_equal(whole[2], whole[0])  # the first of ambiX is the plain microphone's
 

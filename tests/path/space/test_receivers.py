@@ -14,7 +14,7 @@ from sonic_bullet.path.space.ear_filters import ear_filters, onsets
 from sonic_bullet.records import Ambisonics, Array, Binaural, Microphone, MicrophonePath, Sensor
 from sonic_bullet.records.contacts import Contacts
 from sonic_bullet.records.errors import AudioError, RecordError
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.replay import log_frames, render_log
 from tests.few_cases import parametrize_few
 from tests.made import heads
@@ -187,7 +187,7 @@ def test_live_in_blocks_and_replayed_are_the_same_bits() -> None:
     live = np.concatenate([*log_frames(log)], axis=1)
     lag = 3 * 200
     assert np.array_equal(live[:, lag:], whole[:, : live.shape[1] - lag])
-    stems = [frame.sum(axis=0) for _, frame in render_apart(log)]
+    stems = [frame.sum(axis=0) for _, frame in render_per_body(log)]
     np.testing.assert_allclose(np.concatenate(stems, axis=1), whole, atol=1e-12 * np.abs(whole).max())
     plain = render_log(replace(log, sensors=sensors[2:3]))
     assert np.array_equal(plain[0], whole[11])

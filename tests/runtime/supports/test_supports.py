@@ -15,7 +15,7 @@ from sonic_bullet.bank.transmission import STEADY
 from sonic_bullet.files import ContactLog, read_log
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.contacts import Contacts
-from sonic_bullet.runtime.body_stems import render_apart
+from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.runtime.supports import pole_updates
 from tests.made.models import STEEL, WOOD, box_body, box_model, row, step
@@ -78,7 +78,7 @@ def test_without_friction_nothing_is_held_sideways(client: Any) -> None:
             if state.support_state["points"].any():
                 found[:] = [one.spring for one in pole_updates._touches(state, 1, state.window.quaternion_xyzw[0])[1]]
 
-        for _ in render_apart(log, witness=look):
+        for _ in render_per_body(log, observer=look):
             pass
         springs[friction] = held
         client.resetSimulation()
