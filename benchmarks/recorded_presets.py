@@ -39,7 +39,6 @@ from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
 from sonic_bullet.estimator.fit.recorded import recorded_signals
 from sonic_bullet.estimator.fit.takes.best_gain import find_best_gain
 from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
-from sonic_bullet.estimator.lines.log_spectral import floor_between, power_spectra
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.presets import (
     RECORDED_FOLDER,
@@ -54,6 +53,7 @@ from sonic_bullet.presets import (
 from sonic_bullet.records import Array
 from sonic_bullet.residual.code import residual_of
 from sonic_bullet.residual.offline import residual_sound
+from sonic_bullet.signal.log_spectral import floor_between, power_spectra
 
 HOLD_OUT = 2
 STANDARD_ERRORS = 3.0

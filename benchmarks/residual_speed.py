@@ -19,8 +19,8 @@ from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.grains import faded, make_voice, placed, varied
 from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.player import SECTION, section_grain
-from sonic_bullet.residual.spectrogram import axes
 from sonic_bullet.residual.transfer import StruckModes, source_modes, source_power, transfer
+from sonic_bullet.signal.spectrogram import axes
 
 SEEDS = (0x5EED, 0xF00D)
 

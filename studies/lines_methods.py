@@ -3,7 +3,7 @@
     python studies/lines_methods.py --data ../shared/measured [--methods sonic-bullet,peaks,lscf] [--sets NAME ...]
 
 distance   of a take and of what its lines play with a noise like the take's own, from 20 ms after the onset
-           (`estimator.lines.log_spectral`, the first recorded second)
+           (`signal.log_spectral`, the first recorded second)
 too loud   dB by which a line, or the lines closer than a window tells apart, stands above what was recorded in its
            band, over max(50 ms, 5 cycles), where that stands 10 dB over the noise: the worst of all
 """
@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.estimator.fit.recorded import onset_sample
-from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, log_spectral_db, with_noise
 from sonic_bullet.files import read_audio
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import Floor, floor_between, log_spectral_db, with_noise
 
 LATE_S, SECONDS = 0.02, 2.0
 Found = tuple[Array, Array]  # pole (k,) in 1/s, amplitude (k,) complex at the onset

@@ -6,7 +6,7 @@ Practice cases: fit and residual from the 'fit' strikes, judged on 'holdout' str
 model predicts. Measured objects with two recordings or more have no mesh: their features stand in for modes. Modes are
 the damped sinusoids that the first half of the strikes share, with the mean of their amplitudes; a strike of the second
 half is predicted by them at the strike's own level (one gain a strike, the same with and without the residual).
-Distance: `estimator.lines.log_spectral.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction
+Distance: `signal.log_spectral.log_spectral_db` (dB, cells 10 dB above the recording's noise), each prediction
 given that noise; with the residual, the mean over three grains of its noise.
 """
 
@@ -25,7 +25,6 @@ from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, strike_modes
 from sonic_bullet.estimator.fit.recorded import onset_sample
 from sonic_bullet.estimator.lines.joint_lines import joint_lines
-from sonic_bullet.estimator.lines.log_spectral import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.estimator.residual.recorded_strikes import Strikes, case_strikes, strikes_of
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cases import read_case
@@ -33,6 +32,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.residual.compute import damped
 from sonic_bullet.residual.offline import residual_sound
+from sonic_bullet.signal.log_spectral import Floor, floor_of, log_spectral_db, noise_floor_db, with_noise
 
 SHARED = Path(os.environ.get("SONIC_BULLET_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 SECONDS = 1.0

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.comparing.ensemble import RUNS, Audibility, Ensemble, ensemble, judged, measured
-from sonic_bullet.comparing.outcome.sound_effects import AUDIBLE_OCTAVES_HZ, band_levels, level_words, onsets_s, t60_s
+from sonic_bullet.comparing.outcome.sound_effects import band_levels, level_words, onsets_s, t60_s
 from sonic_bullet.comparing.revisions import changed_files, head
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.comparing.tolerance import (
@@ -34,6 +34,7 @@ from sonic_bullet.files import replacing
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.session.scene_file import defines_build
+from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ
 from sonic_bullet.storage.json_text import json_bytes
 from sonic_bullet.storage.reading import reading
 from sonic_bullet.storage.spooled_sound import KeptSound

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.comparing.inputs.tree_difference import with_leaves
-from sonic_bullet.comparing.outcome.sound_effects import AUDIBLE_OCTAVES_HZ
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Call, Who
@@ -27,6 +26,7 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.session.scene_file import defines_build
+from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ, octave_power
 
 RUNS = 99
 """Fewest runs in which a rank can be at the 1 % level."""
@@ -190,9 +190,7 @@ def _band_spectra(x: Array, sr: int) -> Array:
     frames = x[:, : n * slices].reshape(len(x), slices, n)
     power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
     freq = np.fft.rfftfreq(n, 1 / sr)
-    bands = [
-        power[:, (freq >= f / 2**0.5) & (freq < f * 2**0.5)].sum(axis=1) for f in AUDIBLE_OCTAVES_HZ if f < sr / 2**1.5
-    ]
+    bands = octave_power(power, freq, [f for f in AUDIBLE_OCTAVES_HZ if f < sr / 2**1.5])
     table = np.array(bands).T
     floor_db = -90.0
     return np.asarray(10 * np.log10(np.maximum(table, table.max(initial=0) * 10 ** (floor_db / 10)) + 1e-12))

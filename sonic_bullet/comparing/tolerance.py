@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.comparing.outcome.sound_effects import (
-    AUDIBLE_OCTAVES_HZ,
     at_common_rate,
     band_levels,
     level_words,
@@ -23,6 +22,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError
+from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ
 
 if TYPE_CHECKING:
     from sonic_bullet.comparing.ensemble import Audibility

@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
-from sonic_bullet.estimator.lines.log_spectral import with_noise
+from sonic_bullet.signal.log_spectral import with_noise
 
 TIMES = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Impulses over the middle one so far: as far as a hand goes with one hammer."""

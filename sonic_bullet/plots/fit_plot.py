@@ -19,6 +19,7 @@ from sonic_bullet.estimator.fit.prediction_of_lines import predicted
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.signal.short_time import short_time_spectra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -141,5 +142,5 @@ def circle(freq_hz: Array, alpha_per_s: float, beta_s: float) -> Array:
 def _levels(sound: Array) -> Array:
     spectrum_window = 1024
     window = min(spectrum_window, len(sound))
-    frames = np.lib.stride_tricks.sliding_window_view(sound, window)[:: max(1, window // 4)]
-    return np.asarray(20 * np.log10(np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)).T + 1e-12))
+    spectra = short_time_spectra(sound, window, max(1, window // 4))
+    return np.asarray(20 * np.log10(np.abs(spectra).T + 1e-12))

@@ -16,7 +16,7 @@ from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.residual.compute import clip_residual, damped
-from sonic_bullet.residual.spectrogram import Power, power
+from sonic_bullet.signal.spectrogram import Power, power
 
 
 def write_residual_picture(path: str | os.PathLike[str], strikes: Strikes) -> None:

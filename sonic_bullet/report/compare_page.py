@@ -22,6 +22,7 @@ from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import short_time_power
 
 
 class _Plot(NamedTuple):
@@ -219,6 +220,5 @@ def _levels(x: Array, sr: int) -> Array:
     window = 1024
     hop = max(256, x.shape[1] // 800)
     padded = np.pad(x, ((0, 0), (window // 2, window // 2)))  # a window shows at its middle
-    frames = np.lib.stride_tricks.sliding_window_view(padded, window, axis=1)[:, ::hop] * np.hanning(window)
-    power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0)
+    power = short_time_power(padded, window, hop).sum(axis=0)
     return np.asarray(10 * np.log10(power.T[:: 2 if sr > 24_000 else 1] + 1e-30))

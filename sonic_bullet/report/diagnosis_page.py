@@ -25,6 +25,7 @@ from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import short_time_power
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .8rem;border-bottom:1px solid #ddd;text-align:left}
@@ -212,11 +213,7 @@ def _spectrograms(sounds: Any, sr: int) -> str:
     plt = _pyplot()
     figure, axes = plt.subplots(1, len(sounds), figsize=(12, 3.6), sharey=True)
     window = 2048
-    shape = np.hanning(window)
-    tables = []
-    for _, x in sounds:
-        frames = np.lib.stride_tricks.sliding_window_view(x, window)[:: window // 4]
-        tables.append(10 * np.log10(np.abs(np.fft.rfft(frames * shape, axis=1)).T ** 2 + 1e-20))
+    tables = [10 * np.log10(short_time_power(x, window, window // 4).T + 1e-20) for _, x in sounds]
     top = max(float(t.max()) for t in tables)
     for axis, (label, x), table in zip(axes, sounds, tables, strict=True):
         image = axis.imshow(

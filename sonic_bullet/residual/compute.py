@@ -20,8 +20,8 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
 from sonic_bullet.residual.transfer import StruckModes
+from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
 
 
 def damped(freq_hz: Array, decay_per_s: Array, amplitude: Array, n: int, sr: int) -> Array:

@@ -23,7 +23,6 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of, noise_phases
-from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, axes
 from sonic_bullet.residual.transfer import (
     ModePairs,
     ResidualLines,
@@ -37,6 +36,7 @@ from sonic_bullet.residual.transfer import (
     source_power,
     transfer_lines,
 )
+from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, axes
 
 GRAIN_STEP_DB = 2.0
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
-from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, frame_count, hann, inverse, transform
+from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, frame_count, hann, inverse, transform
 
 
 class _Inversion(NamedTuple):

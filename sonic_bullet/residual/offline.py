@@ -17,8 +17,8 @@ from sonic_bullet.records import Array, Residual
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.grains import filtered, make_voice, mixed_number, response, varied
 from sonic_bullet.residual.invert import INVERSION, invert, magnitude_of
-from sonic_bullet.residual.spectrogram import RESIDUAL_WINDOW, axes
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, paired_power, transfer
+from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, axes
 
 
 def transferred_clip(

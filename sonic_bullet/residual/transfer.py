@@ -26,7 +26,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.errors import AudioError
-from sonic_bullet.residual.spectrogram import Power
+from sonic_bullet.signal.spectrogram import Power
 
 
 class _Transfer(NamedTuple):

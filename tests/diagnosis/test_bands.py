@@ -18,8 +18,8 @@ from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.estimator.lines.joint_lines import Lines
-from sonic_bullet.estimator.lines.log_spectral import white, with_noise
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import white, with_noise
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.few_cases import parametrize_few
 from tests.made.body import SR, plate, recorded, struck

@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.selection.stepwise import closed
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.signal.log_spectral import floor_between
 from tests.few_cases import parametrize_few
 from tests.made.body import SR, plate, recorded, struck, truth
 from tests.made.problems import posed

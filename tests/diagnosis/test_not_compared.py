@@ -32,7 +32,7 @@ from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
-from sonic_bullet.estimator.lines.log_spectral import noise_floor_db, white
+from sonic_bullet.signal.log_spectral import noise_floor_db, white
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded, truth
 from tests.made.problems import posed

@@ -21,7 +21,7 @@ from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.room import Room
-from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
 from tests.made.problems import posed
 

@@ -20,7 +20,7 @@ from sonic_bullet.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.radiation import IMPEDANCE, Radiation, areas
 from sonic_bullet.effects.support_damping import SupportDamping
-from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
 from tests.made.problems import posed
 

@@ -9,8 +9,8 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, with_noise
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import Floor, floor_between, with_noise
 from tests.few_cases import parametrize_few
 from tests.made.body import plate, recorded, struck, truth
 

@@ -13,7 +13,7 @@ from sonic_bullet.diagnosis.prediction.score import Take, mean_db, predict_takes
 from sonic_bullet.effects import added_mass
 from sonic_bullet.effects.added_mass import AddedMass, _in_place
 from sonic_bullet.effects.contact_time import ContactTime
-from sonic_bullet.estimator.lines.log_spectral import floor_between
+from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, plate, recorded, truth
 
 BAND = (50.0, 7_500.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sonic_bullet.estimator.fit.takes.best_gain import distance_at, find_best_gain
-from sonic_bullet.estimator.lines.log_spectral import power_spectra, white
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import power_spectra, white
 from tests.few_cases import parametrize_few
 
 SR = 16_000

@@ -11,10 +11,10 @@ import soundfile
 
 from sonic_bullet.estimator.fit.material_fit import CaseFit, fit_case
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum, lines_sound, strike_modes
-from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db, noise_floor_db, with_noise
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import AudioError, FileError, MeshError
+from sonic_bullet.signal.log_spectral import floor_of, log_spectral_db, noise_floor_db, with_noise
 from tests.made.case import SR, Planted, make
 
 BRASS = Material.isotropic("made", youngs_pa=1.04e11, poisson=0.345, density_kg_m3=8500, alpha_per_s=6.0, beta_s=3e-8)

@@ -9,8 +9,8 @@ from sonic_bullet.estimator.fit.pairing import _rings, heaped
 from sonic_bullet.estimator.fit.prediction_of_lines import damped_sum
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines
-from sonic_bullet.estimator.lines.log_spectral import log_spectral_db, noise_floor_db, white, with_noise
 from sonic_bullet.plots.fit_plot import circle
+from sonic_bullet.signal.log_spectral import log_spectral_db, noise_floor_db, white, with_noise
 
 BRIEF_RATIO = 25.0
 

@@ -12,8 +12,8 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.compute import clip_residual, damped
 from sonic_bullet.residual.invert import INVERSION, RESIDUAL_WINDOW, invert, magnitude_of, noise_phases
 from sonic_bullet.residual.offline import transferred_clip
-from sonic_bullet.residual.spectrogram import Power, inverse, power, transform
 from sonic_bullet.residual.transfer import StruckModes, come_from, pair, shifted_hz, transfer
+from sonic_bullet.signal.spectrogram import Power, inverse, power, transform
 from tests.few_cases import parametrize_few
 from tests.made.residuals import SR, banded, modes
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SonicBulletError
+from sonic_bullet.signal.short_time import short_time_power
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 
@@ -130,5 +131,4 @@ def log_distance(a: Array, b: Array) -> float:
 
 def _levels(x: Array) -> Array:
     padded = np.pad(x, ((0, 0), (0, (-x.shape[1]) % LEVELS.window)))
-    frames = padded.reshape(len(x), -1, LEVELS.window) * np.hanning(LEVELS.window)
-    return np.asarray(10 * np.log10(np.abs(np.fft.rfft(frames, axis=2)) ** 2 + 1e-300))
+    return np.asarray(10 * np.log10(short_time_power(padded, LEVELS.window, LEVELS.window) + 1e-300))

@@ -20,6 +20,7 @@ from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.comparing.outcome.sound_effects import level_words
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
+from sonic_bullet.signal.octave_bands import in_octave
 
 
 class _Common(NamedTuple):
@@ -220,7 +221,7 @@ def _response(x: Array, y: Array, sr: int) -> tuple[Array, Array, float]:
     freq = np.fft.rfftfreq(n, 1 / sr)
     centres, response = [], []
     for centre in (63.0 * 2**k for k in range(9)):
-        band = (freq >= centre / 2**0.5) & (freq < centre * 2**0.5)
+        band = in_octave(freq, centre)
         if band.any() and power_x[band].sum() > 1e-7 * power_x.sum():
             centres.append(centre)
             response.append(10 * np.log10(power_y[band].sum() / power_x[band].sum()))

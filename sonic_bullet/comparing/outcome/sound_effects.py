@@ -14,8 +14,7 @@ import numpy as np
 from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
-
-AUDIBLE_OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
+from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ, octave_power
 
 
 class _Onset(NamedTuple):
@@ -73,8 +72,7 @@ def band_levels(x: Array, sr: int) -> Array:
     faded = np.concatenate([x[:, : x.shape[1] - fade], x[:, x.shape[1] - fade :] * ending], axis=1)
     power = (np.abs(np.fft.rfft(faded, axis=1)) ** 2).sum(axis=0) * 2 / n**2
     freq = np.fft.rfftfreq(n, 1 / sr)
-    edge = math.sqrt(2)
-    sums = [power[(freq >= f / edge) & (freq < f * edge)].sum() for f in AUDIBLE_OCTAVES_HZ if f / edge < sr / 2]
+    sums = octave_power(power, freq, [f for f in AUDIBLE_OCTAVES_HZ if f / math.sqrt(2) < sr / 2])
     with np.errstate(divide="ignore"):
         return np.asarray(10 * np.log10(np.array(sums)))
 

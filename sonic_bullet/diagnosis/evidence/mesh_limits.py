@@ -25,8 +25,8 @@ from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.pairing import PAIRING
-from sonic_bullet.estimator.lines.log_spectral import with_noise
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import with_noise
 
 MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 FAR_FOR_MESH = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength

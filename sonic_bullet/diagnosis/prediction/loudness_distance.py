@@ -12,9 +12,9 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Comparable, Take
-from sonic_bullet.estimator.lines.log_spectral import with_noise
 from sonic_bullet.estimator.perceptual.image import loudness_levels
 from sonic_bullet.records.errors import RecordError
+from sonic_bullet.signal.log_spectral import with_noise
 
 FULL_SCALE = 90.0
 OBSERVED = 0.05  # sone

@@ -24,9 +24,9 @@ from sonic_bullet.diagnosis.prediction.prediction import Prediction, Predictions
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain
-from sonic_bullet.estimator.lines.log_spectral import SPECTRAL, Floor, floor_between, power_spectra, white, with_noise
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
+from sonic_bullet.signal.log_spectral import SPECTRAL, Floor, floor_between, power_spectra, white, with_noise
 
 # rms of a noisy take of a cell with power over noise ABOVE
 EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * SPECTRAL.above_noise))

@@ -22,9 +22,9 @@ from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.selection.thresholds import RULES
-from sonic_bullet.estimator.lines.log_spectral import SPECTRAL, Floor
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
+from sonic_bullet.signal.log_spectral import SPECTRAL, Floor
 
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF_BAND = 2 ** (1 / 6)  # of a third octave, to each side

@@ -85,7 +85,7 @@ class CaseFit:
 
     youngs_pa = γρ with ρ of the guess. damping_scatter: relative, of decays about the law. amplitude_scatter: relative,
     of amplitudes about σψ. foreign_hz: strong lines that are no mode. assumed: what was taken from the guess. warnings:
-    one line each. log_spectral_db: distance of recording and synthesis (lines/log_spectral.py), mean over the fitted
+    one line each. log_spectral_db: distance of recording and synthesis (signal/log_spectral.py), mean over the fitted
     strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with. evidence: what was
     recorded of each object, those without a mesh included. takes: how far the prediction of each take is, of those held
     out where there are any. dimension_tolerance: of the shapes, relative, in γ's variance.

@@ -9,7 +9,7 @@ import numpy as np
 
 from sonic_bullet.estimator.fit.case_fit import ObjectFit
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound, predicted
-from sonic_bullet.estimator.lines.log_spectral import floor_of, log_spectral_db, with_noise
+from sonic_bullet.signal.log_spectral import floor_of, log_spectral_db, with_noise
 
 
 def log_spectral_of(objects: tuple[ObjectFit, ...], gain: float) -> float:

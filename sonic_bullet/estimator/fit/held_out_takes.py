@@ -26,12 +26,12 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject, recorded_signals
 from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, find_best_gain, find_nearest_take
 from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.estimator.fit.typical_strike import strike_lines
-from sonic_bullet.estimator.lines.log_spectral import Floor, floor_between, power_spectra
 from sonic_bullet.files.cases import CaseRecording
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.residual.offline import residual_sound
+from sonic_bullet.signal.log_spectral import Floor, floor_between, power_spectra
 
 if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.case_fit import CaseFit

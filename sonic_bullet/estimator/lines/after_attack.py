@@ -20,10 +20,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from sonic_bullet.estimator.lines.line_values import Lines
-from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import floor_between
 
 WIDTHS_AROUND = 7  # widths, from two on, above and below a line
 

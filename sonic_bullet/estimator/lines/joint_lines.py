@@ -16,13 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
-from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.estimator.lines.pole_selection import apart, selected
 from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.log_spectral import floor_between
 
 __all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 

@@ -1,6 +1,6 @@
 """The gain by which a sound is nearest to a recording, where nobody says how hard was struck.
 
-    ĝ = argmin over g ≥ 0 of D(r, g·p + noise)              D: lines/log_spectral.py, from powers
+    ĝ = argmin over g ≥ 0 of D(r, g·p + noise)              D: signal/log_spectral.py, from powers
         noise: N to a sound that has none, (1 − g²)₊ N to one that was recorded with as much
 
 Which cells stand above the noise goes with g, so D has several minima: all of a grid from nothing upwards are looked
@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from sonic_bullet.estimator.lines.log_spectral import SPECTRAL, Floor, noise_spectra, spectra_distance_db
 from sonic_bullet.records import Array
+from sonic_bullet.signal.log_spectral import SPECTRAL, Floor, noise_spectra, spectra_distance_db
 
 
 class _GainGrid(NamedTuple):

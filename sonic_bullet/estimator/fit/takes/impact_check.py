@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from sonic_bullet.estimator.fit.prediction_of_lines import lines_sound
 from sonic_bullet.estimator.lines.line_values import Lines
-from sonic_bullet.estimator.lines.log_spectral import floor_between
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.log_spectral import floor_between
 
 
 class _AnImpact(NamedTuple):

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import short_time_power, window_energy
 
 
 class _SpectralDistance(NamedTuple):
@@ -75,9 +76,7 @@ def floor_of(residual: Array) -> Floor:
     Medians over time, so that what still rings does not count.
     """
     window = min(SPECTRAL.floor_window, len(residual) // 4)
-    shape = np.hanning(window)
-    frames = np.lib.stride_tricks.sliding_window_view(residual, window)[:: window // 2]
-    power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum()
+    power = short_time_power(residual, window, window // 2) / window_energy(window)
     # the median of an exponential law is ln 2 of its mean
     return Floor(np.maximum(np.median(power, axis=0) / np.log(2), 1e-24))
 
@@ -93,13 +92,11 @@ def floor_between(signals: list[Array]) -> Floor:
     length = min(len(signal) for signal in signals)
     window = max(SPECTRAL.floor_window, 1 << int(np.log2(max(min(length // 6, most), 1))))
     rows = []
-    shape = np.hanning(window)
     for signal in signals:
         tail = signal[-max(len(signal) // 3, min(len(signal), 2 * window)) :]
         if len(tail) < window:
             tail = np.pad(tail, (0, window - len(tail)))
-        frames = np.lib.stride_tricks.sliding_window_view(tail, window)[:: window // 2]
-        rows.append(np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2 / (shape**2).sum())
+        rows.append(short_time_power(tail, window, window // 2) / window_energy(window))
     quartile = float(np.log(4 / 3))  # of an exponential law over its mean
     level = np.quantile(np.concatenate(rows), 0.25, axis=0) / quartile
     return Floor(np.maximum(_broad(level, side * window // SPECTRAL.floor_window), 1e-24))
@@ -149,12 +146,12 @@ def log_spectral_db(
 
 def power_spectra(sound: Array, windows: tuple[int, ...] = SPECTRAL.windows) -> tuple[Array, ...]:
     """Powers (frames, bins) of a sound (n,) under each window that fits into it."""
-    return tuple(_power(sound, window) for window in windows if window <= len(sound))
+    return tuple(short_time_power(sound, window, window // 4) for window in windows if window <= len(sound))
 
 
 def noise_spectra(floor: Floor, like: tuple[Array, ...]) -> tuple[Array, ...]:
     """Mean powers (1, bins) of the noise under the windows of spectra ``like``."""
-    return tuple(floor.at(power.shape[1])[None] * (np.hanning(2 * (power.shape[1] - 1)) ** 2).sum() for power in like)
+    return tuple(floor.at(power.shape[1])[None] * window_energy(2 * (power.shape[1] - 1)) for power in like)
 
 
 def spectra_distance_db(
@@ -190,8 +187,3 @@ def noise_floor_db(
     return log_spectral_db(
         with_noise(sound, floor, seeds[0]), with_noise(sound, floor, seeds[1]), floor, windows=windows, above=above
     )
-
-
-def _power(sound: Array, window: int) -> Array:
-    frames = np.lib.stride_tricks.sliding_window_view(sound, window)[:: window // 4]
-    return np.asarray(np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)) ** 2)
