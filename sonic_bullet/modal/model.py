@@ -28,6 +28,8 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.storage import cache as store
 
+LEAST_ERROR = 1e-4  # relative, of a frequency: smaller errors are not distinguished
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Unit:
@@ -256,6 +258,11 @@ def _solve(
             )
     elif found.method.meshed and len(found.value):
         note += "; error not known: no coarser elements tell it"
+    left_open = found.method.surface_error(found.sectors, of.stiffness)
+    if left_open >= LEAST_ERROR:
+        note += (
+            f"; arcs in place of its facets change frequencies by up to {_percent(left_open).removeprefix('about ')}"
+        )
     return _Unit(
         found.value,
         np.ascontiguousarray(shown.shape[:, :, found.order]),
@@ -268,9 +275,8 @@ def _solve(
 
 
 def _percent(error: float) -> str:
-    least_error = 1e-4  # relative, of a frequency: smaller errors are not distinguished
     return (
-        f"about {100 * error:.{2 if error < 1 else 3}g} %" if error >= least_error else f"under {100 * least_error:g} %"
+        f"about {100 * error:.{2 if error < 1 else 3}g} %" if error >= LEAST_ERROR else f"under {100 * LEAST_ERROR:g} %"
     )
 
 

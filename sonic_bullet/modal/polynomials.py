@@ -271,6 +271,10 @@ class Ritz:
         other, _ = lowest(more.stiffness(tensor), value * (1 + 1e-9), more.rigid)
         return abs(value / float(other[top[1]]) - 1) / 2
 
+    def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
+        """Return 0: a box has no other surface."""
+        return 0.0
+
     def finer(self) -> Ritz | None:
         """Return the box with two more polynomials along each axis, None where that takes too many unknowns."""
         x, y, z = (n + 2 for n in self.terms)

@@ -97,6 +97,10 @@ class ModalMethod(Protocol):
         """Estimate the relative error in frequency of mode top[1] of sector top[0]; NaN where it is not known."""
         ...
 
+    def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
+        """Estimate the largest relative change of frequencies by what the surface given leaves open."""
+        ...
+
     def finer(self) -> ModalMethod | None:
         """Return the same method with a smaller error, None where it may cost no more."""
         ...

@@ -40,8 +40,8 @@ class Ours:
 @dataclass(frozen=True, slots=True)
 class Compared:
     """worst: largest relative error of the first fifteen; split: largest relative distance within a pair of the
-    truth's, None where it has none; told: the error that the note tells, None where it tells none; bounded: how many of
-    the fifteen are no farther off than that and the truth's own change.
+    truth's, None where it has none; told: the error that the note tells, of elements and facets, None where it tells
+    none; bounded: how many of the fifteen are no farther off than that and the truth's own change.
     """
 
     worst: float
@@ -53,7 +53,8 @@ class Compared:
 def compared(found: Ours, truth: Truth, *, paired: bool) -> Compared:
     """Modes in ascending order against the truth's; fewer than it has: infinite error."""
     told = re.search(r"error up to \d+ Hz (?:about|under) ([\d.e-]+) %", found.note)
-    bound = float(told[1]) / 100 if told else None
+    facets = re.search(r"facets change frequencies by up to ([\d.e-]+) %", found.note)
+    bound = (float(told[1]) + (float(facets[1]) if facets else 0.0)) / 100 if told else None
     if len(found.frequency_hz) < len(truth.frequency_hz):
         return Compared(np.inf, None, bound, 0)
     ours = found.frequency_hz[: len(truth.frequency_hz)]

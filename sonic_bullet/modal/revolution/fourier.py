@@ -9,7 +9,7 @@ from itertools import count
 import numpy as np
 
 from sonic_bullet.modal import eigen, polynomials
-from sonic_bullet.modal.revolution import rings, skin
+from sonic_bullet.modal.revolution import facets, rings, skin
 from sonic_bullet.modal.revolution.rings import Revolved
 from sonic_bullet.modal.revolution.section import Section, sectioned
 from sonic_bullet.modal.revolution.series import Series, series
@@ -135,6 +135,10 @@ class Fourier:
         most = (top[1] + 1) * sectors[top[0]].multiplicity
         other, _ = finer._around(series(finer.section, [tensor]), m, most, [np.inf])
         return left * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
+
+    def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
+        """Estimate by how much frequencies change where the facets of the meridian are arcs."""
+        return facets.facets_error(self.body, self.section, sectors, tensor)
 
     def finer(self) -> Fourier | None:
         """Return the body on a section with sides `finer_sides` times shorter, None where that takes too many nodes."""

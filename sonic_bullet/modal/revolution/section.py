@@ -37,6 +37,7 @@ class Section:
     basis : scikit-fem's, cubic on curved triangles
     rim_m : (s, 3, 2) start, middle and end of each side of the outline, walked with the body on the left
     dof : (s, 4) unknowns of each side at its start, at thirds, at its end
+    facet : (s,) the basis' mesh's facet that each side is
     on_axis : (s,)
     curvature : (s,) of the smooth outline
     """
@@ -44,6 +45,7 @@ class Section:
     basis: Any
     rim_m: Array
     dof: Array
+    facet: Array
     on_axis: Array
     curvature: Array
 
@@ -195,7 +197,7 @@ def _section(
     inner[:, backward] = inner[::-1, backward]
     corner = basis.nodal_dofs[0][start]
     dof = np.stack([corner, inner[0], inner[1], np.roll(corner, -1)], axis=1)
-    return Section(basis, np.stack([rim, middle, np.roll(rim, -1, axis=0)], axis=1), dof, on_axis, curvature)
+    return Section(basis, np.stack([rim, middle, np.roll(rim, -1, axis=0)], axis=1), dof, facet, on_axis, curvature)
 
 
 def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:

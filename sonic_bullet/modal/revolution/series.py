@@ -61,11 +61,20 @@ class Series:
 
 def series(section: Section, tensors: list[Array]) -> Series:
     """Assemble the problems on a section for isotropic tensors (6, 6) in order rr zz θθ zθ rθ rz, at density one."""
-    from scipy.sparse import csr_array
-
     from sonic_bullet.modal.sparse.ordering import dissection
 
     basis = section.basis
+    order = dissection(basis.doflocs.T, basis.element_dofs.T)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    power, mass = assembled(basis, np.ones(len(basis.dx)), tensors, place)
+    return Series(power, mass, place[np.unique(section.dof[section.on_axis])], place)
+
+
+def assembled(basis: Any, factor: Array, tensors: list[Array], place: Array) -> tuple[tuple[Any, ...], Any]:
+    """Assemble K₀, K₁, K₂ of each tensor and M on a basis, each of its parts (t,) times a factor of any sign."""
+    from scipy.sparse import csr_array
+
     r = np.asarray(basis.global_coordinates())[0]  # (t, q)
     t, q = r.shape
     value = np.stack([np.broadcast_to(basis.basis[i][0], (t, q)) for i in range(10)], axis=-1)  # (t, q, 10)
@@ -80,16 +89,12 @@ def series(section: Section, tensors: list[Array]) -> Series:
     strain[1, :, :, 4, :, 0] = strain[1, :, :, 3, :, 2] = -over
     strain *= weight[..., None, None]
     plain, turned = strain.reshape(2, t, q * 6, 30)
-    element = basis.element_dofs.T
-    order = dissection(basis.doflocs.T, element)
-    place = np.empty(len(order), np.int64)
-    place[order] = np.arange(len(order))
-    column = (3 * place[element][:, :, None] + np.arange(3)).reshape(t, 30)
+    column = (3 * place[basis.element_dofs.T][:, :, None] + np.arange(3)).reshape(t, 30)
     where = np.repeat(column, 30, axis=1).ravel(), np.tile(column, (1, 30)).ravel()
-    n = 3 * len(order)
+    n = 3 * len(place)
 
     def sparse_of(blocks: Array) -> Any:
-        return csr_array((blocks.ravel(), where), shape=(n, n))
+        return csr_array(((blocks * factor[:, None, None]).ravel(), where), shape=(n, n))
 
     power = []
     for tensor in tensors:
@@ -99,6 +104,5 @@ def series(section: Section, tensors: list[Array]) -> Series:
         power.append((sparse_of(first), sparse_of(mixed + mixed.transpose(0, 2, 1)), sparse_of(third)))
     heavy = value * weight
     block = np.einsum("tqi,tqj->tij", heavy, heavy)
-    mass = sparse_of(np.einsum("tij,ab->tiajb", block, np.eye(3)))
-    on_axis = np.unique(section.dof[section.on_axis])
-    return Series(tuple(power), mass, place[on_axis], place)
+    mass = sparse_of(np.einsum("tij,ab->tiajb", block, np.eye(3)).reshape(t, 30, 30))
+    return tuple(power), mass
