@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.recorded_objects import Struck
-from sonic_bullet.effects.damping_law import BETTER, FEWEST_LINES, OMEGA_1, DampingLaw
+from sonic_bullet.effects.damping_law import LAW_SEARCH, OMEGA_1, DampingLaw
 from sonic_bullet.effects.damping_law.damping_form import Damping
 from sonic_bullet.effects.presets_of_effects import stored
 from sonic_bullet.presets import Elasticity, Preset, named_preset
@@ -60,7 +60,7 @@ def law_of(modes: Rows) -> tuple[DampingLaw, float]:
     slope, level = np.polyfit(ratio, decay, 1)
     constant, power = decay - ratio - (decay - ratio).mean(), decay - slope * ratio - level
     score = [count * math.log(float((r**2).mean())) + k * math.log(count) for r, k in ((constant, 1), (power, 2))]
-    if score[0] < score[1] + BETTER:
+    if score[0] < score[1] + LAW_SEARCH.better:
         eta = 2 * math.exp(float((decay - ratio).mean())) / OMEGA_1
         return DampingLaw("constant-loss", rounded(eta, digits=2)), float(constant.std(ddof=1))
     eta = 2 * math.exp(float(level)) / OMEGA_1
@@ -71,7 +71,7 @@ def damping_of(modes: Rows, guess: str) -> tuple[Damping, tuple[dict[str, Any], 
     """Damping and effects of a preset of numbers: the law of its modes where they have one, else the guess's."""
     rings = ", ".join(f"{row['freq_hz']:.0f} Hz {row['t60_s']:.2g} s" for row in modes)
     note, shown = f"T60 measured: {rings}", f"decays of {len(modes)} modes"
-    law, scatter = law_of(modes) if len(modes) >= FEWEST_LINES else (None, math.inf)
+    law, scatter = law_of(modes) if len(modes) >= LAW_SEARCH.fewest_lines else (None, math.inf)
     if law is None or scatter > LOSS_SCATTER:
         taken = f"taken from '{guess}': {shown} alone are known, or scatter by more than a factor of 2"
         return msgspec.structs.replace(

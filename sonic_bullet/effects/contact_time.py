@@ -12,7 +12,7 @@ be observed and are not count, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -21,15 +21,29 @@ from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owne
 from sonic_bullet.records import Array
 
 HERTZ = -0.2
-# times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its second
-AGAIN = 1.29
-ROUGH = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
-FEWEST_LINES, FEW = 2, 3  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
-COMMON, TURNS = 0.05, 15  # of how loud a mode is at the sensor, relative; of weights, gain and that
-STARTS = (0.05, 0.5, 0.95)  # of the ratios of what is observed to what is expected: gains to begin with
+
+
+class _RollOff(NamedTuple):
+    """Numbers of the search for a roll-off."""
+
+    # times shorter or longer, where it is fitted again: √(5/3), half the way from the half-sine's first zero to its
+    # second
+    again: float = 1.29
+    rough: float = 0.03  # of a mode's strongest expected amplitude: the shapes' own error
+    fewest_lines: int = 2  # lines to tell a roll-off from; with no more than FEW, modes that nobody hears tell it, too
+    few: int = 3
+    common: float = 0.05  # of how loud a mode is at the sensor, relative; of weights, gain and that
+    turns: int = 15
+    # of the ratios of what is observed to what is expected: gains to begin with
+    starts: tuple[float, float, float] = (0.05, 0.5, 0.95)
+    # times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
+    silent: float = 10.0
+    hidden: float = 0.02
+
+
+ROLL_OFF = _RollOff()
+
 ONSET_DELAYS_S, ONSET_FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
-# times what noise alone makes of an amplitude, and of the strongest: what lines may not be found under
-SILENT, HIDDEN = 10.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -78,7 +92,7 @@ class ContactTime:
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
         """Fit pulse, duration and exponent to the lines' amplitudes; None where no roll-off is identified."""
-        tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= FEWEST_LINES]
+        tables = [_table(h) for h in evidence.observed if len(h.freq_hz) >= ROLL_OFF.fewest_lines]
         if not tables:
             return None
         freq, level, expected, observed, sd, most = (np.concatenate([t[i] for t in tables]) for i in range(6))
@@ -92,10 +106,10 @@ class ContactTime:
         # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
         if isinstance(evidence.known, cls):
             grid, pulses = (
-                evidence.known.duration_s(reference) * np.geomspace(1 / AGAIN, AGAIN, 24),
+                evidence.known.duration_s(reference) * np.geomspace(1 / ROLL_OFF.again, ROLL_OFF.again, 24),
                 (evidence.known.pulse,),
             )
-        plain = _cost(expected, observed, sd, ROUGH * most, mode)
+        plain = _cost(expected, observed, sd, ROLL_OFF.rough * most, mode)
         directions: list[tuple[float, float, Self]] = []
         for exponent in (HERTZ, 0.0):
             best: tuple[float, Self] | None = None
@@ -106,7 +120,7 @@ class ContactTime:
                     h = np.abs(magnitude(pulse, freq * tau * share))
                     # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
                     h = h / max(float(h.max()), 1e-300)
-                    return _cost(expected * h, observed, sd, ROUGH * most * np.maximum(h, 0.02), mode)
+                    return _cost(expected * h, observed, sd, ROLL_OFF.rough * most * np.maximum(h, 0.02), mode)
 
                 costs = np.array([at(t) for t in grid])
                 i = int(costs.argmin())
@@ -124,7 +138,7 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
     """Flatten strikes and lines: frequency, impulse, expected and observed magnitude, spread, strongest expected."""
     expected, observed = np.abs(h.expected), np.abs(h.amplitude)
     freq, sd = h.freq_hz, h.amplitude_sd
-    if len(freq) <= FEW and h.model is not None and h.signal is not None:
+    if len(freq) <= ROLL_OFF.few and h.model is not None and h.signal is not None:
         high, quiet, least = _unobserved(h)
         freq, expected, observed, sd = (
             np.append(freq, high),
@@ -150,8 +164,8 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
     alone = alone[np.abs(np.log(h.all_hz[alone, None] / observed)).min(axis=1) > near]
     hidden = (
-        SILENT * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
-        + HIDDEN * np.abs(h.amplitude).max(axis=1)[:, None]
+        ROLL_OFF.silent * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
+        + ROLL_OFF.hidden * np.abs(h.amplitude).max(axis=1)[:, None]
     )
     return h.all_hz[alone], np.abs(h.push[:, alone]), hidden
 
@@ -160,26 +174,26 @@ def _cost(expected: Array, observed: Array, sd: Array, rough: Array, mode: Array
     """Compute twice the negative log likelihood under Cauchy's law at the best common gain.
 
     rough (·) is the shapes' own error, which grows with the gain; mode (·) the index of each row's mode. A mode's level
-    at the sensor is off by COMMON at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
+    at the sensor is off by 0.05 at all strikes alike, integrated out by Laplace's method [Tierney & Kadane 1986].
     """
     loud = (observed > 0) & (expected > 0)
-    starts = np.quantile(observed[loud] / expected[loud], STARTS) if loud.any() else np.ones(1)
+    starts = np.quantile(observed[loud] / expected[loud], ROLL_OFF.starts) if loud.any() else np.ones(1)
     return min(_from(float(gain), expected, observed, sd, rough, mode) for gain in starts)
 
 
 def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array, mode: Array) -> float:
     """Compute `_cost` at the gain that is reached from a first one."""
     own = np.zeros(int(mode.max()) + 1)
-    for _ in range(TURNS):
+    for _ in range(ROLL_OFF.turns):
         width = sd**2 + (gain * rough) ** 2
-        model = expected * (1 + COMMON * own[mode])
+        model = expected * (1 + ROLL_OFF.common * own[mode])
         weight = 1 / (1 + (observed - gain * model) ** 2 / width / 9) / width
         gain = max(float((weight * model * observed).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
-        slope = COMMON * gain * expected
+        slope = ROLL_OFF.common * gain * expected
         stiff = np.bincount(mode, weight * slope**2, len(own))
         own = np.bincount(mode, weight * slope * (observed - gain * expected), len(own)) / (1 + stiff)
     width = sd**2 + (gain * rough) ** 2
-    off = observed - gain * expected * (1 + COMMON * own[mode])
+    off = observed - gain * expected * (1 + ROLL_OFF.common * own[mode])
     return float((np.log(width) + 9 * np.log1p(off**2 / width / 9)).sum() + (own**2 + np.log1p(stiff)).sum())
 
 
@@ -191,7 +205,7 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     turn, x = 2 * np.pi * h.freq_hz, np.abs(h.expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.angle(h.amplitude / h.expected * np.sign(magnitude(effect.pulse, h.freq_hz * tau))) + turn * tau / 2
-        width = np.hypot(h.amplitude_sd / np.abs(h.amplitude), ROUGH * x.max(axis=0) / x)
+        width = np.hypot(h.amplitude_sd / np.abs(h.amplitude), ROLL_OFF.rough * x.max(axis=0) / x)
     good = np.isfinite(off) & np.isfinite(width) & (width < 1)
     turn, off, width = np.broadcast_to(turn, off.shape)[good], off[good], width[good]
 

@@ -9,7 +9,7 @@ Identified by lines that belong to no mode and whose amplitude goes with the imp
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -28,8 +28,15 @@ from sonic_bullet.effects.protocol import (
 )
 from sonic_bullet.records import Array
 
-LOUD = 0.02  # of the strongest line's amplitude
-APART = 0.004  # from a mode of the body
+
+class _Foreign(NamedTuple):
+    """What counts as a foreign mode."""
+
+    loud: float = 0.02  # of the strongest line's amplitude
+    apart: float = 0.004  # from a mode of the body
+
+
+FOREIGN = _Foreign()
 
 
 @dataclass(frozen=True)
@@ -106,7 +113,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     ) / np.maximum(mean, 1e-300)
     lean = _against_level(size, sd, level)
     strongest = max(float(np.abs(h.amplitude).max(initial=0.0)), 1e-300)
-    loud = (mean * level.max() > LOUD * strongest) & (mean * level.max() > 30 * np.median(h.foreign_sd))
+    loud = (mean * level.max() > FOREIGN.loud * strongest) & (mean * level.max() > 30 * np.median(h.foreign_sd))
     coherent = (
         np.abs((weight * per).sum(axis=0)) / np.maximum((weight * size).sum(axis=0), 1e-300)
         if h.signed
@@ -114,7 +121,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     )
     apart = np.ones(len(mean), bool)
     if h.model is not None and len(h.freq_hz):
-        apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > APART
+        apart = np.abs(np.log(h.foreign_hz[:, None] / h.freq_hz)).min(axis=1) > FOREIGN.apart
     good = loud & apart & (loose < steady) & (coherent > 0.9) & (np.abs(lean) < 0.25)
     if h.dry:  # a room makes several lines of one, and read outside it, in short frames, each is that one
         good &= _alone(h.foreign_hz, np.where(good, mean, 0.0))
@@ -126,7 +133,7 @@ def _alone(freq_hz: Array, size: Array) -> Array:
     """Select the lines (k,) that represent their neighbours: the loudest first, none within reach of a selected one."""
     found = np.zeros(len(freq_hz), bool)
     for k in np.argsort(-size, kind="stable"):
-        found[k] = not (found & (np.abs(freq_hz - freq_hz[k]) < max(APART * freq_hz[k], 1 / FRAME_S))).any()
+        found[k] = not (found & (np.abs(freq_hz - freq_hz[k]) < max(FOREIGN.apart * freq_hz[k], 1 / FRAME_S))).any()
     return found
 
 

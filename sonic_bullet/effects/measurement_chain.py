@@ -12,7 +12,7 @@ every recording.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -20,8 +20,18 @@ from sonic_bullet.effects.common.hum import hum_of
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
 from sonic_bullet.records import Array
 
-CORNERS, FINER, HIGHEST = 160, 21, 0.49  # tried, and again about the best; of the rate
-STUCK, OFTEN = 4, 12  # samples in a row at the limit, or in all
+
+class _Chain(NamedTuple):
+    """Numbers of the search for a filter and a limit."""
+
+    corners: int = 160  # tried, and again about the best; of the rate
+    finer: int = 21
+    highest: float = 0.49
+    stuck: int = 4  # samples in a row at the limit, or in all
+    often: int = 12
+
+
+CHAIN = _Chain()
 
 
 @dataclass(frozen=True)
@@ -160,7 +170,9 @@ def limit_of(signals: list[Array], known: float = 0.0) -> float:
 def _stands(row: Array) -> bool:
     """Decide whether a recording (n,) is at its peak for long, or often."""
     stuck = np.abs(row) > 0.998 * np.abs(row).max()
-    return bool(np.convolve(stuck, np.ones(STUCK), "valid").max(initial=0) >= STUCK or stuck.sum() > OFTEN)
+    return bool(
+        np.convolve(stuck, np.ones(CHAIN.stuck), "valid").max(initial=0) >= CHAIN.stuck or stuck.sum() > CHAIN.often
+    )
 
 
 def _hum(observed: list[ObjectEvidence], known_hz: float) -> dict[str, Any]:
@@ -188,10 +200,10 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
         return {}
     sr = min(h.sr for h in observed)
     best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})
-    bottom, top = float(freq.min()), min(float(freq.max()), HIGHEST * sr)
+    bottom, top = float(freq.min()), min(float(freq.max()), CHAIN.highest * sr)
     # beyond all lines it is a slope, which much else is
-    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, HIGHEST * sr)))):
-        grid = np.geomspace(*ends, CORNERS)
+    for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, CHAIN.highest * sr)))):
+        grid = np.geomspace(*ends, CHAIN.corners)
         for order in (1, 2, 3, 4):
 
             def cost(corner: float, order: int = order, high: bool = name == "high") -> float:
@@ -199,7 +211,7 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
 
             costs = [cost(corner) for corner in grid]
             i = int(np.argmin(costs))
-            fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, CORNERS - 1)], FINER)
+            fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, CHAIN.corners - 1)], CHAIN.finer)
             finer = [cost(corner) for corner in fine]
             if min(finer) < best[0]:
                 best = (min(finer), {f"{name}_pass_hz": float(fine[int(np.argmin(finer))]), f"{name}_order": order})

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -20,12 +20,21 @@ from sonic_bullet.effects.common.proofs import finite, same_length
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
-SPLIT = (1e-4, 3e-2)
-LOUD, CLEAR = 1e-3, 30.0  # of the strongest line; of a line's own spread
-ALIKE_PATTERNS = 0.9
-# relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near or
-# too far
-SAME, TURNED_PAIR = 1e-4, 0.3
+
+class _Splitting(NamedTuple):
+    """Numbers that tell a split pair."""
+
+    split: tuple[float, float] = (1e-4, 3e-2)
+    loud: float = 1e-3  # of the strongest line; of a line's own spread
+    clear: float = 30.0
+    alike_patterns: float = 0.9
+    # relative; sin 2ψ: what the mesh has apart, and nothing has turned, are neighbours by chance, which it has too near
+    # or too far
+    same: float = 1e-4
+    turned_pair: float = 0.3
+
+
+SPLITTING = _Splitting()
 
 
 @dataclass(frozen=True)
@@ -146,7 +155,8 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
     clear = size > np.maximum(
-        LOUD * size.max(), CLEAR * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0)
+        SPLITTING.loud * size.max(),
+        SPLITTING.clear * np.concatenate([h.amplitude_sd, h.foreign_sd], axis=1).max(axis=0),
     )
     trials: list[tuple[bool, float, int, int, int, float, float]] = []
     for a in np.flatnonzero(np.diff(model_hz) < AXES_PAIR * model_hz[:-1]):
@@ -156,16 +166,27 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
         for i, j in combinations(near.tolist(), 2):
             low, high = (int(i), int(j)) if every[i] < every[j] else (int(j), int(i))
             split = float(2 * (every[high] - every[low]) / (every[high] + every[low]))
-            if not SPLIT[0] < split < SPLIT[1] or split * middle < observed * min(decay[low], decay[high]) / np.pi:
+            if (
+                not SPLITTING.split[0] < split < SPLITTING.split[1]
+                or split * middle < observed * min(decay[low], decay[high]) / np.pi
+            ):
                 continue
             turn, alike = _turn(strike[:, [a, a + 1]], sensor[[a, a + 1]], amplitude[:, [low, high]], h.signed)
             off = abs((every[low] + every[high]) / (2 * middle) - 1)
-            plain = alike > ALIKE_PATTERNS
+            plain = alike > SPLITTING.alike_patterns
             if not plain and alike > also and len(strike) >= strikes:
                 alike = min(alike, _turn(even[:, [a, a + 1]], sensor[[a, a + 1]], evenly[:, [low, high]], h.signed)[1])
             if plain or (alike > also and len(strike) >= strikes):
                 trials.append(
-                    (plain, float(alike - off / reach * (1 - ALIKE_PATTERNS)), int(a), int(low), int(high), split, turn)
+                    (
+                        plain,
+                        float(alike - off / reach * (1 - SPLITTING.alike_patterns)),
+                        int(a),
+                        int(low),
+                        int(high),
+                        split,
+                        turn,
+                    )
                 )
     found: list[tuple[float, ...]] = []
     split_off: list[bool] = []
@@ -180,7 +201,12 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
         done.update((mode, mode + 1))
         middle = float((every[low] + every[high]) / 2)
         found.append((middle, split, turn, 2 * middle / float(model_hz[mode] + model_hz[mode + 1])))
-        split_off.append(bool(model_hz[mode + 1] / model_hz[mode] - 1 < SAME or abs(np.sin(2 * turn)) > TURNED_PAIR))
+        split_off.append(
+            bool(
+                model_hz[mode + 1] / model_hz[mode] - 1 < SPLITTING.same
+                or abs(np.sin(2 * turn)) > SPLITTING.turned_pair
+            )
+        )
     return sorted(found) if split_off and np.mean(split_off) >= mostly else []
 
 

@@ -12,7 +12,7 @@ area A. The decays give the order of ka, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -21,10 +21,17 @@ from sonic_bullet.effects.common.points import solved
 from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, ModalModel
 
-IMPEDANCE = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
-SOUND = 343.0
-SCATTER = 0.03
-ORDERS: tuple[int, ...] = (2, 4)
+
+class _RadiationNumbers(NamedTuple):
+    """Numbers of radiation."""
+
+    impedance: float = 1.2 * 343.0  # ρ₀ c in kg/(m² s)
+    sound: float = 343.0
+    scatter: float = 0.03
+    orders: tuple[int, ...] = (2, 4)
+
+
+RADIATION = _RadiationNumbers()
 
 
 @dataclass(frozen=True)
@@ -56,14 +63,14 @@ class Radiation:
 
     def efficiency(self, freq_hz: Array) -> Array:
         """Compute σ (k,) at frequencies (k,) in Hz."""
-        low = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / SOUND) ** self.order
+        low = (2 * np.pi * np.asarray(freq_hz) * self.radius_m / RADIATION.sound) ** self.order
         return np.asarray(low / (self.order**2 / 4 + low))
 
     def apply(self, x: ModalModel) -> ModalModel:
         """Add the loss to the decays of a body's modes, and the tilt to their levels at the sensor."""
         sigma = self.efficiency(x.freq_hz)
         omega = np.sqrt(x.omega0_squared_per_s2)
-        decay = np.minimum(x.decay_per_s + self.strength * 0.5 * IMPEDANCE * sigma * areas(x), 0.99 * omega)
+        decay = np.minimum(x.decay_per_s + self.strength * 0.5 * RADIATION.impedance * sigma * areas(x), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
         shape = x.shape.copy() if self.tilt else x.shape
         if self.tilt:
@@ -98,7 +105,7 @@ class Radiation:
         loud = (np.abs(observed.push) ** 2).sum(axis=0) + 1e-300
         mine = np.array([np.average(area[m], weights=loud[m]) for m in observed.mode])
         decay, w2 = observed.decay_per_s, observed.omega**2
-        sd = np.hypot(observed.decay_sd_per_s, SCATTER * decay) + 1e-3
+        sd = np.hypot(observed.decay_sd_per_s, RADIATION.scatter * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(observed.model.vertex_m[np.unique(observed.model.face)], axis=0)))
         plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
         radii = np.geomspace(0.02 * across, across, 40)
@@ -107,12 +114,17 @@ class Radiation:
             # by either law: which one, a pulse or a filter may have hidden
             radii = evidence.known.radius_m * np.geomspace(1 / again, again, 21)
         found = []
-        for one in (cls(float(radius), 1.0, order=order) for order in ORDERS for radius in radii):
+        for one in (cls(float(radius), 1.0, order=order) for order in RADIATION.orders for radius in radii):
             x, left = _left(
                 decay,
                 sd,
                 np.stack(
-                    [np.full(len(w2), 0.5), 0.5 * w2, 0.5 * IMPEDANCE * one.efficiency(observed.freq_hz) * mine], axis=1
+                    [
+                        np.full(len(w2), 0.5),
+                        0.5 * w2,
+                        0.5 * RADIATION.impedance * one.efficiency(observed.freq_hz) * mine,
+                    ],
+                    axis=1,
                 ),
             )
             if x[2] > 0:
@@ -160,4 +172,4 @@ def _off(observed: ObjectEvidence, made: Radiation, tilt: float) -> Array:
 
 def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float:
     """Compute twice the negative log likelihood (Cauchy) of the levels' misfit: lines of other modes lie far off."""
-    return float(2 * np.log1p((_off(observed, made, tilt) / SCATTER) ** 2).sum())
+    return float(2 * np.log1p((_off(observed, made, tilt) / RADIATION.scatter) ** 2).sum())

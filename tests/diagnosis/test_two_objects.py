@@ -18,7 +18,7 @@ from sonic_bullet.diagnosis.selection.acceptance import accepted
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import left_out_db
 from sonic_bullet.effects.damping_law import DampingLaw
-from sonic_bullet.effects.radiation import IMPEDANCE, Radiation, areas
+from sonic_bullet.effects.radiation import RADIATION, Radiation, areas
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.signal.log_spectral import floor_between
 from tests.made.body import SR, recorded, truth
@@ -93,6 +93,6 @@ def test_what_the_medium_takes_is_taken_of_another_object_by_its_own_shape() -> 
     other = replace(recorded(), recorded=None)
     other = replace(other, model=replace(other.model, shape=np.float32(2) * other.model.shape))  # a quarter of the mass
     plain, model = predict(truth(), other).model, predict(replace(truth(), effects=(air, held)), other).model
-    expected = 0.3 * 0.5 * IMPEDANCE * air.efficiency(plain.freq_hz) * areas(plain)
+    expected = 0.3 * 0.5 * RADIATION.impedance * air.efficiency(plain.freq_hz) * areas(plain)
     assert expected.min() > 0
     assert model.decay_per_s - plain.decay_per_s == pytest.approx(expected, rel=1e-3)

@@ -14,7 +14,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
 from sonic_bullet.effects.protocol import Impact
-from sonic_bullet.effects.rebound import ALL, Rebound, _turned
+from sonic_bullet.effects.rebound import REBOUND, Rebound, _turned
 from sonic_bullet.effects.rebound.later_hits import second_hit, third_hit
 from sonic_bullet.effects.room import Room
 from sonic_bullet.estimator.lines import joint_lines as line_fit
@@ -45,7 +45,7 @@ def test_all_strikes_at_once_tell_a_second_hit(exponent: float) -> None:
     body = recorded(Rebound(0.0197, 0.016, 0.25, exponent, 0.25, 2))
     observed = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
     said, gap, told = max(second_hit(observed, observed.impulse_n_s / 0.016))
-    assert told == exponent and said > ALL
+    assert told == exponent and said > REBOUND.all
     assert gap == pytest.approx(0.0197, abs=1.5 / SR)
     found = Rebound._of_all(observed)
     assert found is not None and found.hits == 2

@@ -12,7 +12,7 @@ from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.score import least_db, mean_db, predict_takes
-from sonic_bullet.effects.radiation import SOUND, Radiation
+from sonic_bullet.effects.radiation import RADIATION, Radiation
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.few_cases import parametrize_few
 from tests.made.body import GAIN, recorded
@@ -23,7 +23,7 @@ def test_efficiency_is_the_pulsating_and_the_oscillating_spheres(degree: int, or
     """σ_n = 1/(x² |h_n'(x)|²), x = ka   [Fahy & Gardonio 2007, ch. 3; Morse & Ingard 1968, eq. 7.2.8]."""
     x = np.geomspace(0.02, 30, 40)
     slope = spherical_jn(degree, x, derivative=True) + 1j * spherical_yn(degree, x, derivative=True)
-    told = Radiation(0.03, 1.0, order=order).efficiency(x * SOUND / (2 * np.pi * 0.03))
+    told = Radiation(0.03, 1.0, order=order).efficiency(x * RADIATION.sound / (2 * np.pi * 0.03))
     assert told == pytest.approx(1 / (x**2 * np.abs(slope) ** 2), rel=1e-9)
 
 

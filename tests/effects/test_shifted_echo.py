@@ -13,7 +13,7 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.room import Room
-from sonic_bullet.effects.room.shifted_echo import FEWEST_PAIRS, copied
+from sonic_bullet.effects.room.shifted_echo import ECHO, copied
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import recorded
 
@@ -87,7 +87,7 @@ def test_copies_are_those_of_one_ratio_of_frequency_and_decay_and_of_one_pattern
     )
 
 
-@pytest.mark.parametrize(("lines", "copies"), [(40, FEWEST_PAIRS - 1), (90, FEWEST_PAIRS + 2)])
+@pytest.mark.parametrize(("lines", "copies"), [(40, ECHO.fewest_pairs - 1), (90, ECHO.fewest_pairs + 2)])
 def test_few_copies_or_few_among_many_lines_are_chance(lines: int, copies: int) -> None:
     f, d, a = some(lines)
     few = slice(0, copies)

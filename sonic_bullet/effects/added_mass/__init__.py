@@ -21,7 +21,7 @@ import numpy as np
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
-from sonic_bullet.effects.added_mass.mass_search import WIDTHS, MassFit, Scored, strict
+from sonic_bullet.effects.added_mass.mass_search import MASS_SEARCH, MassFit, Scored, strict
 from sonic_bullet.effects.common.pairs import agreed, patterns
 from sonic_bullet.effects.common.points import nearest, spread_out, vertex_normals
 from sonic_bullet.effects.protocol import (
@@ -39,9 +39,7 @@ from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array, ModalModel
 
 POINTS = 100
-# of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the body's own
-# imperfection may be what it stands for
-LIGHTEST = 0.005
+
 SEARCH_RESTARTS = 6
 
 
@@ -125,11 +123,19 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
             if observed.poisson is None and ratio is not None:
                 return known  # beside what moves modes too, no other ν is at hand
             start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
-            return cls._at(x, trial.refined(start, WIDTHS[-1:]), observed.poisson is not None)
+            return cls._at(x, trial.refined(start, MASS_SEARCH.widths[-1:]), observed.poisson is not None)
         plain = patterns(observed, x)
         none = min(
             (
-                agreed(trial.line, trial.size, x.freq_hz, plain, shift=s, width=WIDTHS[-1], strict=strict(WIDTHS[-1]))
+                agreed(
+                    trial.line,
+                    trial.size,
+                    x.freq_hz,
+                    plain,
+                    shift=s,
+                    width=MASS_SEARCH.widths[-1],
+                    strict=strict(MASS_SEARCH.widths[-1]),
+                )
                 for s in trial.shifts(x.freq_hz, plain)
             ),
             key=lambda one: one[0],
@@ -143,7 +149,7 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
                 one
                 for s in shares
                 for y in yields
-                for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), WIDTHS[0])
+                for one in trial.sifted(vertex, s * x.mass_kg, (y * up, y * side), MASS_SEARCH.widths[0])
             ]
 
         found = sorted(one for some in parallel_map(at, spread_out(x, POINTS).tolist()) for one in some)
@@ -157,10 +163,16 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
             )
         )
         # round bodies: as heavy, elsewhere
-        again = sorted(trial.scored(int(v), *best[2:], WIDTHS[1]) for v in spread_out(x, 3 * POINTS))
-        best = min(best, *parallel_map(lambda start: trial.refined(start, WIDTHS[1:]), again[: SEARCH_RESTARTS // 2]))
+        again = sorted(trial.scored(int(v), *best[2:], MASS_SEARCH.widths[1]) for v in spread_out(x, 3 * POINTS))
+        best = min(
+            best,
+            *parallel_map(lambda start: trial.refined(start, MASS_SEARCH.widths[1:]), again[: SEARCH_RESTARTS // 2]),
+        )
         bare = none[0] + trial.unlikely(trial.fitted)
-        if best[0] > bare - max(better[0], better[1] * abs(bare)) or best[2] < LIGHTEST * x.mass_kg:
+        # of the body's: what is lighter moves no mode by 1 % (Δf/f = −2 m/M at a bar's end), so a mesh or the
+        # body's own imperfection may be what it stands for
+        lightest = 0.005
+        if best[0] > bare - max(better[0], better[1] * abs(bare)) or best[2] < lightest * x.mass_kg:
             return None
         return cls._at(x, best, observed.poisson is not None)
 

@@ -8,6 +8,7 @@ places in turns, each with Gauss and Newton's steps of (ln m, ln R, s, ν) on th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,12 +19,23 @@ from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
-PLACES, POLISH = 2, 4  # of a turn's best, and steps from each
-# of ln m, ln R along and across, ν, and s: for slopes, and at once
-SMALL, MOST = (0.01, 0.1, 0.1, 0.004), (0.4, 1.0, 1.0, 0.03, 0.02)
-LEAST, FINE = 0.1, 1e-3  # of what the rest of the modes may yield; of ν
-NEAR, TURNS = 16, 5  # vertices and turns of the search about one of them
-WIDTHS = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
+
+class _MassSearch(NamedTuple):
+    """Numbers of the search for a mass."""
+
+    places: int = 2  # of a turn's best, and steps from each
+    polish: int = 4
+    # of ln m, ln R along and across, ν, and s: for slopes, and at once
+    small: tuple[float, ...] = (0.01, 0.1, 0.1, 0.004)
+    most: tuple[float, ...] = (0.4, 1.0, 1.0, 0.03, 0.02)
+    least: float = 0.1  # of what the rest of the modes may yield; of ν
+    fine: float = 1e-3
+    near: int = 16  # vertices and turns of the search about one of them
+    turns: int = 5
+    widths: tuple[float, float, float] = (0.016, 0.008, 0.004)  # of ln f: lines and modes are paired ever more closely
+
+
+MASS_SEARCH = _MassSearch()
 
 
 def strict(width: float) -> float:
@@ -31,7 +43,7 @@ def strict(width: float) -> float:
 
     It grows as the square of the frequencies' weight: in the end a mode's amplitude may be off by 8 % of its strongest.
     """
-    return (WIDTHS[0] / width) ** 2
+    return (MASS_SEARCH.widths[0] / width) ** 2
 
 
 def _at_points(x: ModalModel, observed: ObjectEvidence) -> ModalModel:
@@ -203,16 +215,16 @@ class MassFit:
         )
         return price + self.unlikely(ratio), vertex, mass, along, found, ratio
 
-    def refined(self, best: Scored, widths: tuple[float, ...] = WIDTHS) -> Scored:
+    def refined(self, best: Scored, widths: tuple[float, ...] = MASS_SEARCH.widths) -> Scored:
         """Search nearby vertices, masses and compliances in turns, at each width of ln f."""
         for width in widths:
             best = self.scored(*best[1:], width)
             reach = 0.12 * float(np.linalg.norm(np.ptp(self.bare.vertex_m[self.bare.face], axis=(0, 1))))
-            for _ in range(TURNS):
+            for _ in range(MASS_SEARCH.turns):
                 first: dict[int, Scored] = {}
                 for one in sorted(self._around(best, reach, width)):
                     first.setdefault(one[1], one)
-                better = min(best, *(self.polished(one, width) for one in list(first.values())[:PLACES]))
+                better = min(best, *(self.polished(one, width) for one in list(first.values())[: MASS_SEARCH.places]))
                 reach *= 0.5
                 if better == best and reach < 0.02:
                     break
@@ -227,8 +239,8 @@ class MassFit:
         at = self.bare.vertex_m
         body = np.unique(self.bare.face)
         near = body[((at[body] - at[vertex]) ** 2).sum(axis=1) < reach**2]
-        least = [LEAST * y for y in self.rest(vertex)]
-        trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // NEAR)]]
+        least = [MASS_SEARCH.least * y for y in self.rest(vertex)]
+        trials = [(int(v), mass, (up, side)) for v in near[:: max(1, len(near) // MASS_SEARCH.near)]]
         trials += [(vertex, mass * f, (up, side)) for f in steps]
         trials += [(vertex, mass, (max(up, least[0]) * f, side)) for f in (0, *steps)] + [
             (vertex, mass, (up, max(side, least[1]) * f)) for f in (0, *steps)
@@ -245,7 +257,7 @@ class MassFit:
             return ratio
         return float(
             np.clip(
-                round(ratio / FINE) * FINE,
+                round(ratio / MASS_SEARCH.fine) * MASS_SEARCH.fine,
                 poisson_range.guess - most_sd * poisson_range.sd,
                 min(poisson_range.guess + most_sd * poisson_range.sd, solid),
             )
@@ -253,7 +265,7 @@ class MassFit:
 
     def polished(self, best: Scored, width: float) -> Scored:
         """Fit mass, compliances, shift and ν at one vertex to its pairs, which are assigned anew with every step."""
-        for _ in range(POLISH):
+        for _ in range(MASS_SEARCH.polish):
             step = self._step(best, width)
             better = best
             for share in (1.0, 0.3):
@@ -268,7 +280,10 @@ class MassFit:
     def _stepped(self, best: Scored, step: Array) -> tuple[int, float, tuple[float, float], float, float]:
         """Apply a step of ln m, ln R along and across, ν and s."""
         _, vertex, mass, along, shift, ratio = best
-        up, side = (max(y, LEAST * r) * np.exp(d) for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True))
+        up, side = (
+            max(y, MASS_SEARCH.least * r) * np.exp(d)
+            for y, r, d in zip(along, self.rest(vertex), step[1:3], strict=True)
+        )
         return (
             vertex,
             mass * float(np.exp(step[0])),
@@ -278,7 +293,10 @@ class MassFit:
         )
 
     def _step(self, best: Scored, width: float) -> Array:
-        """Compute the step (5,) of Gauss and Newton, at most MOST; a number without influence on the lines stays."""
+        """Compute the step (5,) of Gauss and Newton, at most `MASS_SEARCH.most`.
+
+        A number without influence on the lines stays.
+        """
         _, _, _, _, shift, ratio = best
         made = self.loaded(best[1], best[2], best[3], ratio)
         _, row, column, shift = agreed(
@@ -288,10 +306,12 @@ class MassFit:
         slope = np.zeros((len(row), 5))
         slope[:, 4] = 1.0
         for k in range(4 if self.observed.poisson is not None else 3):
-            vertex, mass, along, _, other = self._stepped(best, SMALL[k] * np.eye(5)[k])
+            vertex, mass, along, _, other = self._stepped(best, MASS_SEARCH.small[k] * np.eye(5)[k])
             if k == 3 and other == ratio:
                 continue
-            slope[:, k] = np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / SMALL[k]
+            slope[:, k] = (
+                np.log(self.loaded(vertex, mass, along, other)[0][column] / made[0][column]) / MASS_SEARCH.small[k]
+            )
         poisson_range = self.observed.poisson
         pull = np.array(
             [0, 0, 0, (poisson_range.guess - ratio) / poisson_range.sd**2 if poisson_range is not None else 0.0, 0]
@@ -299,4 +319,4 @@ class MassFit:
         weight = 1 / (1 + (off / width) ** 2) / width**2
         held = np.diag(np.array([1.0, 1.0, 1.0, poisson_range.sd if poisson_range is not None else 1.0, 1.0]) ** -2)
         step = np.linalg.solve((slope.T * weight) @ slope + held, (slope.T * weight) @ off + pull)
-        return np.asarray(np.clip(step, -np.array(MOST), MOST))
+        return np.asarray(np.clip(step, -np.array(MASS_SEARCH.most), MASS_SEARCH.most))

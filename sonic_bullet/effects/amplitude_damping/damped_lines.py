@@ -12,6 +12,7 @@ which a linear body does not show, and which a mesh leaves to chance (axes.py). 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,11 +21,20 @@ from sonic_bullet.effects.common.envelope import Envelopes
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
-ROUGH = 5e-3  # of ln |z|: what neighbours and windows do to a frame
-THIN = 3  # one frame of so many will do where angles are tried
-RANGE = (0.2, 1.6)  # of the observed decay
-LEVEL, MOST, EARLY = 0.1, 2.0, 0.5  # of ln |z|: shapes' own error; more off is no worse; nepers of a line's decay
-FAINT = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
+
+class _Damped(NamedTuple):
+    """Numbers of the fit of lines whose decay falls."""
+
+    rough: float = 5e-3  # of ln |z|: what neighbours and windows do to a frame
+    thin: int = 3  # one frame of so many will do where angles are tried
+    range: tuple[float, float] = (0.2, 1.6)  # of the observed decay
+    level: float = 0.1  # of ln |z|: shapes' own error; more off is no worse; nepers of a line's decay
+    most: float = 2.0
+    early: float = 0.5
+    faint: float = 1e-3  # of Σ|A|: degenerate modes may cancel, not vanish
+
+
+DAMPED = _Damped()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,9 +128,9 @@ def lines_under(e: Envelopes, h: ObjectEvidence, measure: str) -> list[DecayFram
             continue
         pair = degenerate(h, k)
         amplitude, level = about(h, k, measure, ANGLES if pair else np.zeros(1))
-        thin = slice(None, None, THIN if pair else 1)
+        thin = slice(None, None, DAMPED.thin if pair else 1)
         size = np.maximum(np.abs(e.z[:, q]), 1e-300)
-        weight = np.where(good, 1 / (ROUGH**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
+        weight = np.where(good, 1 / (DAMPED.rough**2 + (e.noise[:, q, None] / size) ** 2), 0.0)[:, thin]
         freq = float(h.model.freq_hz[h.mode[k]].mean()) if h.model is not None else float(h.freq_hz[k])
         found.append(
             DecayFrames(
@@ -154,7 +164,7 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
         line = under(line)
     many = len(line.amplitude)
     decay = np.full(many, line.decay_per_s) if start is None or len(start) != many else start
-    low, high = RANGE[0] * line.decay_per_s, RANGE[1] * line.decay_per_s
+    low, high = DAMPED.range[0] * line.decay_per_s, DAMPED.range[1] * line.decay_per_s
     for _ in range(steps):
         left, slope = _left(line, damping_growth, decay)
         step = (line.weight * left * slope).sum(axis=(1, 2)) / np.maximum(
@@ -162,7 +172,7 @@ def fitted_decay(line: DecayFrames, damping_growth: float, start: Array | None =
         )
         decay = np.clip(decay - step, low, high)
     left, _ = _left(line, damping_growth, decay)
-    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + ROUGH**2)
+    within = np.log((line.weight * left**2).sum(axis=(1, 2)) / line.weight.sum() + DAMPED.rough**2)
     return DecayFit(within, _between(line, damping_growth, decay) if many > 1 else np.zeros(many), decay)
 
 
@@ -172,13 +182,13 @@ def _between(line: DecayFrames, damping_growth: float, decay: Array) -> Array:
     In a strike where the line is not observed the model may not be louder.
     """
     observed = line.weight.sum(axis=1) > 0
-    early = line.time_s < line.time_s[0] + EARLY / line.decay_per_s
+    early = line.time_s < line.time_s[0] + DAMPED.early / line.decay_per_s
     weight = np.where(observed[:, None], line.weight, early.astype(float))
     # (p, s)
     off = (weight / weight.sum(axis=1, keepdims=True) * (line.log - _model(line, damping_growth, decay)[0])).sum(axis=2)
     off = off - np.median(off[:, observed], axis=1, keepdims=True)
-    off = np.clip(np.where(observed, off, np.minimum(off, 0.0)), -MOST, MOST)
-    return np.asarray(np.log((off**2).mean(axis=1) + LEVEL**2))
+    off = np.clip(np.where(observed, off, np.minimum(off, 0.0)), -DAMPED.most, DAMPED.most)
+    return np.asarray(np.log((off**2).mean(axis=1) + DAMPED.level**2))
 
 
 def would(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: int) -> float:
@@ -196,7 +206,8 @@ def onset(line: DecayFrames, damping_growth: float, decay_per_s: float, angle: i
     total = line.weight.sum(axis=1)
     mean = (line.weight * (line.log - model)).sum(axis=1) / np.where(total > 0, total, np.nan)
     return np.asarray(
-        np.exp(mean) * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), FAINT * np.abs(one.amplitude[0]).sum(axis=1))
+        np.exp(mean)
+        * np.maximum(np.abs(one.amplitude[0].sum(axis=1)), DAMPED.faint * np.abs(one.amplitude[0]).sum(axis=1))
     )
 
 
@@ -213,7 +224,7 @@ def _model(line: DecayFrames, damping_growth: float, decay: Array) -> tuple[Arra
     less = 1 + x * (1 - fall)
     part = line.amplitude[..., None] * less ** (-1 / line.power)
     total = part.sum(axis=2)
-    least = FAINT * np.abs(line.amplitude).sum(axis=2)[..., None]
+    least = DAMPED.faint * np.abs(line.amplitude).sum(axis=2)[..., None]
     total = np.where(np.abs(total) > least, total, np.where(total < 0, -1.0, 1.0) * np.maximum(least, 1e-300))
     slope = -line.time_s * (part * (1 + x) / less).sum(axis=2) / total
     return np.log(np.abs(total)) - decay[:, None, None] * line.time_s, slope

@@ -15,7 +15,7 @@ with the least Bayes information criterion is proposed, where it is better than 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -25,8 +25,17 @@ from sonic_bullet.records import Array, Material, ModalModel
 
 LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
 OMEGA_1 = 2000 * np.pi
-BETTER = 6.0  # in BIC, than Rayleigh's law
-FEWEST_LINES, AGAIN = 5, 4  # lines: to look for a law, and to fit it again to a part of them
+
+
+class _LawSearch(NamedTuple):
+    """Numbers of the search for a law."""
+
+    better: float = 6.0  # in BIC, than Rayleigh's law
+    fewest_lines: int = 5  # lines: to look for a law, and to fit it again to a part of them
+    again: int = 4
+
+
+LAW_SEARCH = _LawSearch()
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,7 @@ class DampingLaw:
         )
         decay, spread = decay - extra, np.hypot(spread, taken * extra)
         good = np.isfinite(decay) & (decay > 0) & ~np.isposinf(spread)  # in a room some lines tell no decay
-        if good.sum() < (FEWEST_LINES if evidence.known is None else AGAIN):
+        if good.sum() < (LAW_SEARCH.fewest_lines if evidence.known is None else LAW_SEARCH.again):
             return None
         omega, decay = omega[good], decay[good]
         sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), scatter)
@@ -130,7 +139,8 @@ class DampingLaw:
         bic, best = min(trials, key=lambda t: t[0])
         return (
             best
-            if evidence.known is not None or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - BETTER
+            if evidence.known is not None
+            or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - LAW_SEARCH.better
             else None
         )
 

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, ringing
-from sonic_bullet.effects.orthotropy.tensor_search import WIDTHS, Tensor, fitted, isotropic_p, search
-from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, p_of
+from sonic_bullet.effects.orthotropy.tensor_search import Tensor, fitted, isotropic_p, search
+from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, TENSOR_SEARCH, p_of
 from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
@@ -96,7 +96,10 @@ class Orthotropy:
             density = bodies[0].elastic.material.density_kg_m3
             start = p_of(evidence.known.stiffness_pa / density)
             return cls.of(
-                fitted(bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), WIDTHS[4:]), density
+                fitted(
+                    bodies, evidence.known.symmetry, start, isotropic_p(bodies[0].elastic), TENSOR_SEARCH.widths[4:]
+                ),
+                density,
             )
         lines = sum(len(t.log_hz) for t in bodies)
         if lines < 6 or all(_fits(h) for h in evidence.observed):

@@ -27,6 +27,7 @@ from sonic_bullet.effects.orthotropy.tensors import (
     NAMES,
     RATIOS,
     SYMMETRIES,
+    TENSOR_SEARCH,
     bricks,
     constants,
     cubes,
@@ -39,17 +40,7 @@ from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-LEAST_SPREAD = 3e-4  # of ln f: less is not identifiable
-WIDTHS = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
 TENSOR_STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
-STARTS, BLIND = 24, 12  # of those sifted, taken further; without patterns
-# in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
-HINTED, HOP = 10.0, 2.0
-HOPPERS, HOPS = 3, 6  # ends that are gone on from, and how often
-FIRST = 10  # lines that decide where no pattern does
-FREED = (0, 1, 3)  # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
-# of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
-REACH, WIDE = 2.0, 0.014
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,21 +95,28 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     ends = parallel_map(lambda one: fitted(bodies, *one, start), sifted)
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)
     round_axes = ("hexagonal-x", "hexagonal-y", "hexagonal-z")
-    ends += parallel_map(lambda symmetry: fitted(bodies, symmetry, best.p, start, WIDTHS[3:]), ("cubic", *round_axes))
+    ends += parallel_map(
+        lambda symmetry: fitted(bodies, symmetry, best.p, start, TENSOR_SEARCH.widths[3:]), ("cubic", *round_axes)
+    )
     cube = min((e for e in ends if e.symmetry == "cubic"), key=lambda e: e.bic)
     ends += parallel_map(
-        lambda symmetry: fitted(bodies, symmetry, cube.p, start, WIDTHS[4:]), (*round_axes, "orthorhombic")
+        lambda symmetry: fitted(bodies, symmetry, cube.p, start, TENSOR_SEARCH.widths[4:]),
+        (*round_axes, "orthorhombic"),
     )
     near = min(ends, key=lambda e: e.bic)
-    ends += parallel_map(lambda k: fitted(bodies, "orthorhombic", near.p, start, WIDTHS[k:]), FREED)
-    if plain.bic - min(e.bic for e in ends) > HINTED and not blind:
+    ends += parallel_map(
+        lambda k: fitted(bodies, "orthorhombic", near.p, start, TENSOR_SEARCH.widths[k:]), TENSOR_SEARCH.freed
+    )
+    if plain.bic - min(e.bic for e in ends) > TENSOR_SEARCH.hinted and not blind:
         ends += [
             _hopped(bodies, e, start)
-            for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[:HOPPERS]
+            for e in sorted((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)[
+                : TENSOR_SEARCH.hoppers
+            ]
         ]
         near = min(ends, key=lambda e: e.bic)
         ends += parallel_map(
-            lambda symmetry: fitted(bodies, symmetry, near.p, start, WIDTHS[4:]), ("cubic", *round_axes)
+            lambda symmetry: fitted(bodies, symmetry, near.p, start, TENSOR_SEARCH.widths[4:]), ("cubic", *round_axes)
         )
     return plain, min(ends, key=lambda e: e.bic)
 
@@ -129,13 +127,16 @@ def _hopped(bodies: Sequence[BodyLines], best: Tensor, guess: Array) -> Tensor:
     Wrong pairs of upper lines and modes support one another where the low ones hardly decide [iterated local search:
     Lourenço, Martin & Stützle 2003].
     """
-    for _ in range(HOPS):
+    for _ in range(TENSOR_SEARCH.hops):
         sides = [p for p in (best.p + sign * one for one in np.diag(TENSOR_STEP) for sign in (-1, 1)) if sound(p)]
         end = min(
-            parallel_map(lambda p: fitted(bodies, "orthorhombic", p, guess, WIDTHS[FREED[-1] :]), sides),
+            parallel_map(
+                lambda p: fitted(bodies, "orthorhombic", p, guess, TENSOR_SEARCH.widths[TENSOR_SEARCH.freed[-1] :]),
+                sides,
+            ),
             key=lambda e: e.bic,
         )
-        if end.bic > best.bic - HOP:
+        if end.bic > best.bic - TENSOR_SEARCH.hop:
             break
         best = end
     return best
@@ -153,10 +154,10 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
     By correlation of the two spectra on a logarithmic axis.
     """
     peaks = 2
-    shift = np.arange(-REACH, REACH + 1e-9, WIDE / 2)
+    shift = np.arange(-TENSOR_SEARCH.reach, TENSOR_SEARCH.reach + 1e-9, TENSOR_SEARCH.wide / 2)
     most = max(bodies, key=lambda t: float(t.worth.sum()))
     blind = most.amplitude is None
-    first = 1 / (1 + (np.arange(len(most.log_hz)) / FIRST) ** 2) if blind else np.ones(len(most.log_hz))
+    first = 1 / (1 + (np.arange(len(most.log_hz)) / TENSOR_SEARCH.first) ** 2) if blind else np.ones(len(most.log_hz))
 
     def scored(p: Array) -> list[tuple[float, Array]]:
         score = _agreement(most, seen_by(most, p), first, shift)
@@ -164,12 +165,12 @@ def _sifted(bodies: Sequence[BodyLines], starts: list[Array]) -> list[Array]:
         return [(float(score[best]), p + shift[best] * moved) for best in _peaks(score)[: peaks if blind else 1]]
 
     found = sorted((one for some in parallel_map(scored, starts) for one in some), key=lambda s: -s[0])
-    return [p for _, p in found[: BLIND if blind else STARTS]]
+    return [p for _, p in found[: TENSOR_SEARCH.blind if blind else TENSOR_SEARCH.starts]]
 
 
 def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Array:
     """Correlate lines, each weighted by first (k,), and modes whose ln λ is shifted (n,): (n,)."""
-    nil = 5.0  # of WIDE: farther off nothing is in common
+    nil = 5.0  # of TENSOR_SEARCH.wide: farther off nothing is in common
     place = seen.log_hz + shift[:, None] / 2
     worth = np.interp(place, lines.log_hz, first, 0.0, 0.0)  # (n, m)
     weight = lines.worth[:, None] * first[:, None] * seen.alike**2
@@ -177,13 +178,13 @@ def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Arra
     step = (shift[1] - shift[0]) / 2
     # (k, m, a few)
     at = np.rint((gap - shift[0] / 2) / step).astype(int)[..., None] + np.arange(
-        -round(nil * WIDE / step), round(nil * WIDE / step) + 1
+        -round(nil * TENSOR_SEARCH.wide / step), round(nil * TENSOR_SEARCH.wide / step) + 1
     )
-    near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / WIDE) ** 2)
+    near = weight[..., None] * np.exp(-0.5 * ((gap[..., None] - shift[0] / 2 - at * step) / TENSOR_SEARCH.wide) ** 2)
     here = (at >= 0) & (at < len(shift))
     cell = (at * len(seen.log_hz) + np.arange(len(seen.log_hz))[:, None])[here]
     shared = np.bincount(cell, near[here], worth.size).reshape(worth.shape)
-    own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / WIDE) ** 2)
+    own = np.exp(-0.5 * ((seen.log_hz[:, None] - seen.log_hz[None, :]) / TENSOR_SEARCH.wide) ** 2)
     return np.asarray((shared * worth).sum(axis=1) / np.sqrt(np.maximum(((worth @ own) * worth).sum(axis=1), 1.0)))
 
 
@@ -194,7 +195,11 @@ def _peaks(score: Array) -> list[int]:
 
 
 def fitted(
-    bodies: Sequence[BodyLines], symmetry: str, start: Array, guess: Array, widths: Sequence[float] = WIDTHS
+    bodies: Sequence[BodyLines],
+    symmetry: str,
+    start: Array,
+    guess: Array,
+    widths: Sequence[float] = TENSOR_SEARCH.widths,
 ) -> Tensor:
     """Fit the tensor of a symmetry from a start.
 
@@ -236,8 +241,8 @@ def _few(lines: BodyLines, width: float) -> int | None:
     """
     return (
         None
-        if lines.amplitude is not None or width <= WIDTHS[-1]
-        else max(FIRST, round(len(lines.log_hz) * WIDTHS[-1] / width * 2))
+        if lines.amplitude is not None or width <= TENSOR_SEARCH.widths[-1]
+        else max(TENSOR_SEARCH.first, round(len(lines.log_hz) * TENSOR_SEARCH.widths[-1] / width * 2))
     )
 
 
@@ -306,14 +311,14 @@ def _judged(bodies: Sequence[BodyLines], symmetry: str, q: Array, guess: Array) 
         slopes.append(0.5 * s.slope(mode).T @ turn)
     left, worth = np.concatenate(off), np.concatenate([t.worth for t in bodies])
     inside, n = left < LINE_CAP, len(left)
-    square = float(np.average(np.maximum(left, LEAST_SPREAD) ** 2, weights=worth))
+    square = float(np.average(np.maximum(left, TENSOR_SEARCH.least_spread) ** 2, weights=worth))
     bic = (
         n * np.log(square)
         + numbers * np.log(np.average(np.concatenate(unlike), weights=worth))
         + SYMMETRIES[symmetry] * np.log(n)
     )
     scatter = float(np.sqrt(np.mean(left[inside] ** 2))) if inside.any() else LINE_CAP
-    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, LEAST_SPREAD))
+    held = _held(np.concatenate(slopes), symmetry, q, guess, max(scatter, TENSOR_SEARCH.least_spread))
     return Tensor(symmetry, p, float(bic), scatter, float(inside.mean()), held, float(np.sqrt(square)))
 
 

@@ -9,6 +9,8 @@ Isotropic 2, cubic 3, hexagonal about x, y or z (transversely isotropic) 5, orth
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.records import ORTHOTROPIC, Array
@@ -17,6 +19,29 @@ SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "h
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 RATIOS = (0.04, 0.1, 0.25, 0.6, 1.5, 4.0, 10.0)
 MILD = (0.16, 0.4, 1.0, 2.5, 6.0)
+
+
+class _TensorSearch(NamedTuple):
+    """Numbers of the search for a stiffness tensor."""
+
+    least_spread: float = 3e-4  # of ln f: less is not identifiable
+    widths: tuple[float, ...] = (0.04, 0.025, 0.016, 0.01, 0.007, 0.005, 0.004, 0.004)
+    starts: int = 24  # of those sifted, taken further; without patterns
+    blind: int = 12
+    # in BIC: over isotropy, so that a nearer end is looked for; over the last end, so that it is gone on from
+    hinted: float = 10.0
+    hop: float = 2.0
+    hoppers: int = 3  # ends that are gone on from, and how often
+    hops: int = 6
+    first: int = 10  # lines that decide where no pattern does
+    # WIDTHS from which on what a symmetry ties is freed: pairing wide, less so, and near
+    freed: tuple[int, int, int] = (0, 1, 3)
+    # of ln E/ρ in the sieve: an isotropic body may have been fitted to what goes along a plank, or across; of ln f
+    reach: float = 2.0
+    wide: float = 0.014
+
+
+TENSOR_SEARCH = _TensorSearch()
 
 
 def stiffness(p: Array) -> Array:

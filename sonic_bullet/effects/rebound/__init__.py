@@ -12,32 +12,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
 from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
-from sonic_bullet.effects.rebound.later_hits import (
-    EXPONENTS,
-    LEAST,
-    MOST_HITS,
-    SPAN_S,
-    hits_by_strike,
-    second_hit,
-    third_hit,
-)
+from sonic_bullet.effects.rebound.later_hits import LATER_HITS, MOST_HITS, hits_by_strike, second_hit, third_hit
 from sonic_bullet.records import Array
 
-MOST, FEW = (
-    0.6,
-    0.05,
-    # of the strikes show it one by one; of all recordings' energy, that it must say together where fewer do: beating
-    # degenerate modes hide it
-)
-FADE = 2.0  # nepers over what is looked at
-# of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
-ALL, CLEARLY, HALF = 0.25, 1.35, 0.5
+
+class _Rebound(NamedTuple):
+    """Numbers that tell a rebound."""
+
+    most: float = 0.6
+    few: float = 0.05
+    fade: float = 2.0  # nepers over what is looked at
+    # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
+    all: float = 0.25
+    clearly: float = 1.35
+    half: float = 0.5
+
+
+REBOUND = _Rebound()
+
 HITS = (3, 4, 5, MOST_HITS)
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 
@@ -110,7 +108,7 @@ class Rebound:
             return None
         if isinstance(evidence.known, cls):
             again = _refined(evidence.known, h, known=True)[1]
-            return replace(evidence.known, **again) if again["restitution"] > LEAST else None
+            return replace(evidence.known, **again) if again["restitution"] > LATER_HITS.least else None
         return cls._one_by_one(h) or cls._of_all(h)
 
     @classmethod
@@ -126,18 +124,22 @@ class Rebound:
             return None
         reference = float(np.exp(np.log(level).mean()))
         (said, gap, exponent), (next_best, _, _), *_ = sorted(second_hit(h, level / reference), reverse=True)
-        if not (said > ALL and said > CLEARLY * next_best):
+        if not (said > REBOUND.all and said > REBOUND.clearly * next_best):
             return None
         start = cls(gap, reference, RESTITUTIONS[1], exponent, None, 2)
         left, best = min((_refined(replace(start, hits=k), h) for k in (2, *HITS)), key=lambda end: end[0])
         alone, count = _refined(replace(start, hits=1), h)[0], len(level)
-        return replace(start, **best) if best["restitution"] > LEAST and count + left < HALF * (count + alone) else None
+        return (
+            replace(start, **best)
+            if best["restitution"] > LATER_HITS.least and count + left < REBOUND.half * (count + alone)
+            else None
+        )
 
     @classmethod
     def _one_by_one(cls, h: ObjectEvidence) -> Self | None:
         """Look for later hits in each strike, and combine what they agree on; None where they do not."""
         found = [(level, hits) for level, hits in zip(h.impulse_n_s, hits_by_strike(h), strict=True) if len(hits)]
-        need = max(2.0, MOST * len(h.impulse_n_s))
+        need = max(2.0, REBOUND.most * len(h.impulse_n_s))
         if len(found) < 2:
             return None
         level = np.array([j if np.isfinite(j) else 1.0 for j, _ in found])
@@ -151,7 +153,7 @@ class Rebound:
                 ),
                 p,
             )
-            for p in EXPONENTS
+            for p in LATER_HITS.exponents
         ]
         (_, first, which), exponent = max(agreed, key=lambda a: a[0][0])
         mine = [(t, i) for t, i in zip(every, which, strict=True) if i >= 0]
@@ -169,7 +171,7 @@ class Rebound:
         start = cls(float(np.exp(first)), reference, e, exponent, shrink, count)
         ends = [_refined(replace(start, hits=k), h) for k in ((2,) if count <= 2 or shrink is None else HITS)]
         left, best = min(ends, key=lambda end: end[0])
-        if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - FEW * len(h.impulse_n_s):
+        if len(mine) < need and left > _refined(replace(start, hits=1), h)[0] - REBOUND.few * len(h.impulse_n_s):
             return None
         return replace(start, **best)
 
@@ -184,10 +186,10 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     sought = 0.07
     held = 0.999  # of the energy of what is played again
     assert h.signal is not None
-    n = min(h.signal.shape[1], 3 * int(SPAN_S[1] * h.sr))
+    n = min(h.signal.shape[1], 3 * int(LATER_HITS.span_s[1] * h.sr))
     size = 2 * n
     # in 1/s: x(t − τ) e^{−wt} = e^{−wτ} (x e^{−wt})(t − τ), so what is cut off at n, of either, counts for less
-    fade = FADE * h.sr / n
+    fade = REBOUND.fade * h.sr / n
     window = np.exp(-fade * np.arange(n) / h.sr)
     sound = np.fft.rfft(direct_as_expected(h)[:, :n] * window, size)
     both, own = np.conj(sound) * np.fft.rfft(h.signal[:, :n] * window, size), np.abs(sound) ** 2

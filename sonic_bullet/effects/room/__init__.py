@@ -13,7 +13,7 @@ room, lines are identified as they would be without it (`dereverberated`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -26,10 +26,23 @@ from sonic_bullet.records import Array
 RT60 = float(np.log(1e3))
 RATES = np.geomspace(1.7, 70.0, 16)  # of δ in 1/s: rt60 of 4 to 0.1 s
 FINE = np.linspace(-0.25, 0.25, 9)  # of ln δ about the best of these
-LINES = 24  # the strongest
-FASTER, FEWEST_LINES, SHARE = 1.25, 3, 0.35  # than the room; lines that are, and of all: who they must be to tell it
-# what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for good
-TURNS, AGAIN, FULLY = 150, 40, 400
+
+
+class _RoomSearch(NamedTuple):
+    """Numbers of the search for a room."""
+
+    lines: int = 24  # the strongest
+    faster: float = 1.25  # than the room; lines that are, and of all: who they must be to tell it
+    fewest_lines: int = 3
+    share: float = 0.35
+    # what is heard between the loudest modes comes last; from a response that is nearly right there is less to do; for
+    # good
+    turns: int = 150
+    again: int = 40
+    fully: int = 400
+
+
+ROOM_SEARCH = _RoomSearch()
 
 
 @dataclass(frozen=True)
@@ -115,7 +128,7 @@ class Room(Dereverberates):
             Iterate to convergence.
         """
         start = self.response if self.sr == sr and len(self.response) == signal.shape[1] else None
-        turns = FULLY if fully else TURNS if start is None else AGAIN
+        turns = ROOM_SEARCH.fully if fully else ROOM_SEARCH.turns if start is None else ROOM_SEARCH.again
         return replace(
             self,
             response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.reverberant_level, start, turns),
@@ -137,7 +150,7 @@ class Room(Dereverberates):
         if (
             observed.signal is None
             or observed.predicted is None
-            or len(observed.freq_hz) < FEWEST_LINES
+            or len(observed.freq_hz) < ROOM_SEARCH.fewest_lines
             or observed.signal.shape[1] < reverberant_tail.LEAST * reverberant_tail.FRAME_S * observed.sr
         ):
             return None
@@ -177,7 +190,7 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
     known : float
         δ found in the whole evidence, near which it is estimated again.
     """
-    lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[:LINES])
+    lines = np.sort(np.argsort(-np.abs(h.amplitude).max(axis=0))[: ROOM_SEARCH.lines])
     rates = known * np.exp(2 * FINE[::2]) if known else RATES
     r = reverberant_tail.modes(h, rates, lines, every=1 if known else 2)
     best = int(_agreed(r).argmax())
@@ -186,7 +199,7 @@ def late(h: ObjectEvidence, known: float | None = None) -> tuple[float, float] |
             return None
         r = reverberant_tail.modes(h, rates[best] * np.exp(FINE), lines)
         best = int(_agreed(r).argmax())
-    mine = r.decay_per_s[best] > FASTER * r.delta[best]
+    mine = r.decay_per_s[best] > ROOM_SEARCH.faster * r.delta[best]
     return float(r.delta[best]), float(
         np.median(r.reverberant_level[best][mine] if mine.any() else r.reverberant_level[best])
     )
@@ -200,15 +213,19 @@ def _agreed(r: reverberant_tail.Read) -> Array:
 
 def _one(r: reverberant_tail.Read, best: int) -> bool:
     """Decide whether lines that decay faster than the room end with it, all of them alike."""
-    # ln likelihood a line gains; of all lines: so few will do where FEWEST_LINES tell it as plainly as that
+    # ln likelihood a line gains; of all lines: so few will do where ROOM_SEARCH.fewest_lines tell it as plainly as that
     plainly, less = 100.0, 0.25
     # ln likelihood a line gains with a tail; of ln δ: how far lines may lie from one another, by the middle
     tells, alike = 10.0, 0.3
     gain, delta = r.ln_likelihood[best] - r.plain, r.delta[best]
-    mine = (r.decay_per_s[best] > FASTER * delta) & (gain > tells)
+    mine = (r.decay_per_s[best] > ROOM_SEARCH.faster * delta) & (gain > tells)
     off = np.abs(np.log(r.delta[r.ln_likelihood.argmax(axis=0)] / delta))[mine]
-    many = mine.mean() > SHARE or (mine.mean() > less and (gain[mine] > plainly).sum() >= FEWEST_LINES)
-    return bool(mine.sum() >= FEWEST_LINES and many and np.median(off) < alike and (off < 2 * alike).mean() > 0.7)
+    many = mine.mean() > ROOM_SEARCH.share or (
+        mine.mean() > less and (gain[mine] > plainly).sum() >= ROOM_SEARCH.fewest_lines
+    )
+    return bool(
+        mine.sum() >= ROOM_SEARCH.fewest_lines and many and np.median(off) < alike and (off < 2 * alike).mean() > 0.7
+    )
 
 
 def identified(
@@ -219,7 +236,7 @@ def identified(
     delta: float,
     reverberant_level: float,
     start: Array | None = None,
-    turns: int = TURNS,
+    turns: int = ROOM_SEARCH.turns,
 ) -> Array:
     """Estimate the tail (n,) by conjugate gradients on the normal equations under its prior.
 

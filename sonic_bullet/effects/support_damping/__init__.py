@@ -20,7 +20,7 @@ from sonic_bullet.effects.common.dashpots import damped
 from sonic_bullet.effects.common.points import nearest, vertex_normals
 from sonic_bullet.effects.protocol import ActsAtPlaces, Cost, Evidence, Mixing, Owner, Stage, Traits
 from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
-from sonic_bullet.effects.support_damping.support_search import NEARER, refined, sought, tuned
+from sonic_bullet.effects.support_damping.support_search import SUPPORT_SEARCH, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
 
 LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
@@ -89,7 +89,9 @@ class SupportDamping(ActsAtPlaces):
             return None
         trial = DashpotFit.of(observed)
         if isinstance(evidence.known, cls):
-            return cls._of(trial, tuned(trial, refined(trial, evidence.known._on(observed.model), NEARER[-2:])[1]))
+            return cls._of(
+                trial, tuned(trial, refined(trial, evidence.known._on(observed.model), SUPPORT_SEARCH.nearer[-2:])[1])
+            )
         found = sought(trial)
         return cls._of(trial, found) if found and _most(trial, found) > LEAST else None
 

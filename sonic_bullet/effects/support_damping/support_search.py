@@ -1,6 +1,6 @@
 """Search for places of dashpots: all over the surface first, then about the best, one after another.
 
-data · ln left + j (3 ln data + BETTER) -> min over the number j of dashpots; each step: grid, the best few of it,
+data · ln left + j (3 ln data + 6) -> min over the number j of dashpots; each step: grid, the best few of it,
     refined       [Schwarz 1978]
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,23 +17,36 @@ from sonic_bullet.effects.support_damping.support_subsets import subsets
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-POINTS, SPOTS = 90, 500  # vertices where another dashpot is looked for; and where the first is, or one that is moved
-# of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
-LOOKED, STARTS, NEAR, FEW = 40, 4, 28, 10
-NEARER = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
-TUNED = 0.15  # of ln c
-WEAK, ENOUGH = 2, 2.0  # of each number of dashpots to first order; of the spreads' own: no more is asked
-BETTER, HALF = 6.0, 0.5  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
+
+class _SupportSearch(NamedTuple):
+    """Numbers of the search for dashpots."""
+
+    points: int = 90  # vertices where another dashpot is looked for; and where the first is, or one that is moved
+    spots: int = 500
+    # of the grid, looked at closer; refined; vertices of a turn about one; spots enough to stand for all there
+    looked: int = 40
+    starts: int = 4
+    near: int = 28
+    few: int = 10
+    nearer: tuple[float, ...] = (0.12, 0.07, 0.04, 0.02)  # turns, in sizes of the body
+    tuned: float = 0.15  # of ln c
+    weak: int = 2  # of each number of dashpots to first order; of the spreads' own: no more is asked
+    enough: float = 2.0
+    better: float = 6.0  # in BIC, for another dashpot; of what one costs: one that explains less ends the search
+    half: float = 0.5
+
+
+SUPPORT_SEARCH = _SupportSearch()
 
 
 def sought(t: DashpotFit) -> Dashpots:
     """Find the dashpots that are accepted, one after another.
 
-    The least Bayes information criterion decides how many, with BETTER for each on top.
+    The least Bayes information criterion decides how many, with SUPPORT_SEARCH.better for each on top.
     """
     most = 4
     data = 3 * len(t.freq_hz)  # a decay, a pattern and a level each
-    apiece = 3 * np.log(data) + BETTER
+    apiece = 3 * np.log(data) + SUPPORT_SEARCH.better
     least = float(t.worth.sum())  # what is left within the spreads asks for nothing
 
     def priced(d: Dashpots) -> tuple[float, Dashpots]:
@@ -46,18 +60,21 @@ def sought(t: DashpotFit) -> Dashpots:
     chosen: Dashpots = ()
     if t.left(chosen) < least:
         return chosen
-    spots = _spread(t, SPOTS)
-    weak = parallel_map(lambda d: tuned(t, refined(t, d, NEARER[-2:])[1]), subsets(t, spots[:POINTS], WEAK))
+    spots = _spread(t, SUPPORT_SEARCH.spots)
+    weak = parallel_map(
+        lambda d: tuned(t, refined(t, d, SUPPORT_SEARCH.nearer[-2:])[1]),
+        subsets(t, spots[: SUPPORT_SEARCH.points], SUPPORT_SEARCH.weak),
+    )
     none = priced(())
     some = min([none, *(priced(d) for d in weak)], key=_cost)
-    if some[1] and t.left(some[1]) < ENOUGH * least:
+    if some[1] and t.left(some[1]) < SUPPORT_SEARCH.enough * least:
         return without_idle(some)
     tried, starts = [none], [chosen]
     while len(chosen) < most:  # of one alone a basin may lie between the points of a coarse grid
-        chosen, starts = _with_one_more(t, starts, _grid(t, spots[:POINTS] if chosen else spots), spots)
+        chosen, starts = _with_one_more(t, starts, _grid(t, spots[: SUPPORT_SEARCH.points] if chosen else spots), spots)
         tried.append(priced(chosen))
         best = min(tried, key=_cost)
-        if tried[-1][0] > best[0] + HALF * apiece or best not in tried[-2:]:
+        if tried[-1][0] > best[0] + SUPPORT_SEARCH.half * apiece or best not in tried[-2:]:
             break  # weak ones have been looked for; of two as strong as each other, one alone may not pay
     return _elsewhere(t, without_idle(min([*tried, some], key=_cost)), spots)
 
@@ -77,8 +94,8 @@ def _elsewhere(t: DashpotFit, found: Dashpots, spots: Array) -> Dashpots:
     best = (t.left(found), found)
     for i in range(len(found)):
         moved = [(*found[:i], replace(found[i], vertex=int(v)), *found[i + 1 :]) for v in spots]
-        few = _best(_left(t, moved), [(*m[:i], *m[i + 1 :], m[i]) for m in moved], STARTS)
-        ends = parallel_map(lambda one: refined(t, one, NEARER)[1], few)
+        few = _best(_left(t, moved), [(*m[:i], *m[i + 1 :], m[i]) for m in moved], SUPPORT_SEARCH.starts)
+        ends = parallel_map(lambda one: refined(t, one, SUPPORT_SEARCH.nearer)[1], few)
         best = min([best, *((t.left(end), end) for end in ends)], key=_cost)
     return best[1]
 
@@ -99,18 +116,20 @@ def _with_one_more(
     for chosen in starts:
         trials = [(*chosen, d) for d in grid]
         few += _best(
-            _of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials), trials, LOOKED
+            _of_each(lambda part: [t.price(*modes) for modes in t.poles(part, t.runs)], trials),
+            trials,
+            SUPPORT_SEARCH.looked,
         )
-    few = _best(_left(t, few), few, STARTS)
+    few = _best(_left(t, few), few, SUPPORT_SEARCH.starts)
     found, *others = (
         one
         for _, one in sorted(
-            parallel_map(lambda one: refined(t, one, NEARER[:2], spots), few), key=lambda pair: pair[0]
+            parallel_map(lambda one: refined(t, one, SUPPORT_SEARCH.nearer[:2], spots), few), key=lambda pair: pair[0]
         )
     )
     for _ in range(min(len(found), 2)):  # once all are where they should be, one may be seen to stand at a mirror image
-        found = refined(t, found, (np.inf, *NEARER), spots)[1]
-    found = tuned(t, min(found, refined(t, found, NEARER[-1:], whole=True)[1], key=t.left))
+        found = refined(t, found, (np.inf, *SUPPORT_SEARCH.nearer), spots)[1]
+    found = tuned(t, min(found, refined(t, found, SUPPORT_SEARCH.nearer[-1:], whole=True)[1], key=t.left))
     return found, [found, *(others if len(found) == 1 else [])]
 
 
@@ -197,17 +216,17 @@ def _around(t: DashpotFit, d: Dashpot, reach_m: float, spots: Array) -> list[Das
     """Return variants of a dashpot: elsewhere with the same strength or loss, stronger, weaker, other direction."""
     finer, coarser = (0.6, 0.8, 0.92, 1.08, 1.25, 1.6), (0.1, 0.3, 3.0, 10.0)  # times stronger, in turns
     if not np.isfinite(reach_m):
-        some = spots[: 2 * POINTS].tolist()
+        some = spots[: 2 * SUPPORT_SEARCH.points].tolist()
         return (
             [_moved(t, d, v) for v in some]
             + [replace(d, vertex=v) for v in some]
             + [replace(d, c=d.c * f) for f in coarser]
         )
     near = _within(t, d, reach_m, spots)
-    near = near[:NEAR] if len(near) >= FEW else _within(t, d, reach_m, t.body)
+    near = near[: SUPPORT_SEARCH.near] if len(near) >= SUPPORT_SEARCH.few else _within(t, d, reach_m, t.body)
     found = [replace(d, c=d.c * f) for f in finer]
     found.append(replace(d, along="every" if d.along == "normal" else "normal"))
-    some = near[:: max(1, len(near) // NEAR)].tolist()
+    some = near[:: max(1, len(near) // SUPPORT_SEARCH.near)].tolist()
     return found + [_moved(t, d, v) for v in some] + [replace(d, vertex=v) for v in some]
 
 
@@ -223,7 +242,7 @@ def _moved(t: DashpotFit, d: Dashpot, vertex: int) -> Dashpot:
 
 
 def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
-    """Refine the strengths one after another, within TUNED in their logarithms."""
+    """Refine the strengths one after another, within SUPPORT_SEARCH.tuned in their logarithms."""
     from scipy.optimize import minimize_scalar
 
     for i in range(len(found)):
@@ -233,7 +252,7 @@ def tuned(t: DashpotFit, found: Dashpots) -> Dashpots:
 
         best = minimize_scalar(
             lambda x, of=with_one: t.left(of(x), t.wide),
-            bounds=(-TUNED, TUNED),
+            bounds=(-SUPPORT_SEARCH.tuned, SUPPORT_SEARCH.tuned),
             method="bounded",
             options={"maxiter": 10, "xatol": 2e-3},
         )
