@@ -41,19 +41,20 @@ demo: .venv/run.stamp
 	$(BIN)/sonic-bullet render $(SCENE) -o out/$(NAME).wav --contacts out/$(NAME).npz --picture out/$(NAME).png
 	@echo "made out/$(NAME).wav (sound), out/$(NAME).npz (contact log), out/$(NAME).png (picture)"
 
-# types are checked beside the tests: both take minutes. The scene compiles what all tests share, once and not a worker
+# types are checked beside the tests: both take minutes. The scene compiles what all tests share,
+# once and not a worker; a file's tests run in one worker, which shares what they set up and compile
 test: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .
 	$(BIN)/ruff check --quiet .
 	@echo "checking types beside the tests"
 	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
 	$(BIN)/sonic-bullet render scenes/bar.py -o .venv/bar.wav --seconds 0.1; \
-	$(BIN)/python -m pytest -n $(WORKERS) -m "not slow"; tests=$$?; \
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow"; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
 test-all: check .venv/lerobot.stamp
 	@$(PIP) 'datasets>=4'
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --quiet --check .

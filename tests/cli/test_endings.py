@@ -75,7 +75,7 @@ def test_a_scene_that_ends_the_process_is_named_with_its_line(tmp_path: Path, co
         (f"{HEAD}{STEPS}ctypes.CDLL(None)._exit(0)\n", "exit(0) ended the process before there was a result"),
         (f"{HEAD}sys.exit()\n", "line 4: SystemExit"),
         (f"{HEAD}{STEPS}sys.exit('no cup')\n", "line 7: SystemExit: no cup"),
-    ], (0,3,6),
+    ], (0, 6),
 )  # fmt: skip
 def test_whatever_ends_the_process_is_exit_2_and_one_line(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "a.py").write_text(text)

@@ -58,6 +58,7 @@ def test_all_strikes_at_once_tell_no_hit_that_is_not_there(lacks: tuple[Effect, 
     assert Rebound._of_all(evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]) is None
 
 
+@pytest.mark.slow
 def test_strikes_of_one_strength_tell_no_hit_from_what_beats() -> None:
     """All exponents say the same of them, known strengths or none."""
     body = recorded(Rebound(0.0197, 0.016, 0.25, 0.0, 0.25, 2))

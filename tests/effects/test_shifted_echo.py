@@ -15,6 +15,7 @@ from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.room.shifted_echo import ECHO, copied
 from tests.diagnosis.test_found_again import BAND, fitted
+from tests.few_cases import parametrize_few
 from tests.made.body import recorded
 
 
@@ -55,11 +56,12 @@ def test_the_ratio_of_a_moving_echo_is_told_and_no_room_proposed() -> None:
     assert Room.propose(evidence_of(refitted(fitted(body), (body,)), (body,), BAND)) is None
 
 
-def test_what_stands_still_brings_no_copies() -> None:
-    for body in (recorded(), recorded(Room(0.9, 0.8, 11))):
-        assert body.recorded is not None
-        lines = body.recorded.lines
-        assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) is None
+@parametrize_few("more", [(), (Room(0.9, 0.8, 11),)], 1)
+def test_what_stands_still_brings_no_copies(more: tuple[Room, ...]) -> None:
+    body = recorded(*more)
+    assert body.recorded is not None
+    lines = body.recorded.lines
+    assert copied(lines.freq_hz, lines.decay_per_s, lines.amplitude) is None
 
 
 def some(count: int, seed: int = 0) -> tuple[np.ndarray[Any, Any], ...]:

@@ -87,8 +87,11 @@ def test_no_rank_is_claimed_where_there_is_noise_or_no_mode() -> None:
     assert exact_modes.modes(np.sin(1e-4 * np.arange(4000.0) ** 2), SR) is None
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
-@pytest.mark.parametrize("phase", [-np.pi / 2, 0.0, None])
+@parametrize_few(
+    ("noise", "phase"),
+    [(noise, phase) for noise in (0.0, 1e-5, 1e-3) for phase in (-np.pi / 2, 0.0, None)],
+    (1, 3, 8),  # each noise and each phase once
+)
 def test_onset_to_the_sample(noise: float, phase: float | None) -> None:
     """Silence of any length before, sines that begin with a zero included."""
     rng = np.random.default_rng(4)

@@ -27,7 +27,7 @@ from tests.made.case import SR, sound, write_box
 from tests.made.lines import line_at
 
 SIZE_M, ETA = (0.16, 0.03, 0.008), 3e-3
-PLACES = ((0.0475, 0.0075), (-0.06, 0.012), (0.075, -0.01), (-0.025, -0.0125), (0.01, 0.006))
+PLACES = ((0.0475, 0.0075), (-0.06, 0.012), (0.075, -0.01), (-0.025, -0.0125))
 SCENE = """
 import pybullet as p
 import sonic_bullet as sb
@@ -59,7 +59,7 @@ def record(folder: Path) -> list[dict[str, Any]]:
     """WAVs of a bar of brass whose loss factor is constant, as a vibrometer at its corner reads them; their strikes."""
     brass = Material.isotropic("brass", youngs_pa=1.05e11, poisson=0.33, density_kg_m3=8500.0)
     write_box(folder / "bar.obj", SIZE_M)
-    model = modal.analyse((modal.read_mesh(folder / "bar.obj"),), brass, to_hz=16_000)
+    model = modal.analyse((modal.read_mesh(folder / "bar.obj"),), brass, to_hz=12_000)
     decay = ETA * np.pi * model.freq_hz
     rng, up = np.random.default_rng(2), np.array([0, 0, 1.0])
     top = np.flatnonzero(model.vertex_m[:, 2] > SIZE_M[2] / 2 - 1e-9)
@@ -68,7 +68,7 @@ def record(folder: Path) -> list[dict[str, Any]]:
     for i, place in enumerate(PLACES):
         at = int(top[np.argmin(((model.vertex_m[top, :2] - place) ** 2).sum(axis=1))])
         impulse = 0.004 * (1 + i)
-        made = 5 * sound(model, decay, (at, corner), (-up, up), impulse, int(0.4 * SR))
+        made = 5 * sound(model, decay, (at, corner), (-up, up), impulse, int(0.3 * SR))
         soundfile.write(folder / f"s{i}.wav", made + 1e-5 * rng.standard_normal(len(made)), SR, subtype="FLOAT")
         strikes.append({"position": model.vertex_m[at].tolist(), "direction": [0, 0, -1], "impulse": impulse})
     return strikes
@@ -83,7 +83,7 @@ def test_from_recordings_to_a_scene_that_sounds_as_diagnosed(folder: Path) -> No
     case = json.loads(Path("bar/case.json").read_text())
     for entry, strike in zip(case["recordings"], strikes, strict=True):
         entry["strike"] = strike
-    case["band_hz"], case["onset"] = [20, 16_000], "the impulse arrives at sample 0 of every file"
+    case["band_hz"], case["onset"] = [20, 12_000], "the impulse arrives at sample 0 of every file"
     Path("bar/case.json").write_text(json.dumps(case))
     assert run("fit", "bar", "-o", "fit.json") == 0
     assert run("diagnose", "bar", "-o", "d.json", "--json", "verdict.json") == 0

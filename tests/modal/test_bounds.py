@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -78,6 +79,12 @@ def elements(body: Shape, material: str) -> Elements:
     return filled((body,), of.length_m, of.stiffness, wanted, of.clamp, (None, None), place, lambda text: None)
 
 
+@cache
+def crossing_of_wood() -> Elements:
+    """Filled once for all that ask what becomes of it."""
+    return elements(crossing(), "wood")
+
+
 @pytest.mark.parametrize(
     ("body", "material"),
     [
@@ -94,7 +101,7 @@ def test_no_body_costs_more_than_allowed(body: Callable[[], Shape], material: st
 
 
 def test_walls_that_nobody_gave_are_as_thick_as_a_lattice_needs() -> None:
-    made = elements(crossing(), "wood").body.solid
+    made = crossing_of_wood().body.solid
     wall_m = float(made.note.split("given a wall of ")[1].split(" m")[0])
     assert wall_m > 0.03 * np.linalg.norm(np.ptp(crossing().vertex_m, axis=0)) and len(made.tet) < 1.5 * LATTICE.tets
 
@@ -124,7 +131,7 @@ def test_a_hole_of_more_than_a_twentieth_makes_a_shell(height: float, *, solid: 
 
 
 def test_what_a_clock_ended_is_an_error_and_chooses_nothing() -> None:
-    one = elements(crossing(), "wood")
+    one = crossing_of_wood()
 
     def ended(edge_m: float, filler: Filler) -> Filled:
         raise EndlessError("Netgen did not come to an end", "give a simpler mesh")
@@ -139,4 +146,4 @@ def test_what_a_clock_ended_is_an_error_and_chooses_nothing() -> None:
 
 @pytest.mark.parametrize("spare", [-1.0, 0.0, 1e-9, 1.0])
 def test_nothing_finer_is_made_of_no_work(spare: float) -> None:
-    assert replace(elements(crossing(), "wood"), spare=spare).finer() is None
+    assert replace(crossing_of_wood(), spare=spare).finer() is None

@@ -124,7 +124,7 @@ def test_pictures_are_pictures_and_equal_input_gives_equal_bytes(tmp_path: Path)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png", "c.png", "d.pdf"]
 
 
-@pytest.mark.parametrize("frames", [0, 1, 100, 5000])
+@pytest.mark.parametrize("frames", [0, 1])
 def test_silence_and_the_shortest_sounds_can_be_drawn(tmp_path: Path, frames: int) -> None:
     assert drawn(tmp_path / "a.png", np.zeros((1, frames)), log_of([]))
     assert drawn(tmp_path / "b.png", np.ones((1, frames)))

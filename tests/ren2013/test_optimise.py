@@ -92,6 +92,7 @@ def test_planted_materials(planted: tuple[float, ...], full_scale: float) -> Non
     assert np.abs(fast(asked).parameters / truth - 1).max() < 1e-6
 
 
+@pytest.mark.slow
 @parametrize_few("planted", FIGURE_9, 1)
 def test_planted_materials_from_their_sound_alone(planted: tuple[float, ...]) -> None:
     """Silence before, features extracted, onset found: the whole way from a recording to the four numbers."""
@@ -135,6 +136,7 @@ def test_few_features_of_many_modes() -> None:
     assert found.gamma_m2_s2 == pytest.approx(truth[2], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_fast_reaches_the_reference_on_a_fiftieth() -> None:
     """A plate that no parameters fit: decays 10 %, frequencies 0.3 % off the model. Both searches share one metric.
 
