@@ -75,6 +75,7 @@ def render_scene(
     material: str | Path | Material | None = None,
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
+    fill_modes: bool = False,
     residual: bool = True,
     supports: bool = True,
     image: bool | None = None,
@@ -88,7 +89,8 @@ def render_scene(
 
     seconds None: the scene's own SECONDS, or 4. microphones None: the scene's own, or (0, -1, 0.5). material: of all
     that sounds, whatever the scene says; materials: of bodies and links by name, before it; silent: names of those that
-    no sensor receives, though they touch and vibrate. residual: whether the non-modal sound of materials is added.
+    no sensor receives, though they touch and vibrate. fill_modes: whether plates and shells go on above their last
+    mode, as by ``tail=True`` of `Listener.add`. residual: whether the non-modal sound of materials is added.
     supports: whether resting contacts damp and transmit, image: whether large flat faces mirror, as in `attach`;
     None: as the scene's own listener has it.
     progress gets the fraction done, say the current task. at_start, at_end: called with the listener before the first
@@ -100,7 +102,7 @@ def render_scene(
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "choice": as_choice(material, materials, silent),
+        "choice": as_choice(material, materials, silent, fill_modes),
         "residual": as_flag(residual, "residual"),
         "supports": as_flag(supports, "supports"),
         "image": None if image is None else as_flag(image, "image"),
@@ -133,6 +135,7 @@ def run_scene(
     material: str | Path | Material | None = None,
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
+    fill_modes: bool = False,
     receive: Receive | None = None,
     progress: Progress | None = None,
     say: Say | None = None,
@@ -146,7 +149,7 @@ def run_scene(
         "sr": check_sr(sr),
         "seed": as_whole(seed, "seed", "give a whole number, 0 or more", least=0),
         "microphones": None if microphones is None else as_sensors(microphones, "microphones"),
-        "choice": as_choice(material, materials, silent),
+        "choice": as_choice(material, materials, silent, fill_modes),
         "receive": as_call(receive, "receive"),
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():

@@ -91,6 +91,11 @@ def scene_options(command: Any) -> Any:
                 multiple=True,
                 help="No microphone hears the body NAME; others touch it as before; repeatable.",
             ),
+            click.option(
+                "--fill-modes",
+                is_flag=True,
+                help="Of a scene: plates and shells go on above their last mode, as dense as bending waves are.",
+            ),
         )
     ):
         command = option(command)

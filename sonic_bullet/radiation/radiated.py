@@ -44,10 +44,17 @@ def radiation_and_note(
 ) -> tuple[Array, Array, str]:
     """Compute `radiation.far_field.radiation_and_note` of a model, cached as by `radiation_of`.
 
+    A resonator that stands for N modes has the shape √N φ, so that z holds their energy. Their pressures add in power,
+    √N w_1 z_1 = w_1 z with w_1 = w/√N, and it is damped as each of them, by Δd/N. Its phase is no mode's: real, Re(w z)
+    follows the velocity, which what is struck slowly does not have. Else it adds the pulse itself, -g F Im(w)/ω.
+
     keep_surface: also cache the air that its surface moves, some 4 MB: another material of the same shape needs it.
     """
     weight, damping, note = _all_modes(model, air, cache, keep_surface)
-    return weight, damping if model.stands_for is None else damping / model.stands_for, note
+    if model.stands_for is None:
+        return weight, damping, note
+    weight = np.where(model.stands_for > 1, np.abs(weight), weight)
+    return weight / np.sqrt(model.stands_for), damping / model.stands_for, note
 
 
 def _all_modes(model: ModalModel, air: Air, cache: store.Place, keep_surface: bool) -> tuple[Array, Array, str]:

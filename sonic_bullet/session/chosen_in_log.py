@@ -35,13 +35,18 @@ def with_choice(
     SceneError
         No body has one of the names.
     LogError
-        The log does not hold the shape of a body that is to sound.
+        The log does not hold the shape of a body that is to sound, or modes are to be filled in.
     MeshError, ModalError
         As `modal.analyse` does, naming the body.
     """
     as_recorded = "motion, masses and contact forces stay as the log recorded them"
     if not choice:
         return log, ()
+    if choice.fill_modes:
+        raise LogError(
+            f"{where} holds modes, and no law of damping above them",
+            "render its scene with --fill-modes and --contacts: that log keeps them",
+        )
     choice.check_names([body.name for body in log.bodies], where)
     solved: dict[tuple[int, int, str], ModalModel] = {}
     bodies, changed = [], {}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.listener.names import matched
 from sonic_bullet.records import Body, Material
-from sonic_bullet.records.coerce import as_items, shown
+from sonic_bullet.records.coerce import as_flag, as_items, shown
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.runtime.silence import can_sound
 from sonic_bullet.session.arguments import as_material, as_name
@@ -39,15 +39,18 @@ class MaterialChoice:
         Materials of links, or of all links of bodies, by name, which take precedence.
     silent
         Names of those that no sensor receives.
+    fill_modes
+        Whether plates and shells go on above their last mode, as by ``tail=True`` of `Listener.add`.
     """
 
     everyone: Material | None = None
     named: Mapping[str, Material] = field(default_factory=dict)
     silent: frozenset[str] = frozenset()
+    fill_modes: bool = False
 
     def __bool__(self) -> bool:
         """Tell whether anything was chosen."""
-        return self.everyone is not None or bool(self.named) or bool(self.silent)
+        return self.everyone is not None or bool(self.named) or bool(self.silent) or self.fill_modes
 
     def material_of(self, name: str) -> Material | None:
         """Return the material of a link of that name, None without a choice."""
@@ -102,6 +105,7 @@ def as_choice(
     material: str | Path | Material | None = None,
     materials: Mapping[str, str | Path | Material] | None = None,
     silent: Iterable[str] = (),
+    fill_modes: bool = False,
 ) -> MaterialChoice:
     """Convert what a user gives to a choice.
 
@@ -121,6 +125,7 @@ def as_choice(
         None if material is None else as_material(material),
         {as_name(name): as_material(one) for name, one in named.items()},
         frozenset(as_name(name) for name in names),
+        as_flag(fill_modes, "fill_modes"),
     )
 
 
@@ -143,11 +148,13 @@ def current_choice() -> MaterialChoice:
 
 
 def choose_materials(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
-    """Return the bodies to be added with the chosen materials.
+    """Return the bodies to be added with the chosen materials, and with modes filled in where chosen.
 
     A body whose links get different materials becomes several entries, its links in the same order.
     """
     choice = current_choice()
+    if choice.fill_modes:
+        wanted = [replace(one, options=replace(one.options, tail=True)) for one in wanted]
     if choice.everyone is None and not choice.named:
         return wanted
     given = [

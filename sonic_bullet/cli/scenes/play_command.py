@@ -59,7 +59,7 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
     card_options = ("device", "full_scale_pa", "ahead_s")
     path = Path(scene)
     check_scene_file(scene, "play")
-    materials = WantedMaterials.read(options.pop("material"), options.pop("silent"))
+    materials = WantedMaterials.read(*(options.pop(name) for name in ("material", "silent", "fill_modes")))
     space = SpaceWish.read(**{name: options.pop(name) for name in SPACE_OPTIONS})
     if not is_log(scene):
         space.check_live()

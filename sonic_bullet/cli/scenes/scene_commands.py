@@ -54,6 +54,7 @@ def run_render(
     seed: int | None,
     material: tuple[str, ...],
     silent: tuple[str, ...],
+    fill_modes: bool,
     residual: bool | None,
     supports: bool | None,
     image: bool | None,
@@ -66,7 +67,7 @@ def run_render(
     rate = None if sr is None else check_sr(sr)
     level = LevelWish(**{name: others.pop(name) for name in OPTIONS})
     check_request(scene, seconds, level)
-    materials = WantedMaterials.read(material, silent)
+    materials = WantedMaterials.read(material, silent, fill_modes)
     if models is not None and contacts is None:
         raise FileError("--models says where a log's models are, and no log is asked for", "give --contacts too")
     space = SpaceWish.read(**{name: others.pop(name) for name in SPACE_OPTIONS})

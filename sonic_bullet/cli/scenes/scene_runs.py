@@ -27,14 +27,18 @@ DEFAULT_SR = 48_000
 
 @dataclass(frozen=True, slots=True)
 class WantedMaterials:
-    """The options --material and --silent. everyone: of all that sounds; named: by names of bodies; silent: names."""
+    """The options --material, --silent and --fill-modes.
+
+    everyone: of all that sounds; named: by names of bodies; silent: names.
+    """
 
     everyone: str | None = None
     named: dict[str, str] = field(default_factory=dict)
     silent: tuple[str, ...] = ()
+    fill_modes: bool = False
 
     @classmethod
-    def read(cls, material: tuple[str, ...], silent: tuple[str, ...]) -> WantedMaterials:
+    def read(cls, material: tuple[str, ...], silent: tuple[str, ...], fill_modes: bool = False) -> WantedMaterials:
         """Read M or NAME=M; a file whose name holds an "=" is not split.
 
         Every M is read once, to report a wrong one before anything runs. Raises MaterialError, FileError.
@@ -57,18 +61,20 @@ class WantedMaterials:
         twice = next((name for name in silent if silent.count(name) > 1), None)
         if twice is not None:
             raise FileError(f"--silent names {twice} twice", "give it once")
-        return cls(everyone, named, silent)
+        return cls(everyone, named, silent, fill_modes)
 
     @property
     def options(self) -> dict[str, Any]:
         """Options of `render_scene` and `run_scene`."""
-        return {"material": self.everyone, "materials": self.named, "silent": self.silent}
+        return {
+            "material": self.everyone, "materials": self.named, "silent": self.silent, "fill_modes": self.fill_modes,
+        }  # fmt: skip
 
     def choice(self) -> MaterialChoice:
         """Read the presets and return the choice."""
         from sonic_bullet.session.material_choice import as_choice
 
-        return as_choice(self.everyone, self.named, self.silent)
+        return as_choice(self.everyone, self.named, self.silent, self.fill_modes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,9 +33,12 @@ WALL_SAMPLES = 96
 """Places of the wall and directions at them that averages are over."""
 
 
-def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMIT_HZ) -> ModalModel:
+def with_tail(
+    model: ModalModel, material: Material, to_hz: float = HEARING_LIMIT_HZ, resonators_per_third: float = 20.0
+) -> ModalModel:
     """Return a model with resonators above its last mode, up to to_hz; itself where it has none to be continued.
 
+    20 of a third octave are twice as many as the ear has filters' widths there, 4 to a tone's own.
     The note says how many, and for how many modes they stand.
     """
     top_hz = min(to_hz, HEARING_LIMIT_HZ)
@@ -57,7 +60,7 @@ def with_tail(model: ModalModel, material: Material, to_hz: float = HEARING_LIMI
     seed = hashlib.sha256(np.round(model.vertex_m, 7).tobytes() + model.face.tobytes()).digest()
     rng = np.random.default_rng(int.from_bytes(seed[:8], "little"))
     waves = _Waves(model, material, thickness, area * skin)
-    freq, modes = _places(waves, float(model.freq_hz[-1]), top_hz, wall_m2, rng)
+    freq, modes = _places(waves, (float(model.freq_hz[-1]), top_hz), wall_m2, resonators_per_third, rng)
     if not len(freq):
         return model
     axis = _wall_axes(model, area * skin / np.maximum(thickness, 1e-12) ** 4)
@@ -135,14 +138,13 @@ class _Waves:
 
 
 def _places(
-    waves: _Waves, from_hz: float, to_hz: float, area_m2: float, rng: np.random.Generator
+    waves: _Waves, span_hz: tuple[float, float], area_m2: float, resonators_per_third: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Return frequencies of resonators, ascending, and the modes that each stands for."""
-    grid = np.geomspace(from_hz, to_hz, 2000)
+    grid = np.geomspace(*span_hz, 2000)
     number = waves.count(grid, area_m2)
     per_third = np.gradient(number, np.log2(grid)) / 3
-    modes_per_third = 20  # of 1/3 octave: twice as many as the ear has filters' widths there, 4 to a tone's own
-    each = np.maximum(per_third / modes_per_third, 1.0)
+    each = np.maximum(per_third / resonators_per_third, 1 + 1e-9)  # solved ones stand for 1, these for more
     index = np.concatenate([[0.0], np.cumsum(np.diff(number) / ((each[1:] + each[:-1]) / 2))])
     count = int(index[-1])
     at = np.arange(count) + 0.5 + rng.uniform(-0.4, 0.4, count)

@@ -100,10 +100,21 @@ def test_what_was_solved_stays_and_a_file_keeps_the_rest(tmp_path: Path) -> None
         assert np.array_equal(getattr(kept, name), getattr(model, name))
 
 
-def test_the_air_damps_each_of_the_modes_that_one_stands_for_as_itself() -> None:
-    model = filled(40)
-    alone, many = radiation_of(replace(model, stands_for=None), Air()), radiation_of(model, Air())
-    assert np.array_equal(alone[0], many[0]) and np.allclose(many[1] * model.stands_for, alone[1], rtol=1e-12)
+def test_what_a_resonator_radiates_is_what_the_air_takes_of_it() -> None:
+    """2Δd · ½|z|² = 4π |w z|²/2ρc, however many modes it stands for; each of them is damped as it is alone."""
+    model, air = filled(40), Air()
+    alone, many = radiation_of(replace(model, stands_for=None), air), radiation_of(model, air)
+    assert model.stands_for is not None and np.allclose(many[1] * model.stands_for, alone[1], rtol=1e-12)
+    radiated = 2 * np.pi * np.abs(many[0]) ** 2 / (air.density_kg_m3 * air.sound_speed_m_s)
+    assert radiated == pytest.approx(many[1], rel=1e-9)
+
+
+def test_a_quarter_of_the_resonators_sound_as_all() -> None:
+    centres = 4000 * 2.0 ** (np.arange(7) / 3)
+    every = 10 ** (sound(filled(40), centres) / 10)
+    few = with_tail(solved(40), METAL, resonators_per_third=5)
+    assert few.stands_for is not None and few.stands_for.max() > 4 and few.mode_count < filled(40).mode_count / 2
+    assert 10 * np.log10((10 ** (sound(few, centres) / 10)).sum() / every.sum()) == pytest.approx(0, abs=1)
 
 
 def test_a_ball_gives_the_plate_less_than_it_has() -> None:
