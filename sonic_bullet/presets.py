@@ -248,7 +248,6 @@ def material_of(preset: Preset, where: str = "") -> Material:
         "beta_s": beta,
         "roughness_m": preset.surface.roughness_m,
         "hurst": preset.surface.hurst,
-        "form": waves_of(preset.surface.waviness_m or 0.0, preset.surface.waviness_length_m or 2e-3),
         "restitution": preset.impact.restitution,
         "effects": _effects(preset, label),
         "includes_radiation": total_damping(preset),
@@ -257,6 +256,7 @@ def material_of(preset: Preset, where: str = "") -> Material:
         f"| impact: {preset.impact.source}",
     }
     try:
+        rest["form"] = waves_of(preset.surface.waviness_m or 0.0, preset.surface.waviness_length_m or 2e-3)
         if elastic.stiffness_pa is not None and elastic.youngs_pa is None and elastic.poisson is None:
             return Material(preset.name, preset.density_kg_m3, np.array(elastic.stiffness_pa), **rest)
         if elastic.stiffness_pa is None and elastic.youngs_pa is not None and elastic.poisson is not None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from sonic_bullet.files.log_header import material_key
 from sonic_bullet.files.rows.surface_forms import pack_form, track_arrays, unpack_form
+from sonic_bullet.presets import named_preset, write_preset
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.records.touching.surface_form import SurfaceForm, waves_of
+from tests.cli.test_commands import run
 from tests.made.models import STEEL
 
 TRACK_M = 1e-6 * np.random.default_rng(0).normal(size=50)
@@ -41,10 +45,23 @@ def test_crests_are_those_of_a_sine_and_none_are_no_form() -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"waviness_m": -1.0}, {"waviness_length_m": 0.0}, {"track_m": [1.0]}, {"track_m": [0.0, np.nan]},
-     {"track_m": [0.0, 1.0], "track_spacing_m": 0.0}],
+    [{"waviness_m": -1.0}, {"waviness_m": 3e-4}, {"waviness_length_m": 0.0}, {"waviness_length_m": 2.0},
+     {"track_m": [1.0]}, {"track_m": [0.0, np.nan]}, {"track_m": [0.0, 1.0], "track_spacing_m": 0.0}],
 )  # fmt: skip
 def test_what_is_no_form_is_one_line(wrong: dict[str, object]) -> None:
     with pytest.raises(SonicBulletError) as caught:
         SurfaceForm(**wrong)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
+
+
+def test_waves_higher_than_a_tenth_of_their_length_are_one_line_of_the_command(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    preset = named_preset("steel")
+    wavy = msgspec.structs.replace(preset.surface, waviness_m=1e300, waviness_length_m=2e-3)
+    write_preset(tmp_path / "wavy.json", msgspec.structs.replace(preset, surface=wavy))
+    scene = str(Path(__file__).resolve().parents[2] / "scenes" / "rolling.py")
+    capfd.readouterr()
+    assert run("render", scene, "-o", str(tmp_path / "a.wav"), "--material", str(tmp_path / "wavy.json")) == 2
+    said = capfd.readouterr().err.strip()
+    assert "waviness_m" in said and "a tenth of waviness_length_m" in said and "\n" not in said

@@ -21,9 +21,9 @@ class SurfaceForm:
     Parameters
     ----------
     waviness_m
-        rms height of its waves above the finish, 0: none.
+        rms height of its waves above the finish, at most a tenth of their length; 0: none.
     waviness_length_m
-        Their wavelength.
+        Their wavelength, at most 1 m.
     track_m : Array, shape (n,)
         Heights of a measured track, played one by one in place of the octaves; None: none.
     track_spacing_m
@@ -37,10 +37,16 @@ class SurfaceForm:
 
     def __post_init__(self) -> None:
         """Check the fields."""
+        longest_m, steepest = 1.0, 0.1  # beyond, heights are a body's shape, and not waves on its surface
+        length = as_number(
+            self.waviness_length_m, "waviness_length_m", "give metres above 0, up to 1", above=0, most=longest_m
+        )
+        most = steepest * length
+        remedy = f"give an rms height of 0 to a tenth of waviness_length_m, {most:.3g} m"
         store(
             self,
-            waviness_m=as_number(self.waviness_m, "waviness_m", "give an rms height of 0 or more", least=0),
-            waviness_length_m=as_number(self.waviness_length_m, "waviness_length_m", "give metres above 0", above=0),
+            waviness_m=as_number(self.waviness_m, "waviness_m", remedy, least=0, most=most),
+            waviness_length_m=length,
             track_spacing_m=as_number(self.track_spacing_m, "track_spacing_m", "give metres above 0", above=0),
         )
         track_heights_most = 1 << 22
