@@ -96,9 +96,6 @@ class Traits:
     by_line : bool
         Its numbers are of single lines, which no other line determines, or one line may show it: in cross-validation it
         is given all lines, of the other strikes.
-    certain : bool
-        It is proposed only where lines agree on it, each by its own baseband, and goes with level: a smaller gain on
-        excluded strikes is enough, of which a loud one gains most.
     needs_unknown_medium : bool
         It is the medium's: where that is known, the baseline has it, or there is none. It acts on other objects by
         their own shapes.
@@ -109,7 +106,6 @@ class Traits:
     replaces_rayleigh: bool = False
     cost: Cost = Cost.CHEAP
     by_line: bool = False
-    certain: bool = False
     needs_unknown_medium: bool = False
 
 

@@ -79,7 +79,7 @@ def test_what_corrections_alone_would_gain_is_no_effects() -> None:
     found = cross_validated(stale, posed((body,), takes, Idle), evidence_of(stale, (body,), BAND))
     assert [c.id for c in found] == ["mode-splitting"]
     assert np.abs(found[0].drop_db).max() < 0.1 * lost
-    assert not accepted(found[0], lost, first=True)
+    assert not accepted(found[0], lost)
 
 
 @parametrize_few("spoils", [(0, 1, 2, 3, 4), (0, 1), ()], (1,), ids=["all", "two", "none"])
@@ -98,9 +98,9 @@ def test_what_gains_on_neither_of_the_loudest_is_asked_no_further(spoils: tuple[
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
     found = cross_validated(h, posed((body,), takes, Mutes), evidence_of(h, (body,), BAND))[0]
     loudest = sorted(np.argsort(-body.level_n_s, kind="stable")[:2].tolist())
-    assert found.impulse_n_s.tolist() == body.level_n_s[loudest].tolist()
+    assert len(found.drop_db) == len(found.gap_db) == 2
     assert (found.drop_db < -3.0).tolist() == [i in spoils for i in loudest]
-    assert not accepted(found, 1.0, first=True)
+    assert not accepted(found, 1.0)
 
 
 @pytest.mark.slow
@@ -178,7 +178,6 @@ def test_three_weak_dashpots_are_told_together() -> None:
 
 
 def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And one that searches by itself is not asked once enough is found and little left."""
     monkeypatch.setattr("sonic_bullet.parallel._can_fork", lambda: False)
     body = recorded()
     takes, h = takes_of((body,)), refitted(fitted(body), (body,))
@@ -207,11 +206,6 @@ def test_trials_tell_what_has_numbers_of_single_lines_all_lines(monkeypatch: pyt
     cross_validated(h, posed((body,), takes, Listens, Part, Searches), told)
     assert {n for who, n in asked if who in ("listens", "searches")} == {count}
     assert {n for who, n in asked if who == "part"} == {count, round(RULES.kept_lines_share * count)}
-    asked.clear()
-    cross_validated(
-        h, posed((body,), takes, Listens, Searches), replace(told, found=("room", "radiation")), costly=False
-    )
-    assert {who for who, _ in asked} == {"listens"}
 
 
 @parametrize_few(
@@ -281,7 +275,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     monkeypatch.setattr(loop, "in_a_room", lambda _, found, *__, **___: anew.append([c.id for c in found]))
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
     # however little the room leaves
-    monkeypatch.setattr(loop, "RULES", replace(RULES, costly_open_share=1e-9))
+    monkeypatch.setattr(loop, "RULES", replace(RULES, same_share=1e-9, little_share=1e-9))
     monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]

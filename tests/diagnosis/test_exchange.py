@@ -14,7 +14,8 @@ from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.score import mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.exchange import decays_against, exchanged, significant, together
+from sonic_bullet.diagnosis.selection.exchange import decays_for, exchanged, together
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.measurement_chain import MeasurementChain
@@ -77,13 +78,6 @@ def test_a_part_of_the_evidence_fits_the_same_pulse_again() -> None:
         assert again.duration_s(0.02) == pytest.approx(9e-4, rel=0.3)
 
 
-def test_strikes_must_agree_before_a_name_is_changed() -> None:
-    assert significant(np.array([0.4, 0.3, 0.4, 2.5, 0.4]), 0.1)  # no strike speaks against it
-    assert not significant(np.array([0.4, -0.9, 0.4, 2.5, 0.4]), 0.1)
-    assert not significant(np.array([0.05, 0.04, 0.05, 0.06, 0.05]), 0.1)  # too alike
-    assert not significant(np.array([2.0]), 0.1)
-
-
 def test_strikes_alone_do_not_put_one_decay_for_another() -> None:
     """A law and a radiation fitted in its place: the decays of lines know which, and are not asked of what says more
     than decays.
@@ -91,6 +85,6 @@ def test_strikes_alone_do_not_put_one_decay_for_another() -> None:
     law = DampingLaw("relaxation", 5e-3, strength=0.03, tau_s=8e-5)
     body = recorded(law)
     right, wrong = truth(law), refitted(truth(Radiation(0.05, 3.0)), (body,))
-    assert decays_against(wrong.effects[0], right, wrong, 0, problem_of(body))
-    assert not decays_against(right.effects[0], wrong, right, 0, problem_of(body))
-    assert not decays_against(PULSE, right, truth(PULSE), 0, problem_of(body))
+    assert decays_for(right, wrong, 0, problem_of(body)) > RULES.strong_evidence
+    assert decays_for(wrong, right, 0, problem_of(body)) < -RULES.strong_evidence
+    assert decays_for(truth(PULSE), right, 0, problem_of(body)) == 0

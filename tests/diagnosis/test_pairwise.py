@@ -114,7 +114,7 @@ def test_a_room_alone_needs_no_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     without the mass says more.
     """
     assert room_anew((ROOM,), MASS) is None
-    monkeypatch.setattr(pairs, "RULES", replace(RULES, pair_leaves_share=1.0))
+    monkeypatch.setattr(pairs, "RULES", replace(RULES, little_share=1.0, most_share=1.0))
     assert room_anew((ROOM,), MASS) is None
 
 

@@ -10,9 +10,10 @@ import pytest
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.exchange import phases_against
+from sonic_bullet.diagnosis.selection.exchange import phases_for
 from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.simplest import simplest
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -137,10 +138,10 @@ def test_a_name_that_phases_speak_for_is_not_left_for_one_that_strikes_hardly_pr
         body = recorded(effect)
         pulse, low = (c.hypothesis for c in identified_from(effect))
         own, other = (pulse, low) if effect is PULSE else (low, pulse)
-        assert phases_against(own, other, (body,))
-        assert not phases_against(other, own, (body,))
+        assert phases_for(own, other, (body,)) > RULES.strong_evidence
+        assert phases_for(other, own, (body,)) < -RULES.strong_evidence
         split = replace(own, effects=(*own.effects, ModeSplitting((600.0,), (0.01,), (0.0,))))
-        assert not phases_against(split, other, (body,))
+        assert phases_for(split, other, (body,)) == 0
 
 
 @pytest.mark.slow
@@ -150,5 +151,5 @@ def test_phases_speak_against_nobody_of_whom_they_say_nothing() -> None:
     body = recorded(train)
     pulse, hits, room = (refitted(truth(e), (body,)) for e in (PULSE, train, Room(0.5, 0.3, 3)))
     assert not np.isfinite(misfit(hits, (body,)))
-    assert not phases_against(pulse, hits, (body,)) and not phases_against(hits, pulse, (body,))
-    assert not phases_against(pulse, room, (body,)) and not phases_against(room, pulse, (body,))
+    assert phases_for(pulse, hits, (body,)) == phases_for(hits, pulse, (body,)) == 0
+    assert phases_for(pulse, room, (body,)) == phases_for(room, pulse, (body,)) == 0

@@ -79,7 +79,7 @@ def test_objects_of_one_strike_stand_trial_with_the_others() -> None:
     plain = refitted(truth(), bodies)
     found = cross_validated(plain, posed(bodies, takes, DampingLaw), evidence_of(plain, bodies, BAND))
     assert [c.id for c in found] == ["damping-law"] and len(found[0].drop_db) == len(takes)
-    assert accepted(found[0], 5.0, first=True) and found[0].drop_db.min() > 0
+    assert accepted(found[0], 5.0) and found[0].drop_db.min() > 0
     out = left_out_db(found[0].hypothesis, 0, posed(bodies, takes))
     assert len(out) == len(takes) and np.isfinite(out).all()
 

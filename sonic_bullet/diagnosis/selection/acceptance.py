@@ -1,14 +1,13 @@
 """A candidate effect after cross-validation, and the decision whether it is accepted.
 
-Accepted is what gains, on strikes left out, in the mean, each by the record of thresholds (thresholds.py):
+Gains g_s in dB of strikes s that were left out, gaps G_s that were open there; a physical effect closes one share R of
+every gap, chance none:
 
-    more than is needed
-        least_drop_db, and least_drop_share of the gap; less where nothing is found yet and the gap is narrow
-    significantly more than nothing         standard_errors; or none of many_strikes loses, two of them gaining as much
-    significantly more than a control       an effect of as many numbers that means nothing
+    2 Δ ln L = n ln(Σ g² / Σ (g − R G)²),   R = Σ g G / Σ G²        (normal errors of unknown variance)
 
-Of more than many_strikes strikes that gain much one may be odd. What depends on amplitude may be shown by the loudest
-strikes alone.
+Accepted is what speaks so much for itself as strong_evidence, gains more than least_drop_db and same_share of the gap,
+and more than a control effect of as many numbers, which means nothing. A strike is one observation, however many cells
+its spectrum has: cells of one strike err together.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Effect
+from sonic_bullet.records import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class Candidate:
         With the effect.
     drop_db : (s,)
         Gain in the distance of each left-out strike, less the gain of corrections learnt again where it moves modes; of
-        the loudest_strikes alone where it gains on none of those.
+        the two loudest strikes alone where it gains on none of those.
     whole_db : float
         Mean with that gain, by which candidates are ordered.
     control_db : float
@@ -47,8 +47,8 @@ class Candidate:
         Of each number in its parameters over the folds (jackknife).
     lines : float
         Gain in likelihood of lines left out (decay_test.py).
-    impulse_n_s : (s,)
-        Of the strikes.
+    gap_db : (s,)
+        What was open at each strike; (1,) where that is the same.
     why_not : str
         The rule that kept it out in its last round; empty of what was accepted.
     """
@@ -56,12 +56,12 @@ class Candidate:
     id: str
     effect: Effect
     hypothesis: Hypothesis
-    drop_db: np.ndarray[Any, Any]
+    drop_db: Array
     whole_db: float
     control_db: float
     spread: dict[str, Any]
     lines: float = 0.0
-    impulse_n_s: np.ndarray[Any, Any] = field(default_factory=lambda: np.zeros(0))
+    gap_db: Array = field(default_factory=lambda: np.ones(1))
     why_not: str = ""
 
     @property
@@ -70,84 +70,60 @@ class Candidate:
         return mean(self.drop_db)
 
     @property
-    def certain(self) -> bool:
-        """Decide whether lines agreed on it before it was proposed (see needed)."""
-        return self.effect.traits.certain
-
-    @property
-    def loud(self) -> bool:
-        """Decide whether the strike that gains most is one of the loudest_strikes."""
-        return (
-            len(self.impulse_n_s) == len(self.drop_db)
-            and int(self.drop_db.argmax()) in np.argsort(-self.impulse_n_s)[: RULES.loudest_strikes]
-        )
-
-    @property
     def sd_db(self) -> float:
         """Compute the standard error of the mean gain."""
         return float(self.drop_db.std(ddof=1) / np.sqrt(len(self.drop_db))) if len(self.drop_db) > 1 else float("inf")
 
 
-def mean(x: Sequence[float] | np.ndarray[Any, Any]) -> float:
+def mean(x: Sequence[float] | Array) -> float:
     """Compute the mean, 0 of none."""
     return float(np.mean(x)) if len(x) else 0.0
 
 
-def needed(gap_db: float, *, first: bool, certain: bool = False) -> float:
-    """Compute the gain in dB that a candidate needs.
+def evidence(gain: Array, gap: Array | float = 1.0) -> float:
+    """Compute 2 Δ ln L of gains (s,) that are one share of each gap over gains that are nothing, signed as the share.
 
-    It is least_drop_db; less where that is most of what has ever been open, more where much is, as the little that an
-    effect leaves of a wide gap may be its own fit's.
-
-    Parameters
-    ----------
-    gap_db : float
-        What is open.
-    first : bool
-        No effect is found yet.
-    certain : bool
-        Lines agreed on it, each by its own frames, before it was proposed; then strikes left out need only agree, too.
+    That is the likelihood ratio of a regression through the origin; of equal gaps that of Student's t test, n ln(1 +
+    t²/(n − 1)) [Lehmann & Romano 2005, section 5.2]. 0 of fewer than two.
     """
-    faint, share = (RULES.certain_drop_db, RULES.certain_share) if certain else (RULES.faint_drop_db, RULES.most_share)
-    return max(
-        min(RULES.least_drop_db, max(faint, share * gap_db)) if first else RULES.least_drop_db,
-        RULES.least_drop_share * gap_db,
-    )
+    gap = np.broadcast_to(gap, gain.shape)
+    size = float(gap @ gap)
+    if len(gain) < 2 or not np.isfinite(gain).all() or not size or not gain.any():
+        return 0.0
+    share = float(gain @ gap) / size
+    left = max(float(((gain - share * gap) ** 2).sum()), 1e-12 * float(gain @ gain))
+    return float(np.sign(share) * len(gain) * np.log(float(gain @ gain) / left))
 
 
-def accepted(c: Candidate, gap_db: float, *, first: bool) -> bool:
-    """Decide whether a candidate explains enough, significantly, and more than chance; first: see needed."""
-    return not refusal(c, gap_db, first=first)
+def evidence_between(gain: Array, gap: Array | float, of_db: float) -> float:
+    """Compute `evidence` for one of two by what it is nearer (s,); 0 where that is less than same_share of of_db.
+
+    Two models fitted to the same lines err alike at all strikes, so these cannot separate what says the same.
+    """
+    return evidence(gain, gap) if abs(mean(gain)) > RULES.same_share * of_db else 0.0
 
 
-def refusal(c: Candidate, gap_db: float, *, first: bool) -> str:
-    """Return why a candidate is not accepted; empty where it is. first: see needed."""
+def needed(gap_db: float) -> float:
+    """Compute the gain in dB that a candidate needs where so much is open."""
+    return max(RULES.least_drop_db, RULES.same_share * gap_db)
+
+
+def accepted(c: Candidate, gap_db: float) -> bool:
+    """Decide whether a candidate explains enough, significantly, and more than chance."""
+    return not refusal(c, gap_db)
+
+
+def refusal(c: Candidate, gap_db: float) -> str:
+    """Return why a candidate is not accepted; empty where it is."""
     if len(c.drop_db) == 0:
         return "no strike could be left out"
-    need = needed(gap_db, first=first, certain=c.certain)
-    if not (c.mean_db > need and np.isfinite(c.sd_db)):
+    need = needed(gap_db)
+    if not c.mean_db > need:
         return f"strikes left out must come {need:.2f} dB nearer"
-    more = c.whole_db - max(c.control_db, 0.0)  # a control effect is not held against corrections either
-    chance = "" if more > RULES.most_share * need else "chance comes as near"
-    drop = np.sort(c.drop_db)
-    if c.certain and c.loud and -np.minimum(drop, 0).sum() < RULES.lost_share * drop[-1]:
-        # what goes with level is for the loudest to show, which these others were fitted without
-        return chance
-    if len(drop) > RULES.many_strikes and drop[1:].mean() > RULES.odd_strike_factor * max(
-        need, needed(gap_db, first=first)
-    ):
-        drop = drop[1:]  # one strike may be odd: what it alone shows, none of the others did
-    sd = float(drop.std(ddof=1) / np.sqrt(len(drop)))
-    if (
-        len(drop) >= RULES.many_strikes
-        and drop[0] > -RULES.lost_share * drop.mean()
-        and (drop[-2] > need or (first and c.certain and c.loud))
-    ):
-        # no strike speaks against it, though loud ones may gain far more than soft ones
-        return chance
-    if not drop.mean() > RULES.standard_errors * sd:
-        return f"less than {RULES.standard_errors:g} standard errors"
-    return chance or ("" if more > RULES.standard_errors * sd else "chance comes as near")
+    if not evidence(c.drop_db, c.gap_db) > RULES.strong_evidence:
+        return f"strikes left out say less than {RULES.strong_evidence:g} (2 Δ ln L)"
+    # a control effect is not held against corrections either
+    return "" if c.whole_db - max(c.control_db, 0.0) > RULES.most_share * c.whole_db else "chance comes as near"
 
 
 def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -171,7 +147,7 @@ def jackknife(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _spread(x: np.ndarray[Any, Any]) -> float:
+def _spread(x: Array) -> float:
     """Compute the jackknife's standard error of values (n,)."""
     n = len(x)
     return float(np.sqrt((n - 1) / n * ((x - x.mean()) ** 2).sum()))

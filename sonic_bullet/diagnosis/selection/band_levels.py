@@ -2,12 +2,12 @@
 
     d_sb = 10 lg Σ|R|² / Σ(|P|² + N)   over the cells of a band b, the first early_s and the rest apart;
         third octaves that overlap by half
-    off:  |mean_s d| > band_apart_db  and  > standard_errors standard errors,
+    off:  |mean_s d| > band_apart_db, and strong_evidence that it is not 0,
         over the strikes s in which either is ABOVE over the noise N
 
-A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over lobe_cells cells to each
+A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over LOBE cells to each
 side: recorded is more only where it is more than what is played so much beyond the band, too, and the other way round.
-Each band has the shortest window that keeps band_cells cells in it. No effect is looked for here: it can only revoke
+Each band has the shortest window of which it holds a main lobe. No effect is looked for here: it can only revoke
 a verdict `none`.
 """
 
@@ -21,6 +21,7 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.selection.acceptance import evidence
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
@@ -29,6 +30,7 @@ from sonic_bullet.signal.log_spectral import SPECTRAL, Floor
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF_BAND = 2 ** (1 / 6)  # of a third octave, to each side
 SHOWN = 4  # in words
+LOBE = 2  # cells from the middle of a Hann window's main lobe to its first zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +110,11 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     low, high = CENTRE_HZ / HALF_BAND, CENTRE_HZ * HALF_BAND
     inside = (low >= band_hz[0]) & (high <= min(band_hz[1], sr / 2))
     fits = [w for w in windows if w <= len(recorded)]
-    window = np.array([next((w for w in fits if RULES.band_cells * sr / w <= wide), 0) for wide in high - low])
+    window = np.array([next((w for w in fits if 2 * LOBE * sr / w <= wide), 0) for wide in high - low])
     for w in np.unique(window[inside & (window > 0)]):
         who = np.flatnonzero(inside & (window == w))
         cell, mine = sr / w, (low[who], high[who])
-        edge = np.maximum(RULES.lobe_cells * cell, CORRECTION * CENTRE_HZ[who])
+        edge = np.maximum(LOBE * cell, CORRECTION * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
         (a, near_a), (b, near_b) = (
             (_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w))
@@ -151,9 +153,10 @@ def off_in(over: Array) -> tuple[BandOff, ...]:
     found = []
     for part, b in zip(*np.nonzero(count), strict=True):
         d = over[np.isfinite(over[:, part, b]), part, b]
-        own = float(d.std(ddof=1)) if len(d) > 1 else 0.0
-        error = (own if len(d) >= RULES.own_scatter_strikes else max(own, usual)) / np.sqrt(len(d))
-        if abs(d.mean()) > max(RULES.band_apart_db, RULES.standard_errors * error):
+        few = len(d) < 3  # which leave one degree of freedom, or none
+        error = (usual if few else float(d.std(ddof=1))) / np.sqrt(len(d))
+        clear = abs(d.mean()) > RULES.standard_errors * error if few else abs(evidence(d)) > RULES.strong_evidence
+        if clear and abs(d.mean()) > RULES.band_apart_db:
             found.append(
                 BandOff(
                     float(CENTRE_HZ[b] / HALF_BAND),

@@ -73,15 +73,15 @@ class ControlEffect:
         evidence : Evidence
             The evidence.
         freedom : int
-            Count of numbers.
+            Count of numbers, of which no more are spent than half as many as there are lines.
         seed : int
             Of the directions.
         """
         h = evidence.observed[0]
-        count = len(h.all_hz)
+        count, freedom = len(h.all_hz), min(freedom, len(h.freq_hz) // 2)
         direction = directions(seed, freedom, count)
         half = (freedom + 1) // 2
-        if len(h.freq_hz) <= freedom:
+        if not freedom:
             return None
         member = [int(np.argmin(np.abs(h.all_hz - f))) for f in h.freq_hz]
         y = np.log(np.maximum(h.decay_per_s, 1e-3) / np.maximum(h.expected_decay_per_s, 1e-3))

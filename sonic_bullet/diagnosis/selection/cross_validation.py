@@ -50,7 +50,7 @@ def cross_validated(
     evidence : Evidence
         The whole.
     costly : bool
-        Whether to ask those that take long, and those that search once enough_effects have been found.
+        Whether to ask those that take long.
     """
     found: list[Candidate] = []
     if len(problem.takes) < 2:
@@ -64,15 +64,10 @@ def cross_validated(
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
     still = cache(lambda by_line: _at_rest_folds(whole_lines() if by_line else folds))
     gap = mean([f.before - f.noise for f in folds])
-    idle = not costly and len(evidence.found) >= RULES.enough_effects
     dry = any(one.dry for one in evidence.observed)
-    kinds = [
-        kind
-        for kind in problem.effects
-        if kind.id not in evidence.found and not (idle and kind.traits.cost is Cost.SEARCHES)
-    ]
+    kinds = [kind for kind in problem.effects if kind.id not in evidence.found]
     for group in _groups(kinds, late=dry and costly):
-        if any(isinstance(c.effect, Dereverberates) and accepted(c, gap, first=not evidence.found) for c in found):
+        if any(isinstance(c.effect, Dereverberates) and accepted(c, gap) for c in found):
             break  # what others say of lines that a room has made is hearsay: in the next round they are dereverberated
         if (
             dry
@@ -206,15 +201,12 @@ def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gain:
-    """Gains on one left-out strike by an effect fitted without it, if there was one, as in `Candidate`.
-
-    control_db has one number a draw.
-    """
+    """Gains on one left-out strike by an effect fitted without it, if there was one, as in `Candidate`."""
 
     effect: Effect | None = None
     drop_db: float = 0.0
     whole_db: float = 0.0
-    control_db: tuple[float, ...] = ()
+    control_db: float | None = None
     lines: float = 0.0
 
 
@@ -233,20 +225,17 @@ def _cross_validated(
         lined = [b for b in bodies if b.recorded is not None] if asks_lines else []
         # such axes are whole's (Evidence.held_out)
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
-        random = [
-            ControlEffect.fitted(less, min(free, RULES.control_numbers), 10 * i + draw)
-            for draw in range(RULES.control_draws)
-        ]
+        control = ControlEffect.fitted(less, free, i)
         body = fold.take.body
         made = predict_each(_augmented(fold, effect), (body, *lined))
         after = fold.take.distance(made[body])
-        controls = [predict(_augmented(fold, control), body) for control in random if control is not None]
-        chance = tuple(fold.before - fold.take.distance(p) for p in controls)
+        chance = None if control is None else fold.before - fold.take.distance(predict(_augmented(fold, control), body))
         lines = likelier(predict_each(fold.base, lined), made, evidence, less) if lined else 0.0
         return Gain(effect, fold.least - after, fold.before - after, chance, lines)
 
-    level = _levels(folds)
-    loud = np.argsort(-np.nan_to_num(level), kind="stable")[: RULES.loudest_strikes].tolist()
+    loud = np.argsort(-np.nan_to_num(_levels(folds)), kind="stable")[
+        :2
+    ].tolist()  # the fewest that have a standard error
     gains = dict(zip(loud, parallel_map(judged, loud), strict=True))
     if any(g.drop_db > 0 for g in gains.values()) or tells(h, whole):  # lines may speak for what strikes do not
         rest = [i for i in range(len(folds)) if i not in gains]
@@ -257,7 +246,7 @@ def _cross_validated(
     drop, whole_db, control_db = (
         np.array([g.drop_db for g in found]),
         mean([g.whole_db for g in found]),
-        mean([x for g in found for x in g.control_db]),
+        mean([g.control_db for g in found if g.control_db is not None]),
     )
     # each line is left out in so many of the folds
     lines = mean([g.lines for g in found]) / (1 - RULES.kept_lines_share)
@@ -270,7 +259,7 @@ def _cross_validated(
         control_db,
         jackknife([g.effect.parameters() for g in found if g.effect is not None]),
         lines,
-        level[asked],
+        np.array([folds[i].before - folds[i].noise for i in asked]),
     )
 
 

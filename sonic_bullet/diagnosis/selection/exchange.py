@@ -2,8 +2,8 @@
 
     e_i -> propose(evidence of the model without e_i, known = e_i), in turns
         (backfitting [Buja, Hastie & Tibshirani 1989])
-    exchange: for each added effect, what was accepted in the same round and was passed over replaces it; both are
-        compared on strikes left out
+    exchange: for each added effect, what was accepted in the same round and was passed over replaces it where
+        strikes left out, decays and phases together say so
 
 A round adds what explains most of the whole gap alone, and a filter may take up what a pulse and a tilt of level do
 together; with the other effect it no longer does.
@@ -23,11 +23,11 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.diagnosis.prediction.prediction import predict, predict_fitted
 from sonic_bullet.diagnosis.prediction.score import Judged, Take
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, evidence_between
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
 from sonic_bullet.diagnosis.selection.thresholds import RULES
-from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence
+from sonic_bullet.effects.protocol import Dereverberates, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
@@ -120,7 +120,7 @@ def exchanged(
     passed: Sequence[Sequence[Candidate]],
     problem: DiagnosisProblem,
 ) -> tuple[Hypothesis, list[Candidate]]:
-    """Fit the effects to each other, and replace each by a rival of its round that is significantly nearer.
+    """Fit the effects to each other, and replace each by a rival of its round where strong_evidence says so.
 
     Parameters
     ----------
@@ -150,49 +150,32 @@ def exchanged(
             other = together(other, problem)
             far = left_out_db(best, place, problem) if far is None else far
             now = left_out_db(other, place, problem)
-            gain = far - now
-            if (
-                significant(gain, RULES.alike_share * rival.mean_db)
-                and not (
-                    np.nanmean(gain) < RULES.phases_decide_share * rival.mean_db
-                    and phases_against(best, other, problem.bodies)
-                )
-                and not decays_against(other.effects[place], best, other, place, problem)
-            ):
+            said = evidence_between(far - now, 1.0, rival.mean_db)
+            said += phases_for(other, best, problem.bodies) + decays_for(other, best, place, problem)
+            if said > RULES.strong_evidence:
                 best, far, names = other, now, names - {own.id} | {rival.id}
                 added = [*added[:i], rival, *added[i + 1 :]]
     return best, [replace(c, effect=next(e for e in best.effects if e.id == c.id)) for c in added]
 
 
-def decays_against(rival: Effect, best: Hypothesis, other: Hypothesis, i: int, problem: DiagnosisProblem) -> bool:
-    """Decide whether, of two effects that change only decays, the lines' own decays favour the present one.
-
-    Strikes hardly separate such two.
-    """
-    own = best.effects[i]
+def decays_for(other: Hypothesis, best: Hypothesis, i: int, problem: DiagnosisProblem) -> float:
+    """Compute 2 Δ ln L of lines' decays for the i-th effect of one over another's; 0 unless both change decays only."""
+    rival, own = other.effects[i], best.effects[i]
     if not (of_decays(best, own) and of_decays(other, rival)):
-        return False
-    evidence = evidence_of(best, problem.bodies, problem.band_hz)
+        return 0.0
+    known = evidence_of(best, problem.bodies, problem.band_hz)
     mine, its = (predict_fitted(h, problem.bodies) for h in (best, other))
-    return misfit(its, rival, evidence) > misfit(mine, own, evidence)
+    return misfit(mine, own, known) - misfit(its, rival, known)
 
 
-def phases_against(best: Hypothesis, other: Hypothesis, bodies: tuple[Struck, ...]) -> bool:
-    """Decide whether the lines' phases (phase_test.py) favour the present effect over one that strikes hardly separate.
+def phases_for(other: Hypothesis, best: Hypothesis, bodies: tuple[Struck, ...]) -> float:
+    """Compute 2 Δ ln L of the lines' phases (phase_test.py) for one over another.
 
     Phases are compared on lines as they were fitted; of several hits they say nothing, and with a room lines are
     others.
     """
     dry = [any(isinstance(e, Dereverberates) for e in h.effects) for h in (best, other)]
     if moves(best) or moves(other) or dry[0] != dry[1]:
-        return False
+        return 0.0
     mine, its = phases(best, bodies), phases(other, bodies)
-    return bool(np.isfinite([mine, its]).all() and its > mine + RULES.strong_evidence)
-
-
-def significant(gain_db: Array, least_db: float) -> bool:
-    """Decide whether strikes agree that there is a gain (s,), and more than least_db."""
-    if len(gain_db) < 2 or gain_db.mean() <= least_db:
-        return False
-    none_loses = len(gain_db) >= RULES.many_strikes and gain_db.min() > -RULES.lost_share * gain_db.mean()
-    return bool(none_loses or gain_db.mean() > RULES.standard_errors * gain_db.std(ddof=1) / np.sqrt(len(gain_db)))
+    return mine - its if np.isfinite([mine, its]).all() else 0.0

@@ -83,7 +83,7 @@ def pairwise(
 
     pairs = [pair for some in parallel_map(augmented, first) for pair in some]
     now = problem.score(start)
-    if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.pair_leaves_share * now.gap_db:
+    if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.little_share * now.gap_db:
         return None
     h = _likeliest(pairs, now.floor_db + now.gap_db, problem.bodies)
     # what was found alone had the other's share to explain, too
@@ -130,7 +130,7 @@ def in_a_room(
         best = min(
             (pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None
         )
-        if best is not None and best.db - floor <= RULES.pair_leaves_share * (left - floor):
+        if best is not None and best.db - floor <= RULES.little_share * (left - floor):
             break
     else:
         return None
@@ -148,8 +148,7 @@ def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypoth
         full = replace(now, distance_db=response)
         candidates = cross_validated(rest, problem.only(type(effect)), evidence)
         if not candidates or not (
-            accepted(candidates[0], max(now.gap_db, 0.0), first=False)
-            and helps(candidates[0], problem, now, full, first=False)
+            accepted(candidates[0], max(now.gap_db, 0.0)) and helps(candidates[0], problem, now, full)
         ):
             return None
         h, added = candidates[0].hypothesis, [candidates[0], *added]
@@ -157,14 +156,14 @@ def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypoth
 
 
 def _likeliest(pairs: Sequence[Pair], before_db: float, bodies: tuple[Struck, ...]) -> Hypothesis:
-    """Select the pair nearest to the strikes, or one that phases favour clearly (phase_test.py).
+    """Select the pair nearest to the strikes, or one that phases favour (phase_test.py).
 
     The latter among those with the same effect that moves modes, and nearly as near.
     """
     best = min(pairs, key=lambda pair: pair.db)
-    near = best.db + RULES.phases_decide_share * (before_db - best.db)
+    near = best.db + RULES.little_share * (before_db - best.db)
     others = [pair.h for pair in pairs if pair.db < near and _movers(pair.h) == _movers(best.h)]
-    off = [misfit(h, bodies) + RULES.clear_phases for h in others]
+    off = [misfit(h, bodies) + RULES.strong_evidence for h in others]
     own = misfit(best.h, bodies)
     return others[int(np.argmin(off))] if np.isfinite(own) and min(off) < own else best.h
 

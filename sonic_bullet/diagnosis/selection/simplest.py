@@ -1,7 +1,7 @@
 """Choice of the accepted candidate that is added, and of the added ones that are still needed at the end.
 
-every candidate of a round -> why it is not accepted, if it is not; on all strikes together it helps, too -> the best,
-    or the simplest of those that strikes cannot separate from it -> phases, where two are nearly the same
+every candidate of a round -> why it is not accepted, if it is not; on all strikes together it helps, too -> score by
+    strikes, decays and phases -> the simplest of those that strong_evidence does not separate from the best
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves, move
 from sonic_bullet.diagnosis.prediction.prediction import predict_fitted
 from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed, refusal
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, evidence_between, needed, refusal
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
 from sonic_bullet.diagnosis.selection.decay_test import numbers, of_decays, tells
 from sonic_bullet.diagnosis.selection.phase_test import misfit
@@ -25,14 +25,12 @@ from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Evidence
 
 
-def examined(
-    found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, *, first: bool
-) -> list[Candidate]:
+def examined(found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score) -> list[Candidate]:
     """Return a round's candidates, each with why it is not accepted; else lines may favour one. full: a room anew."""
 
     def why_not(c: Candidate) -> str:
-        why = refusal(c, max(now.gap_db, 0.0), first=first)
-        return why or ("" if helps(c, problem, now, full, first=first) else "all strikes together come no nearer")
+        why = refusal(c, max(now.gap_db, 0.0))
+        return why or ("" if helps(c, problem, now, full) else "all strikes together come no nearer")
 
     made = [replace(c, why_not=why_not(c)) for c in found]
     if all(c.why_not for c in made):
@@ -41,7 +39,7 @@ def examined(
     return made
 
 
-def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, first: bool) -> bool:
+def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score) -> bool:
     """Decide whether all strikes together gain, and lose nothing of what a room's response alone explains.
 
     A response, identified again without the candidate (full), takes up echoes, and some of what stray modes leave, so
@@ -56,9 +54,7 @@ def helps(c: Candidate, problem: DiagnosisProblem, now: Score, full: Score, *, f
     )
     if after >= full.distance_db + RULES.same_share * max(full.gap_db, 0.0):
         return False
-    return before.distance_db - after > RULES.most_share * needed(
-        max(before.gap_db, 0.0), first=first, certain=c.certain
-    )
+    return before.distance_db - after > RULES.most_share * needed(max(before.gap_db, 0.0))
 
 
 def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
@@ -73,54 +69,36 @@ def by_lines(c: Candidate, problem: DiagnosisProblem, full: Score) -> bool:
     )
 
 
-def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], evidence: Evidence) -> Candidate:
-    """Select the best, or the one with the fewest numbers of those that strikes cannot separate from it.
+def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], known: Evidence) -> Candidate:
+    """Select the one with the fewest numbers of those that strong_evidence does not separate from the likeliest.
 
-    That is by two standard errors of the difference, and alike_share of its gain. Where another with no more numbers is
-    nearly as near (phases_decide_share), the lines' phases may decide (phase_test.py): by clear_phases, or by
-    strong_evidence where it is alike_share. Between two that only change decays the lines' own decays decide, by BIC.
-    Effects that move modes are not compared: corrections are learnt anew with them, and are numbers too.
+    The score is 2 Δ ln L of strikes, of the lines' decays between two that only change decays, and of their phases,
+    which no spectrum in dB has (phase_test.py). Effects that move modes are not compared: corrections are learnt anew
+    with them, and are numbers too. Nor is what leaves more than little_share of the best one's gain.
     """
     best = able[0]
     # by lines alone one may be accepted that strikes speak against
     if moves_itself(best.hypothesis, best.effect) or len(able) == 1:
         return best
-
-    def close(c: Candidate, share: float) -> bool:
-        more = best.drop_db - c.drop_db
-        return bool(
-            more.mean() <= RULES.standard_errors * more.std(ddof=1) / np.sqrt(len(more))
-            and more.mean() < share * best.mean_db
-        )
-
-    rivals = [c for c in able if not moves_itself(c.hypothesis, c.effect)]
-    first = min((c for c in rivals if close(c, RULES.alike_share)), key=lambda c: (numbers(c.effect), -c.mean_db))
-    if of_decays(first.hypothesis, first.effect):
-        alike = [
-            c
-            for c in rivals
-            if of_decays(c.hypothesis, c.effect)
-            and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
-        ]
-        first = min(alike, key=lambda c: decays(predict_fitted(c.hypothesis, bodies), c.effect, evidence))
-    others = [
+    rivals = [
         c
-        for c in rivals
-        if c is not first
-        and numbers(c.effect) <= numbers(first.effect)
-        and (best.drop_db - c.drop_db).mean() < RULES.phases_decide_share * best.mean_db
+        for c in able
+        if not moves_itself(c.hypothesis, c.effect) and c.mean_db >= (1 - RULES.little_share) * best.mean_db
     ]
-    if not others or moves(best.hypothesis):
-        return first  # phases are held against lines as they were fitted
-    own = misfit(first.hypothesis, bodies)  # the less strikes say, the less phases need to
-    off = np.array(
-        [
-            misfit(c.hypothesis, bodies)
-            + (RULES.strong_evidence if close(c, RULES.alike_share) else RULES.clear_phases)
-            for c in others
-        ]
-    )
-    return others[int(off.argmin())] if np.isfinite(own) and off.min() < own else first
+    off = {c.id: -evidence_between(c.drop_db - best.drop_db, best.gap_db, best.mean_db) for c in rivals}
+    lost = {
+        c.id: decays(predict_fitted(c.hypothesis, bodies), c.effect, known)
+        for c in rivals
+        if of_decays(c.hypothesis, c.effect)
+    }
+    off |= {name: off[name] + value - min(lost.values()) for name, value in lost.items()}
+    if not moves(best.hypothesis):  # phases are held against lines as they were fitted
+        phases = {c.id: misfit(c.hypothesis, bodies) for c in rivals}
+        if np.isfinite(list(phases.values())).all():
+            off = {name: value + phases[name] for name, value in off.items()}
+    least = min(off.values())
+    near = [c for c in rivals if off[c.id] <= least + RULES.strong_evidence]
+    return min(near, key=lambda c: (numbers(c.effect), off[c.id]))
 
 
 def pruned(
@@ -132,6 +110,6 @@ def pruned(
             continue  # strikes need not speak for it
         rest = [e for e in h.effects if e.id != candidate.id]
         without = refitted(with_effects(h, tuple(rest), problem.bodies), problem.bodies)
-        if problem.distance_db(without) - problem.distance_db(h) < needed(gap_db, first=False):
+        if problem.distance_db(without) - problem.distance_db(h) < needed(gap_db):
             h, added = without, [c for c in added if c is not candidate]
     return h, added

@@ -229,19 +229,19 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
     first: list[Candidate] = []
     last: dict[str, Candidate] = {}
     weak = False
-    for turn in range(RULES.rounds):
+    for turn in range(len(problem.effects)):
         problem.say(
             f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB"
         )
-        if now.gap_db < (RULES.least_drop_db if added else RULES.faint_drop_db):
-            break  # so little is what a mesh gets wrong
+        if now.gap_db < RULES.least_drop_db:
+            break
         drawn = replace(problem, seed=problem.seed + turn)
         evidence = evidence_of(h, problem.bodies, problem.band_hz, seed=problem.seed)
         # a room's response is the lines' so far, which leaves open more than there is
         other = reidentified(h, problem.bodies)
         full = now if other is h else replace(now, distance_db=problem.distance_db(other))
-        costly = full.gap_db > RULES.costly_open_share * (before_db - now.floor_db)
-        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, first=not added)
+        costly = full.gap_db > RULES.little_share * (before_db - now.floor_db)
+        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full)
         last |= {c.id: c for c in found}
         pair, acceptable = None, [c for c in found if not c.why_not]
         if not added:
@@ -256,7 +256,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         pair = pair or _room_anew(h, acceptable, found, problem)
         if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
             late_ones = cross_validated(h, drawn.only(*late), evidence, costly=costly)
-            found = examined(late_ones, problem, now, full, first=not added)
+            found = examined(late_ones, problem, now, full)
             last |= {c.id: c for c in found}
             acceptable = [c for c in found if not c.why_not]
             pair = _room_anew(h, acceptable, found, problem)
@@ -298,7 +298,7 @@ def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[
 
 
 def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: Score, problem: DiagnosisProblem) -> str:
-    """Decide the verdict; effects must close explained_share of the gap, or all but a mesh's errors."""
+    """Decide the verdict; effects must close most_share of the gap, or all but a mesh's errors."""
     gap, left = before_db - now.floor_db, now.gap_db
     if not added:
         excused = gap < RULES.suffices_db or (
@@ -307,7 +307,7 @@ def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: S
         return "none" if excused else "unexplained"
     # whose response takes up what a mesh gets wrong, too: that is no excuse
     room = any(isinstance(e, Dereverberates) for e in h.effects)
-    most = max((1 - (RULES.explained_by_room_share if room else RULES.most_share)) * gap, RULES.suffices_db)
+    most = max((RULES.little_share if room else 1 - RULES.most_share) * gap, RULES.suffices_db)
     return "explained" if left <= most or (not room and left <= of_the_mesh(h, problem)) else "unexplained"
 
 

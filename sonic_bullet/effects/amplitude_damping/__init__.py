@@ -73,7 +73,7 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
-    traits: ClassVar[Traits] = Traits(by_line=True, certain=True)
+    traits: ClassVar[Traits] = Traits(by_line=True)
 
     damping_growth: float
     measure: str = "velocity"

@@ -73,7 +73,7 @@ class AmplitudePitch(RotatesPairs):
     stage: ClassVar[Stage] = Stage.BANK
     owner: ClassVar[Owner] = Owner.OBJECT
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
-    traits: ClassVar[Traits] = Traits(by_line=True, certain=True)
+    traits: ClassVar[Traits] = Traits(by_line=True)
 
     bend: float
     measure: str = "velocity"
