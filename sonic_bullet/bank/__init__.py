@@ -29,11 +29,11 @@ from sonic_bullet.bank.instrument import (
 from sonic_bullet.bank.layout import FLOOR
 from sonic_bullet.bank.mode_set import ModeSet, Translation
 from sonic_bullet.bank.poles import prepare_poles, set_poles
-from sonic_bullet.bank.transmission import PASSES, set_passes
+from sonic_bullet.bank.transmission import MOST_PARTNERS, set_transmissions
 
 __all__ = [
     "FLOOR",
-    "PASSES",
+    "MOST_PARTNERS",
     "Bank",
     "BankState",
     "ModeSet",
@@ -42,8 +42,8 @@ __all__ = [
     "audible",
     "empty_bank",
     "prepare_poles",
-    "set_passes",
     "set_poles",
+    "set_transmissions",
     "silence",
     "silent",
     "subset",

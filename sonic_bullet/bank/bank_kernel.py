@@ -31,7 +31,7 @@ DRIVE_SCRATCH = IMPULSE_SCRATCH + DRIVEN * LANES + DRIVEN + MOST_DUE
 
 @uncounted
 def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover - compiled
-    """Compute the tiles of body b for the block that starts: sound (W, b, BLOCK), pass_sound (J·W, b, BLOCK).
+    """Compute the tiles of body b for the block that starts: sound (W, b, BLOCK), transmission_sound (J·W, b, BLOCK).
 
     Advances z to the next block. False where all modes are below the floor. scratch: RING_SCRATCH numbers.
     """
@@ -39,7 +39,11 @@ def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover
     table = scratch[12 * CHUNK : (12 + 2 * TILE_ROW) * CHUNK]
     column = scratch[(12 + 2 * TILE_ROW) * CHUNK : RING_SCRATCH]
     start, columns, modes = bank.body[b].start, bank.body[b].columns, bank.law.shape[1]
-    alive, sets, partners = False, len(bank.observed), bank.passes.shape[1] if bank.ringing[b].passes else 0
+    alive, sets, partners = (
+        False,
+        len(bank.observed),
+        bank.transmissions.shape[1] if bank.ringing[b].transmissions else 0,
+    )
     end = start + -(-columns // LANES) * LANES
     for lo in range(start, end, CHUNK):
         lanes = Lanes(modes, lo, min(CHUNK, end - lo))
@@ -52,7 +56,7 @@ def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover
                     bank.sound[w, b, :] = 0.0
             bank.blend[:, :] = 0.0
             for j in range(partners):
-                bank.pass_sound[j * sets : (j + 1) * sets, b, :] = 0.0
+                bank.transmission_sound[j * sets : (j + 1) * sets, b, :] = 0.0
         real = min(lanes.count, start + columns - lo)  # spare lanes need no table
         tile.rows(powers, real, table)
         for w in range(sets):
@@ -64,10 +68,10 @@ def _ring(b, bank, scratch):  # noqa: PLR0912 - a loop a set  # pragma: no cover
                     tile.columns(now, bank.aim[2 * k + 1], lanes, powers, column)
                     tile.outer(column, table, real, bank.blend[k])
         for j in range(partners):
-            if transmission.sounds(bank.passes[b, j].phase):
+            if transmission.sounds(bank.transmissions[b, j].phase):
                 for w in range(j * sets, (j + 1) * sets):
-                    tile.columns(now, bank.pass_weight[w], lanes, powers, column)
-                    tile.outer(column, table, real, bank.pass_sound[w, b])
+                    tile.columns(now, bank.transmission_weight[w], lanes, powers, column)
+                    tile.outer(column, table, real, bank.transmission_sound[w, b])
     if alive:
         _turn(b, bank)
     return alive
@@ -203,7 +207,7 @@ def _drive(b, stretch, bank, scratch, work):  # noqa: PLR0912 - a loop a set  # 
     sets, last = len(bank.observed), transmission.last_set(b, bank)
     for w in range(last + 1):  # each active weight set in turn: the state advances with the last
         j, v = w // sets - 1, w % sets  # of partner j, where it is 0 or above
-        if w > 0 and not (bank.observed[v, b] if j < 0 else transmission.sounds(bank.passes[b, j].phase)):
+        if w > 0 and not (bank.observed[v, b] if j < 0 else transmission.sounds(bank.transmissions[b, j].phase)):
             continue
         keep = w == last
         for k in range(count * LANES):
@@ -221,20 +225,23 @@ def _drive(b, stretch, bank, scratch, work):  # noqa: PLR0912 - a loop a set  # 
             if not used:
                 for k in range(drive.SAMPLE_NUMBERS):
                     impulse[k] = 0.0
-            weight = At(bank.weight if j < 0 else bank.pass_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
+            weight = At(bank.weight if j < 0 else bank.transmission_weight, 2 * (w if j < 0 else w - sets) * modes + lo)
             if j < 0 and bank.aims[w] >= 0:
                 weight = At(bank.aim, 4 * bank.aims[w] * modes + lo)
             motion = drive.DrivenModes(bank.driven, bank.pole)
             drive.run(motion, lanes, weight, drive.LaneImpulses(impulse, used), count, partial, keep)
         if j >= 0 or bank.observed[w, b]:
             drive.across(partial, count, total)
-            free, place = bank.sound[w, b] if j < 0 else bank.pass_sound[w - sets, b], (stretch.at + stretch.i) % BLOCK
+            free, place = (
+                bank.sound[w, b] if j < 0 else bank.transmission_sound[w - sets, b],
+                (stretch.at + stretch.i) % BLOCK,
+            )
             for k in range(count if ringing.tiled else 0):
                 total[k] += free[place + k]
             if j < 0:
                 _copy_flushed(total, scratch.source[w, b, stretch.i : stretch.i + count])
             else:
-                transmission.pass_on(b, j, v, stretch, total, bank, scratch.passed)
+                transmission.transmit(b, j, v, stretch, total, bank, scratch.transmitted)
 
 
 @uncounted
@@ -248,11 +255,11 @@ def _sound_free(b, stretch, bank, scratch):  # pragma: no cover - compiled
                 _copy_flushed(bank.sound[w, b, place : place + end - i], scratch.source[w, b, i:end])
             else:
                 scratch.source[w, b, i:end] = 0.0
-    for j in range(bank.passes.shape[1] if ringing.passes and ringing.tiled else 0):
-        if transmission.sounds(bank.passes[b, j].phase):
+    for j in range(bank.transmissions.shape[1] if ringing.transmissions and ringing.tiled else 0):
+        if transmission.sounds(bank.transmissions[b, j].phase):
             for w in range(sets):
-                free = bank.pass_sound[j * sets + w, b, place : place + end - i]
-                transmission.pass_on(b, j, w, stretch, free, bank, scratch.passed)
+                free = bank.transmission_sound[j * sets + w, b, place : place + end - i]
+                transmission.transmit(b, j, w, stretch, free, bank, scratch.transmitted)
 
 
 @uncounted
@@ -302,8 +309,8 @@ def advance(at, n, sr, progress, bank, scratch, work):  # pragma: no cover - com
     """Compute samples at … at + n - 1 into scratch: source (W, b, n or more) and dipole (b, 3, n or more).
 
     scratch.sounds (b, 2): 1 where a body's rows of source, of dipole are not zero. On entry it must hold for the rows
-    passed in: rows that stay silent are cleared only where it is 1. progress (n,): where between its gains each sample
-    of a drive lies. See layout.py for the tables; all in place.
+    transmitted in: rows that stay silent are cleared only where it is 1. progress (n,): where between its gains each
+    sample of a drive lies. See layout.py for the tables; all in place.
     """
     sounds = scratch.sounds
     list_forces(n, progress, 1.0 / sr, bank, scratch, work)
@@ -323,5 +330,5 @@ def advance(at, n, sr, progress, bank, scratch, work):  # pragma: no cover - com
         sounds[b, 1] = 1 if moves else 0
         if ringing.strike >= 0:
             release_done(b, bank)
-    if bank.passes.shape[1]:
+    if bank.transmissions.shape[1]:
         transmission.add_passed(n, bank, scratch)

@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, FLUSH, LANE_PAIR, RINGING
 from sonic_bullet.bank.mode_set import ModeSet, Translation
 from sonic_bullet.bank.tile import BLOCK
-from sonic_bullet.bank.transmission import OFF, PASS, SILENCED
+from sonic_bullet.bank.transmission import OFF, SILENCED, TRANSMISSION
 from sonic_bullet.contact.force_pulse import pulse_table
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -69,7 +69,7 @@ class BankState:
     sound : (W, b, 256) the block's free ringing
     pole, block : (2·m,) e^s and e^{256 s}, bent by level where a body is
     law, coming : (7, m) the bank's, with poles as they are now; (8, m) see `poles`
-    passes, pass_weight, pass_sound : (b, J) PASS, (J·W, 2·m), (J·W, b, 256), see `transmission`
+    transmissions, transmission_weight, transmission_sound : (b, J) TRANSMISSION, (J·W, 2·m), (J·W, b, 256)
     aim, turned, blend : (2·D, 2·m) weights of aimed sets as they are, and from the next block on; (D, b) 1 where these
         differ; (D, 256) scratch
     ringing : (b,) RINGING
@@ -85,9 +85,9 @@ class BankState:
     block: Array
     law: Array
     coming: Array
-    passes: Array
-    pass_weight: Array
-    pass_sound: Array
+    transmissions: Array
+    transmission_weight: Array
+    transmission_sound: Array
     aim: Array
     turned: Array
     blend: Array
@@ -144,11 +144,11 @@ def flushed(values: Array) -> Array:
 
 
 def empty_bank(
-    sr: int, weight_sets: int = 1, at: int = 0, passes: int = 0, aims: Array | None = None
+    sr: int, weight_sets: int = 1, at: int = 0, transmissions: int = 0, aims: Array | None = None
 ) -> tuple[Bank, BankState]:
     """Build a bank without bodies and its state at absolute sample ``at``.
 
-    passes: partners to which each body may transmit. aims: as of `Bank`, None: none is aimed. Raises
+    transmissions: partners to which each body may transmit. aims: as of `Bank`, None: none is aimed. Raises
     AudioError on a rate outside 1 … 10 MHz.
     """
     if not (isinstance(sr, int | np.integer) and 0 < sr <= 10_000_000):
@@ -161,8 +161,9 @@ def empty_bank(
     silent, strikes = np.zeros((weight_sets, 0, BLOCK)), np.zeros(0, BANK_STRIKE)
     rows, free = np.zeros((0, 8, LANE_PAIR)), np.zeros(1, np.int64)
     state = BankState(
-        int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)), np.zeros((0, passes), PASS),
-        np.zeros((passes * weight_sets, 0)), np.zeros((passes * weight_sets, 0, BLOCK)),
+        int(at), z, driven, silent, pole, block, np.zeros((7, 0)), np.zeros((8, 0)),
+        np.zeros((0, transmissions), TRANSMISSION), np.zeros((transmissions * weight_sets, 0)),
+        np.zeros((transmissions * weight_sets, 0, BLOCK)),
         np.zeros((2 * aimed, 0)), np.zeros((aimed, 0), np.int64), np.zeros((aimed, BLOCK)), np.zeros(0, RINGING),
         strikes, rows, free,
     )  # fmt: skip
@@ -225,11 +226,17 @@ def append(bank: Bank, state: BankState, bodies: Sequence[ModeSet]) -> tuple[Ban
         block=_joined(state.block, block),
         law=np.concatenate([state.law, np.vstack([law, np.zeros(total)])], axis=1),
         coming=np.concatenate([state.coming, np.zeros((8, total))], axis=1),
-        passes=np.concatenate([state.passes, np.zeros((len(bodies), state.passes.shape[1]), PASS)]),
-        pass_weight=np.stack([_joined(one, silent) for one in state.pass_weight]).reshape(len(state.pass_weight), -1)
-        if len(state.pass_weight)
+        transmissions=np.concatenate(
+            [state.transmissions, np.zeros((len(bodies), state.transmissions.shape[1]), TRANSMISSION)]
+        ),
+        transmission_weight=np.stack([_joined(one, silent) for one in state.transmission_weight]).reshape(
+            len(state.transmission_weight), -1
+        )
+        if len(state.transmission_weight)
         else np.zeros((0, 2 * grown.law.shape[1])),
-        pass_sound=np.concatenate([state.pass_sound, np.zeros((len(state.pass_sound), len(bodies), BLOCK))], axis=1),
+        transmission_sound=np.concatenate(
+            [state.transmission_sound, np.zeros((len(state.transmission_sound), len(bodies), BLOCK))], axis=1
+        ),
         aim=np.array([_joined(one, more) for one, more in zip(state.aim, aimed, strict=True)]).reshape(
             len(aimed), 2 * grown.law.shape[1]
         ),
@@ -254,15 +261,17 @@ def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
     few = Bank(bank.sr, body, law, weight, np.take(bank.observed, keep, axis=1), bank.aims)
     flat = {name: getattr(state, name)[both] for name in ("z", "driven", "pole", "block")}
     flat |= {name: np.take(getattr(state, name), lane, axis=1) for name in ("law", "coming")}
-    flat |= {name: np.take(getattr(state, name), keep, axis=1) for name in ("sound", "pass_sound", "turned")}
+    flat |= {name: np.take(getattr(state, name), keep, axis=1) for name in ("sound", "transmission_sound", "turned")}
     flat["aim"] = np.take(state.aim, both, axis=1)
     number = np.full(bank.body_count, -1)
     number[keep] = np.arange(len(keep))
-    passes = state.passes[keep]
-    passes["to"] = number[passes["to"]]
-    passes["phase"][passes["to"] < 0] = OFF
-    weights = np.take(state.pass_weight, both, axis=1)
-    return few, replace(state, **flat, passes=passes, pass_weight=weights, ringing=state.ringing[keep])
+    transmissions = state.transmissions[keep]
+    transmissions["to"] = number[transmissions["to"]]
+    transmissions["phase"][transmissions["to"] < 0] = OFF
+    weights = np.take(state.transmission_weight, both, axis=1)
+    return few, replace(
+        state, **flat, transmissions=transmissions, transmission_weight=weights, ringing=state.ringing[keep]
+    )
 
 
 def silent(state: BankState) -> Array:
@@ -275,13 +284,13 @@ def silent(state: BankState) -> Array:
 def silence(state: BankState) -> BankState:
     """Return the state at the same sample with nothing ringing and no strike under way."""
     state = state.copy()
-    for name in ("z", "driven", "sound", "pass_sound"):
+    for name in ("z", "driven", "sound", "transmission_sound"):
         getattr(state, name)[...] = 0
-    for name in ("ringing", "driven", "tiled", "moving", "motion"):  # poles and passes stay: contacts do
+    for name in ("ringing", "driven", "tiled", "moving", "motion"):  # poles and transmissions stay: contacts do
         state.ringing[name] = 0
     state.ringing["strike"] = -1
-    state.passes["phase"] = SILENCED[state.passes["phase"]]
-    state.ringing["passes"] = np.count_nonzero(state.passes["phase"] != OFF, axis=1)
+    state.transmissions["phase"] = SILENCED[state.transmissions["phase"]]
+    state.ringing["transmissions"] = np.count_nonzero(state.transmissions["phase"] != OFF, axis=1)
     pool = len(state.strikes)
     state.free[...] = np.concatenate([[pool], np.arange(pool - 1, -1, -1)])
     return state

@@ -62,7 +62,7 @@ RINGING = np.dtype(
         ("tiled", "i8"),  # 1: the block's free sound is not zero
         ("moving", "i8"),  # 1: a translation's state is not zero
         ("fresh", "i8"),  # 1: other poles at the next block's start
-        ("passes", "i8"),  # passes that are not off
+        ("transmissions", "i8"),  # that are not off
         ("passed_to", "i8"),  # 1: within a call, a body transmitted to it
         ("strike", "i8"),  # slot of its first strike, -1 for none
         ("motion", "f8", (3, 2)),  # state of the translations
@@ -114,9 +114,9 @@ class BankTables(NamedTuple):
     pole: Array
     block: Array
     coming: Array
-    passes: Array
-    pass_weight: Array
-    pass_sound: Array
+    transmissions: Array
+    transmission_weight: Array
+    transmission_sound: Array
     aim: Array
     turned: Array
     blend: Array
@@ -139,7 +139,7 @@ class ScratchTables(NamedTuple):
     body: Array
     slot: Array
     source: Array
-    passed: Array
+    transmitted: Array
     dipole: Array
     sounds: Array
 

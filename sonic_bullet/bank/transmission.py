@@ -1,11 +1,11 @@
 """Transmission: modes of one body that sound at another that it touches.
 
-    passes (b, J) PASS: up to J partners of each body;  set j·W + w of weights at the lanes of body b:
+    transmissions (b, J): up to J partners of each body;  set j·W + w of weights at the lanes of body b:
         y[w, to, n] += ramp[n] Σ Re(weight z[n])
 
 A mode of coupled bodies moves all of them. Its shape on the others is the weight here, its pole the coupled one
-(`poles`), so a pass has no memory of its own. It begins and ends where a block of absolute time does, fading in over
-its first block and out over its last: nothing jumps, and any split into calls gives the same bits.
+(`poles`), so a transmission has no memory of its own. It begins and ends where a block of absolute time does, fading in
+over its first block and out over its last: nothing jumps, and any split into calls gives the same bits.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -24,11 +24,11 @@ from sonic_bullet.records import Array
 if TYPE_CHECKING:
     from sonic_bullet.bank.instrument import Bank, BankState
 
-PASSES = 8
+MOST_PARTNERS = 8
 """Partners to which a body transmits at a time, those that fade out among them."""
 OFF, STEADY, COMING, RISING, LEAVING, FALLING, BRIEF = range(7)
-"""States of a pass. COMING, LEAVING: from the next block on RISING, FALLING; BRIEF: rises and is to fall."""
-PASS = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
+"""States of a transmission. COMING, LEAVING: from the next block on RISING, FALLING; BRIEF: rises and is to fall."""
+TRANSMISSION = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
 LEAVES = np.array([OFF, LEAVING, OFF, BRIEF, LEAVING, FALLING, BRIEF])
 """State that each becomes where it is to end."""
 SILENCED = np.array([OFF, STEADY, STEADY, STEADY, OFF, OFF, OFF])
@@ -37,10 +37,10 @@ SILENCED = np.array([OFF, STEADY, STEADY, STEADY, OFF, OFF, OFF])
 
 @uncounted
 def move_on(b, bank):  # pragma: no cover - compiled
-    """Advance the passes of body b at the begin of its block."""
-    left, passes = 0, bank.passes
-    for j in range(passes.shape[1] if bank.ringing[b].passes else 0):
-        phase = passes[b, j].phase
+    """Advance the transmissions of body b at the begin of its block."""
+    left, transmissions = 0, bank.transmissions
+    for j in range(transmissions.shape[1] if bank.ringing[b].transmissions else 0):
+        phase = transmissions[b, j].phase
         if phase == COMING:
             phase = RISING
         elif phase == RISING:
@@ -49,14 +49,14 @@ def move_on(b, bank):  # pragma: no cover - compiled
             phase = FALLING
         elif phase == FALLING:
             phase = OFF
-        passes[b, j].phase = phase
+        transmissions[b, j].phase = phase
         left += phase != OFF
-    bank.ringing[b].passes = left
+    bank.ringing[b].transmissions = left
 
 
 @uncounted
 def sounds(phase):  # pragma: no cover - compiled
-    """Return whether a pass is active."""
+    """Return whether a transmission is active."""
     return phase not in (OFF, COMING)
 
 
@@ -67,19 +67,19 @@ def last_set(b, bank):  # pragma: no cover - compiled
     for w in range(sets):
         if bank.observed[w, b]:
             last = w
-    if bank.ringing[b].passes:
-        for j in range(bank.passes.shape[1]):
-            if sounds(bank.passes[b, j].phase):
+    if bank.ringing[b].transmissions:
+        for j in range(bank.transmissions.shape[1]):
+            if sounds(bank.transmissions[b, j].phase):
                 last = (j + 2) * sets - 1
     return last
 
 
 @uncounted
-def pass_on(b, j, w, stretch, values, bank, passed):  # pragma: no cover - compiled
-    """Add the values of a `layout.Stretch` of body b's j-th pass, set w, to its partner."""
-    phase, to = bank.passes[b, j].phase, bank.passes[b, j].to
+def transmit(b, j, w, stretch, values, bank, transmitted):  # pragma: no cover - compiled
+    """Add the values of a `layout.Stretch` of body b's j-th transmission, set w, to its partner."""
+    phase, to = bank.transmissions[b, j].phase, bank.transmissions[b, j].to
     bank.ringing[to].passed_to = 1
-    place, out = (stretch.at + stretch.i) % BLOCK, passed[w, to, stretch.i : stretch.i + stretch.count]
+    place, out = (stretch.at + stretch.i) % BLOCK, transmitted[w, to, stretch.i : stretch.i + stretch.count]
     for k in range(stretch.count):
         x = (place + k) / BLOCK
         ramp = x if phase in (RISING, BRIEF) else (1.0 - x if phase == FALLING else 1.0)
@@ -89,30 +89,30 @@ def pass_on(b, j, w, stretch, values, bank, passed):  # pragma: no cover - compi
 @uncounted
 def add_passed(n, bank, scratch):  # pragma: no cover - compiled
     """Add what was transmitted to the bodies' own sound; their rows of scratch.sounds become 1."""
-    source, passed = scratch.source, scratch.passed
+    source, transmitted = scratch.source, scratch.transmitted
     for b in range(len(bank.ringing)):
         if bank.ringing[b].passed_to:
             bank.ringing[b].passed_to, scratch.sounds[b, 0] = 0, 1
             for w in range(len(bank.observed)):
                 for k in range(n):
-                    value = source[w, b, k] + passed[w, b, k]
+                    value = source[w, b, k] + transmitted[w, b, k]
                     source[w, b, k] = value if abs(value) >= FLUSH else 0.0
-                    passed[w, b, k] = 0.0
+                    transmitted[w, b, k] = 0.0
 
 
-def set_passes(bank: Bank, state: BankState, b: int, wanted: Mapping[int, Array]) -> None:
+def set_transmissions(bank: Bank, state: BankState, b: int, wanted: Mapping[int, Array]) -> None:
     """Set what body b transmits from the next block's start, at once where nothing of it is active.
 
-    wanted: weights (W, m) complex by partner. Earlier passes end. Where there are too few places, the first of
+    wanted: weights (W, m) complex by partner. Earlier ones end. Where there are too few places, the first of
     ``wanted`` have them.
     """
     start, m, modes = int(bank.body[b]["start"]), int(bank.body[b]["columns"]), bank.law.shape[1]
-    now, mine, sets = state.ringing[b], state.passes[b], len(bank.observed)
+    now, mine, sets = state.ringing[b], state.transmissions[b], len(bank.observed)
     loud = now["ringing"] or now["driven"] or now["tiled"] or now["strike"] >= 0
     mine["phase"] = LEAVES[mine["phase"]] if loud else OFF
     places = np.flatnonzero(mine["phase"] == OFF)
     for j, (to, weight) in zip(places, wanted.items(), strict=False):
         mine[j] = to, COMING if loud else STEADY
-        rows = state.pass_weight[j * sets : (j + 1) * sets]
+        rows = state.transmission_weight[j * sets : (j + 1) * sets]
         rows[:, start : start + m], rows[:, modes + start : modes + start + m] = weight.real, weight.imag
-    now["passes"] = np.count_nonzero(mine["phase"])
+    now["transmissions"] = np.count_nonzero(mine["phase"])

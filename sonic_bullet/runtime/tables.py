@@ -153,7 +153,7 @@ class StepScratch:
 
     count (2,): its pulses and drives. pulse (p,) PULSE with modal_impulse (p, 2, columns); drives d: force (d·n,),
     gain0, gain1 (d, 2, columns), direction0, direction1 (d, 3), body (d, 2), slot (d,). source (W, b, n), dipole
-    (b, 3, n), sounds (b, 2): which rows of these are not zero; passed (W, b, n): zeros.
+    (b, 3, n), sounds (b, 2): which rows of these are not zero; transmitted (W, b, n): zeros.
     """
 
     count: Array = field(default_factory=lambda: np.zeros(2, np.int64))
@@ -167,7 +167,7 @@ class StepScratch:
     body: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     slot: Array = field(default_factory=lambda: np.zeros(0, np.int64))
     source: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
-    passed: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
+    transmitted: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     dipole: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))
     sounds: Array = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     samples: int = -1  # capacity in samples
@@ -185,4 +185,4 @@ class StepScratch:
             self.force = np.zeros(len(self.slot) * samples)
         if self.source.shape[:2] != shape or self.source.shape[2] < samples:
             self.source, self.dipole = np.zeros((*shape, samples)), np.zeros((shape[1], 3, samples))
-            self.sounds, self.passed = np.zeros((shape[1], 2), np.int64), np.zeros((*shape, samples))
+            self.sounds, self.transmitted = np.zeros((shape[1], 2), np.int64), np.zeros((*shape, samples))

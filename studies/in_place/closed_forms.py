@@ -131,7 +131,9 @@ def reciprocity() -> Iterator[Line]:
         for k in (1.0, 10.0, 100.0):
             (a, b), there, back = pair(np.random.default_rng(5), k, 1, 0.5, (4, 3))
             a, b = (replace(x, decay_per_s=0 * x.decay_per_s) for x in (a, b))
-            offs.append(np.abs(solve(a, [b], there).passes[0] / solve(b, [a], back).passes[0].T + 1).max())
+            offs.append(
+                np.abs(solve(a, [b], there).transmissions[0] / solve(b, [a], back).transmissions[0].T + 1).max()
+            )
         slope = np.diff(np.log10(offs))
         yield Line(
             f"reciprocity of what passes, {name}: what is left at K = 1, 10, 100 N/m",

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sonic_bullet.contact.coupling import ContactSpring
-from sonic_bullet.runtime.supports.pole_updates import passed_weight
+from sonic_bullet.runtime.supports.pole_updates import transmitted_weight
 from studies.in_place.lines import Line
 from studies.in_place.standing import AT_M, POINT_LOSS, POINT_N_M
 from studies.in_place.things import MINDLIN, Stands, Thing, board, fork, spring, stand, with_plate
@@ -45,7 +45,7 @@ def fork_on_board() -> Iterator[Line]:
         taken = taken_per_s(placed, k)
         for how in (placed.newton, placed.runs):
             own = one.resonator.weight[0, 0]
-            whole = own + passed_weight(on.resonator, how.passes[0], how.omega_rad_s)[0, 0]
+            whole = own + transmitted_weight(on.resonator, how.transmissions[0], how.omega_rad_s)[0, 0]
             louder.append(20 * np.log10(abs(whole) / abs(own)))
             grown.append((how.decay_per_s[0] - one.mobility.decay_per_s[0]) / taken)
         name = f"fork {one.hz[0]:.0f} Hz, its foot's motion {foot_over_tip(one):.2%} of its tip's, on 24 mm of wood"

@@ -1,11 +1,21 @@
-"""Poles and passes that change while bodies ring: any cutting gives the same bits, nothing jumps, nothing is added."""
+"""Poles and transmissions that change while bodies ring: any cutting gives the same bits, and nothing is added."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from sonic_bullet.bank import PASSES, Bank, BankState, ModeSet, append, empty_bank, set_passes, set_poles, silence
+from sonic_bullet.bank import (
+    MOST_PARTNERS,
+    Bank,
+    BankState,
+    ModeSet,
+    append,
+    empty_bank,
+    set_poles,
+    set_transmissions,
+    silence,
+)
 from sonic_bullet.bank.tile import BLOCK
 from sonic_bullet.records import Array
 from tests.made.banks import Force, Strike, advance
@@ -13,7 +23,7 @@ from tests.made.banks import Force, Strike, advance
 SR = 48_000
 SIZES = (20, 7, 11)
 CHANGES = (0, 700, 1500, 1555, 2400, 3600)
-"""Samples before which poles and passes change."""
+"""Samples before which poles and transmissions change."""
 RUBBED = (500, 2500)
 ENTER = (90, 1480, 1990)
 """Samples at which strikes become known: a step's are known when it begins, with the poles that are then."""
@@ -27,7 +37,7 @@ def bodies(rng: np.random.Generator, bent: bool = False) -> tuple[Bank, BankStat
         )
         for m in SIZES
     ]  # fmt: skip
-    return *append(*empty_bank(SR, 2, passes=PASSES), sets), sets
+    return *append(*empty_bank(SR, 2, transmissions=MOST_PARTNERS), sets), sets
 
 
 def played(cuts: Array, bent: bool = False) -> Array:
@@ -54,7 +64,7 @@ def change(rng: np.random.Generator, bank: Bank, state: BankState, sets: list[Mo
         set_poles(bank, state, b, (1j * one.omega_rad_s * turn - one.decay_per_s - more) / SR)
         others = [c for c in range(3) if c != b and rng.random() < 0.7]
         m = SIZES[b]
-        set_passes(bank, state, b, {c: rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)) for c in others})
+        set_transmissions(bank, state, b, {c: rng.normal(size=(2, m)) + 1j * rng.normal(size=(2, m)) for c in others})
 
 
 @pytest.mark.parametrize("bent", [False, True])
@@ -72,7 +82,7 @@ def test_a_mode_whose_pole_changes_goes_on_with_the_other_from_the_next_block(be
     depends on its level starts from the new pole too.
     """
     one = ModeSet(np.array([3000.0]), np.array([4.0]), np.ones((1, 1)), bend=bend)
-    bank, state = append(*empty_bank(SR, passes=PASSES), [one])
+    bank, state = append(*empty_bank(SR, transmissions=MOST_PARTNERS), [one])
     y = advance(bank, state, 1000, [Strike(0, 0.0, 1e-12, np.array([1.0]))])[0, 0]
     set_poles(bank, state, 0, np.array([-90 + 3010j]) / SR)
     y = np.concatenate([y, advance(bank, state, 3000)[0, 0]])
@@ -85,12 +95,12 @@ def test_a_mode_whose_pole_changes_goes_on_with_the_other_from_the_next_block(be
 
 def test_what_passes_on_is_the_ringing_by_its_weights_faded_in_and_out_over_a_block() -> None:
     one = ModeSet(np.array([3000.0, 7000.0]), np.array([4.0, 9.0]), np.array([[1.0, 1.0]]) + 0j)
-    bank, state = append(*empty_bank(SR, passes=PASSES), [one, one])
+    bank, state = append(*empty_bank(SR, transmissions=MOST_PARTNERS), [one, one])
     weight = np.array([[0.2 + 0.1j, -0.3j]])
     y = [advance(bank, state, 300, [Strike(0, 0.0, 1e-12, np.array([1.0, 2.0]))])]
-    set_passes(bank, state, 0, {1: weight})
+    set_transmissions(bank, state, 0, {1: weight})
     y.append(advance(bank, state, 900))
-    set_passes(bank, state, 0, {})
+    set_transmissions(bank, state, 0, {})
     y.append(advance(bank, state, 1000))
     n = np.arange(2200)
     z = np.stack([a * (1 + 1j * d / w) * np.exp((-d + 1j * w) / SR * n) for a, w, d in ((1, 3e3, 4.0), (2, 7e3, 9.0))])
@@ -103,7 +113,7 @@ def test_what_passes_on_is_the_ringing_by_its_weights_faded_in_and_out_over_a_bl
 def test_quenched_they_are_silent_and_touch_on() -> None:
     rng = np.random.default_rng(3)
     bank, state, sets = bodies(rng)
-    set_passes(bank, state, 0, {2: rng.normal(size=(2, 20)) + 0j})
+    set_transmissions(bank, state, 0, {2: rng.normal(size=(2, 20)) + 0j})
     set_poles(bank, state, 0, (1j * sets[0].omega_rad_s - sets[0].decay_per_s - 100) / SR)
     hit = rng.normal(size=20)
     fresh = state.copy()
@@ -120,9 +130,9 @@ def test_a_quench_within_a_fade_leaves_nothing_to_fade() -> None:
     rng = np.random.default_rng(4)
     bank, state, _ = bodies(rng)
     weight, hit = rng.normal(size=(2, 20)) + 0j, rng.normal(size=20)
-    set_passes(bank, state, 0, {2: weight})
+    set_transmissions(bank, state, 0, {2: weight})
     advance(bank, state, 300, [Strike(0, 0.0, 1e-4, hit)])
-    set_passes(bank, state, 0, {1: weight})
+    set_transmissions(bank, state, 0, {1: weight})
     advance(bank, state, 100)
     state = silence(state)
     state.at = 0
@@ -131,7 +141,7 @@ def test_a_quench_within_a_fade_leaves_nothing_to_fade() -> None:
 
 
 def test_no_change_adds_energy() -> None:
-    """What rings, Σ|z|², through 2000 changes of poles and passes at random samples: it never grows."""
+    """What rings, Σ|z|², through 2000 changes of poles and transmissions at random samples: it never grows."""
     rng = np.random.default_rng(5)
     bank, state, sets = bodies(rng)
     advance(bank, state, 3 * BLOCK, [Strike(b, 0.0, 1e-4, rng.normal(size=m)) for b, m in enumerate(SIZES)])
@@ -141,7 +151,7 @@ def test_no_change_adds_energy() -> None:
         for b, one in enumerate(sets):
             slow = rng.uniform(0, 1e-2) * one.decay_per_s
             set_poles(bank, state, b, (1j * one.omega_rad_s * rng.uniform(0.3, 1.5) - slow) / SR)
-        set_passes(bank, state, 0, {c: rng.normal(size=(2, 20)) + 0j for c in (1, 2) if rng.random() < 0.5})
+        set_transmissions(bank, state, 0, {c: rng.normal(size=(2, 20)) + 0j for c in (1, 2) if rng.random() < 0.5})
         advance(bank, state, int(rng.integers(1, 700)))
         assert (state.z**2).sum() <= before + 1e-9 * begun
         before = (state.z**2).sum()

@@ -75,7 +75,7 @@ def advance(
     if dipole is None:
         dipole = np.zeros((bank.body_count, 3, n))
     dipole[...] = 0.0
-    scratch = step_scratch(bank, n, forces)._replace(source=out, passed=passed(bank, state, n), dipole=dipole)
+    scratch = step_scratch(bank, n, forces)._replace(source=out, transmitted=transmitted(bank, state, n), dipole=dipole)
     work = room(bank.body_count, len(forces), n)
     bank_kernel.advance(state.at, n, float(bank.sr), along, tables(bank, state), scratch, work)
     state.at += n
@@ -88,9 +88,9 @@ def tables(bank: Bank, state: BankState) -> BankTables:
     return group
 
 
-def passed(bank: Bank, state: BankState, n: int) -> Array:
+def transmitted(bank: Bank, state: BankState, n: int) -> Array:
     """Room for what touching bodies transmit."""
-    return np.zeros((*bank.observed.shape, n if state.passes.shape[1] else 0))
+    return np.zeros((*bank.observed.shape, n if state.transmissions.shape[1] else 0))
 
 
 @lru_cache(maxsize=8)

@@ -72,14 +72,14 @@ def _described(
     decay = np.maximum(-s.real, 0.0)
     force = np.linalg.solve(inverse_w(x, s)[0], (v @ x.own.T)[..., None])[..., 0]
     at = s[:, None]
-    passed = at * (force @ x.other) / (at**2 + 2 * x.other_decay * at + x.other_lam)
-    passed /= 1 + (np.abs(passed) ** 2).sum(axis=1, keepdims=True)
+    transmitted = at * (force @ x.other) / (at**2 + 2 * x.other_decay * at + x.other_lam)
+    transmitted /= 1 + (np.abs(transmitted) ** 2).sum(axis=1, keepdims=True)
     ends = np.cumsum([0, *(len(p.omega_rad_s) + 6 for p in partners)])
     return CoupledModes(
         s.imag,
         decay,
         turn,
-        tuple(passed[:, a : b - 6].T for a, b in pairwise(ends)),
+        tuple(transmitted[:, a : b - 6].T for a, b in pairwise(ends)),
         np.abs(force).T,
         _shares(x, m, s.imag, decay, v, force),
         stands & ~held,

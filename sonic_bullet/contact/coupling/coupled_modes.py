@@ -51,7 +51,7 @@ class CoupledModes:
         The identity where they do not mix. State z, gains Uᵀj and shapes of the free modes become turnᵀ z, turnᵀ Uᵀj,
         Φ turn: ½|z|² stays what it is.
     omega_rad_s, decay_per_s : (m,) poles of the new modes; no decay is below 0
-    passes : for each partner (m_p, m) complex, its modes' velocity per velocity of each new mode
+    transmissions : for each partner (m_p, m) complex, its modes' velocity per velocity of each new mode
         At most ½ in all: of two that meet at one frequency, each has the other's half.
     force_n_s : (c, m) amplitude of the normal force at each touch in N, for a velocity amplitude z of 1 of a new mode
         Where Σ|force z| exceeds the load the contact separates.
@@ -62,7 +62,7 @@ class CoupledModes:
     omega_rad_s: Array
     decay_per_s: Array
     turn: Array
-    passes: tuple[Array, ...]
+    transmissions: tuple[Array, ...]
     force_n_s: Array
     shares: Array
     newton: Array

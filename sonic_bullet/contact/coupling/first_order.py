@@ -90,9 +90,9 @@ def first_order(
     force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
     lifts = np.zeros((3 * len(touches), m))
     lifts[row] = np.abs(times_real(force, q[:m].T))
-    passed = np.where(held, 0, moved * part / (1 + shift * part * yielding))
-    passed /= 1 + size_squared(passed).sum(axis=0)
-    passed = times_real(passed, q[:m].T)
+    transmitted = np.where(held, 0, moved * part / (1 + shift * part * yielding))
+    transmitted /= 1 + size_squared(transmitted).sum(axis=0)
+    transmitted = times_real(transmitted, q[:m].T)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
     decay = np.maximum(-new.real, 0.0)
     power = np.stack([own, -contact.imag, -partner.imag], axis=1)
@@ -103,7 +103,7 @@ def first_order(
         new.imag,
         decay,
         turn,
-        tuple(passed[a:b] for a, b in pairwise(ends)),
+        tuple(transmitted[a:b] for a, b in pairwise(ends)),
         lifts[::3],
         decay[:, None] * power / whole,
         ~held,

@@ -47,7 +47,7 @@ ON = 0.02
 """Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
 NARROW = 0.1
 """Least width of a face that touches over its length: where two corners alone are known."""
-LEAST_PASSED = 0.3
+LEAST_TRANSMITTED = 0.3
 """Of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out."""
 FAINTEST = 1e-3
 """Of a body's loudest mode: 60 dB below, it is what is left when all else has decayed."""
@@ -102,7 +102,7 @@ def _update_body(state: State, b: int, quaternion: Array) -> None:
     turn_modes(state, b, placed.turn if touches else None)
     if not touches:
         bank.set_poles(state.bank, state.ringing, b, free)
-        bank.set_passes(state.bank, state.ringing, b, {})
+        bank.set_transmissions(state.bank, state.ringing, b, {})
         return
     new = _audible((-placed.decay_per_s + 1j * placed.omega_rad_s) / state.bank.sr, free[:m])
     voice = state.voices[b]
@@ -112,7 +112,9 @@ def _update_body(state: State, b: int, quaternion: Array) -> None:
     separation = np.zeros(len(free))
     separation[:m] = np.nan_to_num(np.abs(placed.force_n_s) / load_n[:, None]).max(axis=0)
     bank.set_poles(state.bank, state.ringing, b, new, separation)
-    bank.set_passes(state.bank, state.ringing, b, dict(_passed(state, b, partners, placed, len(free))))
+    bank.set_transmissions(
+        state.bank, state.ringing, b, dict(_transmitted_weights(state, b, partners, placed, len(free)))
+    )
 
 
 def _lanes(state: State, b: int) -> Array:
@@ -130,25 +132,25 @@ def _audible(new: Array, free: Array) -> Array:
     return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
 
 
-def _passed(
+def _transmitted_weights(
     state: State, b: int, partners: list[int], placed: CoupledModes, columns: int
 ) -> Iterator[tuple[int, Array]]:
     """Yield weights (W, columns) of the transmission to each audible partner.
 
-    Audible: more than LEAST_PASSED of the body's own sound in some mode, of those within FAINTEST of its loudest, both
-    without gains.
+    Audible: more than LEAST_TRANSMITTED of the body's own sound in some mode, of those within FAINTEST of its loudest,
+    both without gains.
     """
     own = np.abs(state.resonators[b].weight[0] @ placed.turn) / state.resonators[b].body.gain
-    least = np.maximum(LEAST_PASSED * own, FAINTEST * own.max(initial=0.0))
-    for p, rate in zip(partners, placed.passes, strict=True):
+    least = np.maximum(LEAST_TRANSMITTED * own, FAINTEST * own.max(initial=0.0))
+    for p, rate in zip(partners, placed.transmissions, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
-        weight[:, : rate.shape[1]] = passed_weight(state.resonators[p], rate, placed.omega_rad_s)
-        passed = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
-        if (passed > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
+        weight[:, : rate.shape[1]] = transmitted_weight(state.resonators[p], rate, placed.omega_rad_s)
+        transmitted = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
+        if (transmitted > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
 
 
-def passed_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
+def transmitted_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
     """Compute weights (W, m) of another body's modes, at omega_rad_s (m,), in the sound of a partner.
 
     rate (m_p, m): motion of the partner's own modes per motion of them. Pressure is iωρ₀ times velocity: it is

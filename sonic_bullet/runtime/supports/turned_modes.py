@@ -57,7 +57,7 @@ def _turn_state(state: State, b: int, pairs: Array, step: Array) -> None:
     now, start, modes = state.ringing, int(state.bank.body[b]["start"]), state.bank.law.shape[1]
     weight = state.bank.weight.copy()  # the bank is other states', too
     for part in (start, modes + start):
-        for values in (now.z, now.driven, now.pass_weight, weight):
+        for values in (now.z, now.driven, now.transmission_weight, weight):
             turn_lanes(values, part + pairs, step)
     state.bank = replace(state.bank, weight=weight)
     slot = int(now.ringing[b]["strike"])

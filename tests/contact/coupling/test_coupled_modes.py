@@ -123,9 +123,9 @@ def test_two_bodies_at_once(k: float) -> None:
     np.testing.assert_allclose(got, s[near], rtol=1e-6)
     assert len(set(near)) == len(got)
     q = vector[:n, near]
-    passed = q[11:] / (found.turn * q[:5]).sum(axis=0)
-    want = passed[:4] / (1 + (np.abs(passed) ** 2).sum(axis=0))
-    np.testing.assert_allclose(found.passes[0], want, rtol=1e-5, atol=1e-8)
+    transmitted = q[11:] / (found.turn * q[:5]).sum(axis=0)
+    want = transmitted[:4] / (1 + (np.abs(transmitted) ** 2).sum(axis=0))
+    np.testing.assert_allclose(found.transmissions[0], want, rtol=1e-5, atol=1e-8)
     np.testing.assert_allclose(found.shares.sum(axis=1), found.decay_per_s, rtol=1e-9)
 
 
@@ -137,7 +137,7 @@ def test_what_passes_is_reciprocal() -> None:
     for k in (1.0, 10.0, 100.0):
         (a, b), there, back = pair(np.random.default_rng(5), 4, 3, k)
         a, b = (BodyMobility(x.omega_rad_s, 0 * x.decay_per_s, x.mass_kg, x.inertia_kg_m2) for x in (a, b))
-        one, other = newton_modes(a, [b], there).passes[0], newton_modes(b, [a], back).passes[0]
+        one, other = newton_modes(a, [b], there).transmissions[0], newton_modes(b, [a], back).transmissions[0]
         assert np.abs(one).min() > 0
         off.append(np.abs(one / other.T + 1).max())
     assert off[0] < 1e-4
@@ -150,7 +150,7 @@ def test_two_of_one_frequency_share_by_halves() -> None:
     body = BodyMobility(root, np.zeros(1))
     spot = BodyPoint(shape, np.zeros(3), AXES)
     found = newton_modes(body, [body], [ContactPoint(0, spot, spot, ContactSpring(1e3, 0.0))])
-    np.testing.assert_allclose(np.abs(found.passes[0]), 0.5, rtol=1e-9)
+    np.testing.assert_allclose(np.abs(found.transmissions[0]), 0.5, rtol=1e-9)
 
 
 def test_a_touch_of_more_force_than_load() -> None:

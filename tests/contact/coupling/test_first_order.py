@@ -78,8 +78,8 @@ def test_reciprocity_of_what_passes() -> None:
     rng = np.random.default_rng(3)
     one, other = BodyMobility(np.array([3e3]), np.array([1.0])), BodyMobility(np.array([9e3]), np.array([2.0]))
     spring, a, b = ContactSpring(2e3 + 0j, 1e3 + 0j), place(rng, one), place(rng, other)
-    there = first_order(one, [other], [ContactPoint(0, a, b, spring)]).passes[0][0, 0]
-    back = first_order(other, [one], [ContactPoint(0, b, a, spring)]).passes[0][0, 0]
+    there = first_order(one, [other], [ContactPoint(0, a, b, spring)]).transmissions[0][0, 0]
+    back = first_order(other, [one], [ContactPoint(0, b, a, spring)]).transmissions[0][0, 0]
     assert there * (9e3**2 - 3e3**2) == pytest.approx(back * (3e3**2 - 9e3**2), rel=0.02)
 
 
@@ -100,8 +100,8 @@ def test_what_passes_is_reciprocal_mode_by_mode() -> None:
             for n, kg in ((4, 0.2), (3, 0.5))
         )
         spring, own, other = ContactSpring(stiff + 0j, stiff + 0j), place(rng, a), place(rng, b)
-        there = first_order(a, [b], [ContactPoint(0, own, other, spring)]).passes[0]
-        back = first_order(b, [a], [ContactPoint(0, other, own, spring)]).passes[0]
+        there = first_order(a, [b], [ContactPoint(0, own, other, spring)]).transmissions[0]
+        back = first_order(b, [a], [ContactPoint(0, other, own, spring)]).transmissions[0]
         off.append(np.abs(there / back.T + 1).max())
     assert off[0] < 1e-3
     assert np.diff(np.log10(off)) == pytest.approx([1.0, 1.0], abs=0.1)
@@ -159,7 +159,7 @@ def test_what_twins_pass_on_does_not_hang_on_the_choice_of_their_basis() -> None
         )
         for by in (np.eye(3), turn)
     )
-    told_free, turned_free = (found.passes[0] @ found.turn.T for found in (told, turned))
+    told_free, turned_free = (found.transmissions[0] @ found.turn.T for found in (told, turned))
     assert np.abs(turned_free - told_free @ turn).max() < 0.02 * np.abs(told_free).max()
 
 

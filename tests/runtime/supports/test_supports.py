@@ -201,9 +201,9 @@ def test_a_partner_is_heard_for_one_mode_alone() -> None:
     state: Any = SimpleNamespace(resonators=[fork, on], bank=SimpleNamespace(observed=np.ones((1, 2))))
 
     def heard(share: float) -> list[tuple[int, Array]]:
-        passes = (np.array([[share, 1e-4]]),)
-        placed: Any = SimpleNamespace(passes=passes, omega_rad_s=fork.omega_rad_s, turn=np.eye(2))
-        return list(pole_updates._passed(state, 0, [1], placed, 2))
+        transmissions = (np.array([[share, 1e-4]]),)
+        placed: Any = SimpleNamespace(transmissions=transmissions, omega_rad_s=fork.omega_rad_s, turn=np.eye(2))
+        return list(pole_updates._transmitted_weights(state, 0, [1], placed, 2))
 
     assert not heard(1e-4)
     ((partner, weight),) = heard(0.05)
@@ -213,4 +213,4 @@ def test_a_partner_is_heard_for_one_mode_alone() -> None:
 def test_a_plate_on_a_board_makes_it_sound(client: Any) -> None:
     """In the run time too: late, when the board's own ringing is over, what the plate passes on is heard from it."""
     listener = landed(client, seconds=0.6)
-    assert (listener._synth._state.ringing.passes["phase"][1] == STEADY).any()
+    assert (listener._synth._state.ringing.transmissions["phase"][1] == STEADY).any()
