@@ -177,10 +177,6 @@ def names(found: Comparison) -> str:
     )
 
 
-def quiet(text: str) -> None:
-    pass
-
-
 def scenes(bench: Bench, logs: bool = False) -> None:
     """42 changes of one input."""
     found_count = right = 0
@@ -190,7 +186,7 @@ def scenes(bench: Bench, logs: bool = False) -> None:
         if logs:
             assert a.log is not None and b.log is not None
             a, b = of_log(a.log, "a"), of_log(b.log, "b")
-        found = compared(a, b, quiet)
+        found = compared(a, b)
         first = bool(found.differences) and is_that(found.differences[0], one)
         found_count += not found.same
         right += first and (logs or len(found.causes) == 1)
@@ -211,7 +207,7 @@ def pairs(bench: Bench) -> None:
         if i.scene == j.scene and (i.who, i.what) != (j.who, j.what) and not {"body", "material"} & {i.what, j.what}:
             listed.append((i, j))
     for one, other in listed:
-        found = compared(*bench.both(one, other), quiet)
+        found = compared(*bench.both(one, other))
         good = len(found.causes) == 2 and all(any(is_that(x, p) for x in found.causes) for p in (one, other))
         right += good
         line(one.scene, f"{one.who}: {one.what}", f"{other.who}: {other.what}", "" if good else f"WRONG {names(found)}")
@@ -225,7 +221,7 @@ def decoys(bench: Bench) -> None:
         partner = next(
             x for x in PLANTED if x.scene == one.scene and not x.options and x.what not in ("body", "material")
         )
-        found = compared(*bench.both(*((one,) if number < 5 else (one, partner))), quiet)
+        found = compared(*bench.both(*((one,) if number < 5 else (one, partner))))
         if number < 5:
             good = found.same and len(found.differences) == 1 and not found.causes
             alone += good
@@ -239,7 +235,7 @@ def decoys(bench: Bench) -> None:
 def same(bench: Bench, runs: int = 200) -> None:
     """Unchanged runs: the same bits."""
     a = bench.side("a", "drop", (), {})
-    equal = sum(compared(a, bench.side("b", "drop", (), {}), quiet).same for _ in range(runs))
+    equal = sum(compared(a, bench.side("b", "drop", (), {})).same for _ in range(runs))
     line("same", f"{equal} of {runs} unchanged runs have the same bits")
 
 
@@ -278,7 +274,7 @@ def page(bench: Bench, count: int = 20) -> None:
     a = run(SceneSide(place), "a")
     assert a.log is not None
     b = of_log(replace(a.log, seed=a.log.seed + 1, sensors=tuple(moved(x) for x in a.log.sensors)), "b")
-    write_page(str(bench.folder / "page.html"), [page_entry(compared(of_log(a.log, "a"), b, quiet))] * count)
+    write_page(str(bench.folder / "page.html"), [page_entry(compared(of_log(a.log, "a"), b))] * count)
     line("page", f"{(bench.folder / 'page.html').stat().st_size / 1e6:.2f} MB of {count} scenes, {PLAYED_S:g} s each")
 
 
@@ -309,7 +305,7 @@ def piles(bench: Bench, count: int = 100) -> None:
 
     place = write(bench.folder / "pile.py", SCENES["pile"])
     scene = SceneSide(place)
-    known = ensemble(scene, quiet)
+    known = ensemble(scene)
     alarms = 0
     for seed in range(1000, 1000 + count):
         alarms += judged(

@@ -20,7 +20,7 @@ def held_out(folder: Path, line: Callable[..., None]) -> None:
         if scene not in kept:
             kept[scene] = run(SceneSide(_written(folder / f"{scene}-a", scene, "", "")), "a")
         b = run(SceneSide(_written(folder / f"{scene}-{number}", scene, old, new)), "b")
-        found = compared(kept[scene], b, lambda text: None)
+        found = compared(kept[scene], b)
         first = found.differences[0] if found.differences else None
         good = (
             not found.same and first is not None and bool(first.cause) and what in first.what

@@ -8,7 +8,6 @@ wrong use, or a side that cannot be compared; 130: interrupted, and the results 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
+from sonic_bullet.machine.progress import progress_listener, progress_to
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
@@ -62,8 +62,8 @@ def compare(a: str, b: str | None, **options: Any) -> None:
             there, options["revision"] = stack.enter_context(at_revision(a, options["ref"]))
             a, b = there, a
         assert b is not None
-        tell = stack.enter_context(status("compare"))
-        found, stopped = _found(Path(a), Path(b), options, tell, page is not None)
+        stack.enter_context(progress_to(stack.enter_context(status("compare"))))
+        found, stopped = _found(Path(a), Path(b), options, page is not None)
         summary = CompareReport(found, stopped)
         print_report(summary, say)
         if page is not None:
@@ -111,7 +111,7 @@ def _of_scenes(a: str, b: str | None) -> bool:
     return a.lower().endswith(SCENE_ENDINGS) or (b or a).lower().endswith(SCENE_ENDINGS) or Path(a).is_dir()
 
 
-def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bool) -> tuple[list[Any], bool]:
+def _found(a: Path, b: Path, options: Any, page: bool) -> tuple[list[Any], bool]:
     """Compare all pairs; return one entry a pair, and whether it was interrupted."""
     from sonic_bullet.comparing.compared_sides import compare as compare_both
     from sonic_bullet.comparing.folders import Paired, compare_folders
@@ -125,12 +125,12 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
         return SceneSide(path, **given, revision=options.get("revision") if old else None)
 
     def both(one: Path, other: Path) -> dict[str, Any]:
-        found, refused = compare_both(side(one, old=True), side(other), say=tell), ""
+        found, refused = compare_both(side(one, old=True), side(other)), ""
         if options["audible"] and not found.same and not found.stopped:
             from sonic_bullet.comparing.ensemble import audible
 
             try:
-                found = replace(found, audible=audible(found.a, found.b, tell))
+                found = replace(found, audible=audible(found.a, found.b))
             except KeyboardInterrupt:
                 found = replace(found, stopped=True)
             except CompareError as error:
@@ -140,9 +140,9 @@ def _found(a: Path, b: Path, options: Any, tell: Callable[[str], None], page: bo
         return _kept(found, page) | {"refused": refused}
 
     if a.suffix.lower() == ".json":
-        return [Paired(b.name, _against_baseline(a, b, tell, options["tolerance_db"]))], False
+        return [Paired(b.name, _against_baseline(a, b, options["tolerance_db"]))], False
     if a.is_dir():
-        return compare_folders(a, b, both, tell)
+        return compare_folders(a, b, both, progress_listener())
     kept = both(a, b)
     return [Paired(b.name, kept)], kept["stopped"]
 
@@ -157,12 +157,12 @@ def _kept(found: Any, page: bool) -> dict[str, Any]:
     return kept
 
 
-def _against_baseline(a: Path, b: Path, tell: Callable[[str], None], tolerance_db: float | None) -> dict[str, Any]:
+def _against_baseline(a: Path, b: Path, tolerance_db: float | None) -> dict[str, Any]:
     """Compare a scene with its baseline."""
     from sonic_bullet.comparing.baselines import check_baseline, read_baseline
     from sonic_bullet.comparing.tolerance import sameness_words
 
-    checked = check_baseline(read_baseline(a), b, tell, tolerance_db)
+    checked = check_baseline(read_baseline(a), b, tolerance_db)
     judged = [one.words for one in (checked.audible, checked.closeness) if one is not None]
     words = [*checked.words, *judged, *([f"compared: {checked.compared}"] if checked.passed else [])]
     head = f"differs from {a.name}"
@@ -254,8 +254,8 @@ def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int
         import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
         from sonic_bullet.comparing.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
-        with status(scene) as tell:
-            made = make_baseline(scene, reason, tell, runs)
+        with status(scene) as say, progress_to(say):
+            made = make_baseline(scene, reason, runs)
         place.parent.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)
         what = format_count(len(made.features), "run") if made.features else "no ensemble"

@@ -9,7 +9,6 @@ The file holds no sound. Where the commit still exists, the scene as it was is r
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,7 +41,6 @@ from sonic_bullet.storage.typed_json import decode_json
 
 BASELINE_FOLDER = "sonic_baselines"
 BASELINE_FORMAT = "sonic_bullet baseline 1"
-Tell = Callable[[str], None]
 
 
 class SceneBaseline(msgspec.Struct, omit_defaults=True):
@@ -127,7 +125,7 @@ def samples_digest(sound: KeptSound) -> str:
     return made.hexdigest()
 
 
-def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) -> SceneBaseline:
+def make_baseline(scene: str | Path, reason: str, runs: int = RUNS) -> SceneBaseline:
     """Run a scene and make its baseline; raises what running it does."""
     side = run(SceneSide(scene), "a")
     assert side.log is not None
@@ -140,7 +138,7 @@ def make_baseline(scene: str | Path, reason: str, tell: Tell, runs: int = RUNS) 
         list(AUDIBLE_OCTAVES_HZ[: len(levels)]), [round(float(v), 3) if np.isfinite(v) else None for v in levels],
     )  # fmt: skip
     if defines_build(place) and runs:
-        known = ensemble(SceneSide(scene), tell, runs)
+        known = ensemble(SceneSide(scene), runs)
         made.seconds, made.rests = known.seconds, known.rests
         made.features = np.round(known.features, 4).tolist()
         made.spectra = np.round(known.spectra, 1).tolist()
@@ -167,9 +165,7 @@ def read_baseline(path: str | Path) -> SceneBaseline:
     return decode_json(data, SceneBaseline, f"{path} is no baseline", FileError, remedy)
 
 
-def check_baseline(
-    baseline: SceneBaseline, scene: str | Path, tell: Tell, tolerance_db: float | None = None
-) -> Checked:
+def check_baseline(baseline: SceneBaseline, scene: str | Path, tolerance_db: float | None = None) -> Checked:
     """Compare the scene as it is now with a baseline; raises what running it does.
 
     tolerance_db: of octave levels, where samples need not be equal.

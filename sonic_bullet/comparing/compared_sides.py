@@ -24,7 +24,7 @@ from sonic_bullet.comparing.revision_tree import unpinned, unpinned_words
 from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, run
 from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import report_progress, says_so
 from sonic_bullet.records.coerce import as_call
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.runtime.replay import render_kept
@@ -32,7 +32,6 @@ from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 Given = str | Path | SceneSide | ContactLog | Side
-Tell = Callable[[str], None]
 CAUSES_FIRST = {True: 0, None: 1, False: 2}
 
 
@@ -58,14 +57,14 @@ def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> 
     SonicBulletError
         A side cannot be run, read or compared.
     """
-    tell = as_call(say, "say") or (lambda text: None)
-    tell("A")
-    one = as_side(a, "a", say)
-    tell("B")
-    return compared(one, as_side(b, "b", say), tell)
+    as_call(say, "say")
+    report_progress("A")
+    one = as_side(a, "a")
+    report_progress("B")
+    return compared(one, as_side(b, "b"))
 
 
-def compared(a: Side, b: Side, tell: Tell) -> Comparison:
+def compared(a: Side, b: Side) -> Comparison:
     """Compare two sides that were run or read; raises CompareError."""
     same = a.sr == b.sr and same_sound(a.sound, b.sound)
     if a.log is None or b.log is None:
@@ -78,7 +77,7 @@ def compared(a: Side, b: Side, tell: Tell) -> Comparison:
         require_kin(a.log, b.log, match)
     first = FirstDifference(None, None) if same else first_difference(a.log, b.log, match)
     if a.scene is not None and b.scene is not None:
-        differences, causes = _of_scenes(a, b, same, first, tell)
+        differences, causes = _of_scenes(a, b, same, first)
     else:
         differences, causes = _of_logs(a.log, b.log, a, b, match, same, first)
     effects = () if same else (*_contact_effect(first), *modal_effects(a.log, b.log, match), *_of_sounds(a, b))
@@ -91,12 +90,12 @@ def compared(a: Side, b: Side, tell: Tell) -> Comparison:
     )  # fmt: skip
 
 
-def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference, tell: Tell) -> tuple[list[Difference], Causes]:
+def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference) -> tuple[list[Difference], Causes]:
     pairs, asked = asked_differences(a, b)
 
     def put_back(chosen: Sequence[int], like: Sequence[bytes] | None = None) -> KeptSound:
-        tell(f"with {', '.join(asked[i].what for i in chosen[:3])} put back")
-        return _put_back(b, pairs, [asked[i] for i in chosen], tell, like).sound
+        report_progress(f"with {', '.join(asked[i].what for i in chosen[:3])} put back")
+        return _put_back(b, pairs, [asked[i] for i in chosen], like).sound
 
     def is_a(chosen: Sequence[int]) -> bool:
         try:
@@ -111,16 +110,14 @@ def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference, tell: Tell)
     return _in_order(made), causes
 
 
-def _put_back(
-    b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], tell: Tell, like: Sequence[bytes] | None
-) -> Side:
+def _put_back(b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], like: Sequence[bytes] | None) -> Side:
     """Run B with those inputs of A; like: frames that it must have, else raise OtherSound."""
     assert b.scene is not None
     options = {one.option: one.a for one in asked if one.option}
     if "seconds" in options and not defines_build(Path(b.scene.path)):
         raise CompareError("a plain script says itself how long it runs", "change it there")
     plan = PutBack(pairs, frozenset(place for one in asked for place in one.places))
-    return run(replace(b.scene, **options), "b", plan=plan, like=like, say=tell)
+    return run(replace(b.scene, **options), "b", plan=plan, like=like)
 
 
 def _of_logs(

@@ -11,7 +11,7 @@ Features: contacts (episodes, impulse), log-spectral distance from the mean of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from sonic_bullet.comparing.inputs.tree_difference import with_leaves
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Call, Who
+from sonic_bullet.machine.progress import progress_listener, progress_to, report_progress
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import CompareError
@@ -30,7 +31,6 @@ from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ, octave_power
 
 RUNS = 99
 """Fewest runs in which a rank can be at the 1 % level."""
-Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +110,7 @@ class Shifted:
         return (x + shift_m * float(np.cos(angle)), y + shift_m * float(np.sin(angle)), z)
 
 
-def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
+def ensemble(scene: SceneSide, runs: int = RUNS) -> Ensemble:
     """Run a scene with shifted starts.
 
     Raises
@@ -126,10 +126,11 @@ def ensemble(scene: SceneSide, tell: Tell, runs: int = RUNS) -> Ensemble:
     longer = replace(scene, seconds=seconds)
 
     def one(seed: int) -> tuple[Array, Array]:
-        tell(f"run {seed} of {runs}")
-        return measured(run(longer, "b", plan=Shifted(seed)))
+        report_progress(f"run {seed} of {runs}")
+        with progress_to(lambda text: None):
+            return measured(run(longer, "b", plan=Shifted(seed)))
 
-    found = parallel_map(one, range(1, runs + 1), tell)
+    found = parallel_map(one, range(1, runs + 1), progress_listener())
     return Ensemble(np.array([x for x, _ in found]), np.array([y for _, y in found]), seconds, rests)
 
 
@@ -212,7 +213,7 @@ def judged(known: Ensemble, features: Array, spectra: Array) -> Audibility:
     return Audibility(float(statistic[-1]), rank, n - 1, rank / n, rank / n <= significance, note)
 
 
-def audible(a: Side, b: Side, tell: Tell, known: Ensemble | None = None) -> Audibility:
+def audible(a: Side, b: Side, known: Ensemble | None = None) -> Audibility:
     """Test whether B differs from an ensemble of A.
 
     Raises
@@ -222,6 +223,6 @@ def audible(a: Side, b: Side, tell: Tell, known: Ensemble | None = None) -> Audi
     """
     if a.scene is None or b.scene is None:
         raise CompareError(f"{a.name} is no scene: it has no ensemble", "leave --audible out, or compare scenes")
-    known = ensemble(a.scene, tell) if known is None else known
-    tell("B until it rests")
+    known = ensemble(a.scene) if known is None else known
+    report_progress("B until it rests")
     return judged(known, *measured(run(replace(b.scene, seconds=known.seconds), "b")))

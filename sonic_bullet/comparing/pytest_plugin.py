@@ -94,10 +94,6 @@ def _in_child(check: Callable[[], tuple[str, str]]) -> tuple[str, str]:
         return said, compared
 
 
-def _quiet(text: str) -> None:
-    pass
-
-
 def _checked(
     scene: Path, here: Path, results: Path, config: pytest.Config, tolerance_db: float | None
 ) -> tuple[str, str]:
@@ -119,14 +115,14 @@ def _checked(
     if not baseline.is_file() and with_test.is_file():  # put there by `baseline -o`
         baseline = with_test
     if config.getoption("--sonic-update"):
-        made = make_baseline(scene, "pytest --sonic-update", _quiet)
+        made = make_baseline(scene, "pytest --sonic-update")
         baseline.parent.mkdir(exist_ok=True)
         write_baseline(baseline, made)
         return "", f"baseline made anew, {baseline}"
     if not baseline.is_file():
         return f"{scene.name} has no baseline; make it: sonic-bullet baseline {scene} --reason WHY", ""
     known = read_baseline(baseline)
-    checked = check_baseline(known, scene, _quiet, tolerance_db)
+    checked = check_baseline(known, scene, tolerance_db)
     if checked.passed:
         return "", checked.compared
     said = [f"{scene.name} sounds otherwise than its baseline ({known.reason}): {'; '.join(checked.words)}"]

@@ -8,7 +8,7 @@ recording                     -> Side(sound)
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from sonic_bullet.comparing.revision_tree import RevisionTree, noted_files, own_
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
+from sonic_bullet.machine.progress import progress_listener
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, shown
 from sonic_bullet.records.errors import CompareError, SonicBulletError
@@ -29,7 +30,6 @@ from sonic_bullet.session.listening import Listener
 from sonic_bullet.session.wanted_bodies import WantedBody
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-Say = Callable[[str], None]
 OF_WHOM = ("body", "links", "parts", "own_shapes")
 """Fields of a `WantedBody` that identify it and its shape; all others are inputs."""
 
@@ -177,7 +177,6 @@ def run(
     *,
     plan: Plan | None = None,
     like: Sequence[bytes] | None = None,
-    say: Say | None = None,
 ) -> Side:
     """Run a scene and record its calls; raises what `render_scene` does.
 
@@ -193,7 +192,7 @@ def run(
     with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch):
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
-            material=scene.material, residual=scene.residual, say=say or (lambda text: None),
+            material=scene.material, residual=scene.residual, say=progress_listener(),
         )  # fmt: skip
     names = {(watch.calls.who(body.body_id), body.link): body.name for body in result.log.bodies}
     return Side(
@@ -202,7 +201,7 @@ def run(
     )  # fmt: skip
 
 
-def as_side(given: Any, side: str, say: Say | None = None) -> Side:
+def as_side(given: Any, side: str) -> Side:
     """Run or read a side.
 
     Raises
@@ -214,7 +213,7 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
     if isinstance(given, Side):
         return given
     if isinstance(given, SceneSide):
-        return run(given, side, say=say)
+        return run(given, side)
     if isinstance(given, ContactLog):
         return of_log(given, f"log {side}")
     name = as_path(given, side, remedy, error=CompareError)
@@ -222,7 +221,7 @@ def as_side(given: Any, side: str, say: Say | None = None) -> Side:
     if not place.is_file():
         raise CompareError(f"no file {shown(name)}", remedy)
     if place.suffix.lower() in SCENE_ENDINGS:
-        return run(SceneSide(name), side, say=say)
+        return run(SceneSide(name), side)
     if place.suffix.lower() == ".npz":
         return of_log(read_log(name), name)
     samples, sr = read_audio(name)

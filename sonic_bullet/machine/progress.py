@@ -1,5 +1,6 @@
 """Progress messages of long work, and their display.
 
+    report_progress(text) ─► whoever listens (progress_to, says_so)
     status(label), show_stage(text) ─► a terminal: one line, rewritten
                                     ─► else a pipe ─► supervisor of the command, or a thread ─► lines of stderr
 
@@ -18,6 +19,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import wraps
 from typing import ParamSpec, TypeVar
@@ -31,6 +33,7 @@ COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 LONGEST = 300  # characters of a line
 
 _SHOWN: list[Say] = []
+_HEARD: ContextVar[Say | None] = ContextVar("heard", default=None)
 
 
 @dataclass(slots=True)
@@ -133,8 +136,33 @@ def status(label: str) -> Iterator[Say]:
                 clear_stage()
 
 
+def report_progress(text: str) -> None:
+    """Tell whoever listens (`progress_to`) what is being done; without one, nothing."""
+    progress_listener()(text)
+
+
+def progress_listener() -> Say:
+    """Return whoever listens, to be handed to code that takes a function of its own; without one, a deaf one."""
+    return _HEARD.get() or (lambda text: None)
+
+
+@contextmanager
+def progress_to(say: Say | None) -> Iterator[None]:
+    """Let `report_progress` call ``say`` within the context; None: whoever listens already."""
+    if say is None:
+        yield
+        return
+    before = _HEARD.set(say)
+    try:
+        yield
+    finally:
+        _HEARD.reset(before)
+
+
 def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made]], Callable[P, Made]]:
     """Decorate a function: where its caller gives neither argument of these names, `status` shows them.
+
+    What it calls reaches the former by `report_progress`.
 
     text: name of the argument called with what is being done; fraction: of that called with the fraction done.
     """
@@ -144,8 +172,9 @@ def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made
         def called(*args: P.args, **options: P.kwargs) -> Made:
             names = [name for name in (text, fraction) if name]
             if any(options.get(name) is not None for name in names):
-                return function(*args, **options)
-            with status("sonic_bullet") as say:
+                with progress_to(options.get(text)):  # type: ignore[arg-type]
+                    return function(*args, **options)
+            with status("sonic_bullet") as say, progress_to(say):
                 options.update({name: say if name == text else percent(say) for name in names})
                 return function(*args, **options)
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, eigen, fem, lagrange
 from sonic_bullet.modal.cost import ELEMENT_LIMITS
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
@@ -109,21 +110,21 @@ class Elements:
             raise ModalError("the clamps hold the whole body", "give a smaller radius")
         return held
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), in one sector.
 
         From all λ the discretisation error of the first tensor is subtracted. Raises ModalError, MeshError.
         """
-        raw = self._solved(tensors, wanted, say)
+        raw = self._solved(tensors, wanted)
         nodes, free, _ = raw.place
-        less = self._less(tensors[0], raw.found[0][0], say)
+        less = self._less(tensors[0], raw.found[0][0])
         most_off = 0.01  # where two sizes differ by more, errors do not follow a power yet
         off = np.clip(np.nan_to_num(less[1]), -most_off, most_off) if self._same_body else np.zeros(less.shape[1])
         left = np.maximum(np.abs(less[0]) - np.abs(off), np.abs(off))
         found = tuple((value * np.exp(-2 * _as_long(off, len(value))), vector) for value, vector in raw.found)
         return [raw._replace(found=found, place=(nodes, free, left))]
 
-    def _less(self, tensor: Array, fine: Array, say: Callable[[str], None]) -> Array:
+    def _less(self, tensor: Array, fine: Array) -> Array:
         """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (2, m) by `orders`.
 
         Where no coarser body can be made, the same elements with polynomials of one degree less give the largest, and 0
@@ -140,7 +141,7 @@ class Elements:
         name = np.asarray(tensor).tobytes()
         try:
             if len(coarser.known.get(name, ())) < len(fine):
-                coarser._solved([tensor], Wanted(np.inf, len(fine)), say)
+                coarser._solved([tensor], Wanted(np.inf, len(fine)))
         except ModalError:  # walls too thin for its rigid motions to be told from its modes
             return np.full((2, len(fine)), np.nan)
         coarse = coarser.known[name][: len(fine)]
@@ -150,7 +151,7 @@ class Elements:
         lost = np.concatenate([np.full(len(few), few.mean()) for few in np.split(lost, apart) if len(few)])
         return np.array([lost / (ratio**order - 1) for order in orders[self.degree]] if sized else [lost, 0 * lost])
 
-    def _solved(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> Sector:
+    def _solved(self, tensors: Sequence[Array], wanted: Wanted) -> Sector:
         """Solve for the modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
         solid, nodes = self.solid, self.nodes
         held = self.held(nodes)
@@ -158,7 +159,7 @@ class Elements:
         corner = solid.node_m[self.body.skin.node][self.body.skin.face]
         area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
         shift = -SECTORS.shift * (2 * self.volume / float(area)) ** 2
-        say(f"assembling {len(free)} unknowns")
+        report_progress(f"assembling {len(free)} unknowns")
         rigid = 6
         if held.any():
             rigid -= int(np.linalg.matrix_rank(fem.rigid_modes(nodes.node_m)[np.repeat(held, 3)], tol=1e-9))
@@ -170,7 +171,13 @@ class Elements:
             if held.any():
                 k_matrix, mass = k_matrix[free][:, free], mass[free][:, free]
             modes = eigen.solve(
-                k_matrix, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > bound), most=most, say=say
+                k_matrix,
+                mass,
+                shift,
+                rigid=rigid,
+                enough=lambda value: bool(value[-1] > bound),
+                most=most,
+                say=report_progress,
             )
             keep = modes.lambda_per_s2 <= bound
             self.known[np.asarray(tensor).tobytes()] = modes.lambda_per_s2

@@ -5,13 +5,13 @@ mesh, wall, shortest wave, count of modes -> edge -> filled -> larger, less deta
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, lagrange, polynomials
 from sonic_bullet.modal.cost import ELEMENT_LIMITS
 from sonic_bullet.modal.elements import Elements, coarse
@@ -37,7 +37,6 @@ def filled(
     clamp: Array,
     sizes: tuple[float | None, float | None],
     kept: tuple[store.Place, str],
-    say: Callable[[str], None],
 ) -> Elements:
     """Fill any body with elements of a first size, for a material of stiffness (6, 6).
 
@@ -58,11 +57,11 @@ def filled(
     def at_size(edge_m: float, filler: Filler) -> Filled:
         cache, name = kept
         name = key("solid", name, edge_m, filler if filler == "simple" else filler == "lattice")
-        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), say, filler=filler)
+        return kept_or_filled(shapes, (edge_m, thickness_m), (cache, name), filler=filler)
 
     # the nodes that a clamp reaches depend on the size, which moves modes by up to 1 %: one size, whatever is wanted
     first = Wanted(np.inf, SECTORS.most_modes) if len(clamp) else wanted
-    wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first, say)
+    wall_m, edge_m, modes, simple = _first(shapes, thickness_m, length_m, tensor, first)
     edge = given or edge_m
     thin = edge > wall_m
     degree = 2 if given and given < wide * wall_m else 3
@@ -82,7 +81,6 @@ def _first(
     length_m: float,
     tensor: Array,
     wanted: Wanted,
-    say: Callable[[str], None],
 ) -> tuple[float, float, int, bool]:
     """Estimate the wall and the first edge, in m, the number of modes, and whether detail is left out.
 
@@ -105,7 +103,7 @@ def _first(
     )
     least = edge_within_m(area * wall / 2, wall, most / ELEMENT_LIMITS.per_tet[3])
     if edge < least:
-        say(
+        report_progress(
             f"elements of {edge * length_m:.2g} m, for the shortest wave wanted, are about {(least / edge) ** 2:.1f} × "
             f"{most} unknowns: larger ones are used, unless edge_m gives their size"
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,6 @@ def kept_or_filled(
     shapes: tuple[Shape, ...],
     sizes: tuple[float | None, float | None],
     kept: tuple[store.Place, str],
-    say: Callable[[str], None],
     *,
     filler: Filler,
 ) -> Filled:
@@ -34,7 +32,7 @@ def kept_or_filled(
         return Filled(
             Solid(a["node"], a["tet"], bool(a["affine"][0]), note), SolidSurface(a["skin"], a["face"]), a["curvature"]
         )
-    body = fill(shapes, *sizes, say, filler=filler)
+    body = fill(shapes, *sizes, filler=filler)
     solid, skin = body.solid, body.skin
     arrays = {
         "node": solid.node_m,

@@ -9,7 +9,7 @@ everything else                          -> tetrahedra (first_elements.py, eleme
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,6 @@ def chosen(
     edge_m: float | None,
     thickness_m: float | None,
     kept: tuple[store.Place, str],
-    say: Callable[[str], None],
 ) -> ModalMethod:
     """Choose the method for shapes and a material of stiffness (6, 6), its modes to be true up to what is wanted.
 
@@ -47,7 +46,7 @@ def chosen(
         )
         if found is not None:
             return found
-    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept, say)
+    return filled(shapes, length_m, tensor, wanted, clamp, (edge_m, thickness_m), kept)
 
 
 class Converged(NamedTuple):
@@ -68,15 +67,13 @@ class Converged(NamedTuple):
     error: float
 
 
-def converged(
-    method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, accuracy: float, say: Callable[[str], None]
-) -> Converged:
+def converged(method: ModalMethod, tensors: Sequence[Array], wanted: Wanted, accuracy: float) -> Converged:
     """Solve for the modes wanted of each tensor (6, 6), refined until the first's highest is as accurate as asked.
 
     It ends earlier where refining costs more than allowed. Raises ModalError, MeshError.
     """
     while True:
-        sectors = method.sectors(tensors, wanted, say)
+        sectors = method.sectors(tensors, wanted)
         value, owner, index = _listed(sectors)
         order = np.argsort(value, kind="stable")[: min(wanted.most, int((value <= wanted.limit).sum()))]
         top = (int(owner[order[-1]]), int(index[order[-1]])) if len(order) else None

@@ -94,7 +94,6 @@ def analyse(
     ModalError
         There are no usable modes.
     """
-    say = progress or (lambda _: None)
     asked = ModalOptions(to_hz, count, fixed, thickness_m, accuracy)
     to_hz, count = asked.to_hz, asked.count
     if not shapes:
@@ -115,7 +114,7 @@ def analyse(
     of = _unit_of(shapes, material, asked, edge_m)
     unit = _recall(store.load(cache, of.name))
     if unit is None:
-        unit = _solve(of, shapes, asked, edge_m, cache, say)
+        unit = _solve(of, shapes, asked, edge_m, cache)
         store.save(cache, of.name, _arrays(unit), unit.note)
     lam = unit.value * of.per_s2
     freq, decay, alive = damped(lam, material)
@@ -232,7 +231,6 @@ def _solve(
     asked: ModalOptions,
     edge_m: float | None,
     cache: store.Place,
-    say: Callable[[str], None],
 ) -> _Unit:
     """Solve for the body's modes without units, by its method, as accurate as asked or as that can be."""
     wanted = Wanted(of.limit, SECTORS.most_modes) if asked.count is None else Wanted(np.inf, asked.count)
@@ -245,9 +243,8 @@ def _solve(
         edge_m=edge_m,
         thickness_m=asked.thickness_m,
         kept=(cache, of.solid),
-        say=say,
     )
-    found = converged(method, [of.stiffness], wanted, asked.accuracy, say)
+    found = converged(method, [of.stiffness], wanted, asked.accuracy)
     shown = found.method.shown(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     if np.isfinite(found.error):

@@ -10,7 +10,7 @@ each parity. Errors fall exponentially with the degree.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.meshing import prisms, structured
 from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.modal.meshing.solid import surface
@@ -230,11 +231,11 @@ class Ritz:
         """Whether λ carries an element's error: never."""
         return False
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), a sector a parity."""
         from scipy.sparse import eye_array
 
-        say(f"solving {8 * unknowns(self.terms)} unknowns of a box")
+        report_progress(f"solving {8 * unknowns(self.terms)} unknowns of a box")
         high = min(wanted.limit, self.high)
         while True:
             found: list[Sector] = []

@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
@@ -42,7 +43,6 @@ def family(
     fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
     """
     beyond = 1.1  # × the limit on λ: a mode above it at one ν may lie below it at the other
-    say = progress or (lambda _: None)
     length = diagonal_m((shape,))
     limit = (2 * np.pi * to_hz) ** 2 * length**2 / gamma_m2_s2
     clamp = np.array(fixed, float).reshape(-1, 4)
@@ -68,18 +68,18 @@ def family(
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
     wanted = Wanted(limit, SECTORS.most_modes, beyond)
-    method = chosen(
-        (shape,),
-        length,
-        mixed(max(low, high), *_lame_shear()),
-        wanted,
-        clamp=clamp,
-        edge_m=edge_m,
-        thickness_m=None,
-        kept=kept,
-        say=say,
-    )
-    made = _reduced(method, length, wanted, (low, high), say)
+    with progress_to(progress):
+        method = chosen(
+            (shape,),
+            length,
+            mixed(max(low, high), *_lame_shear()),
+            wanted,
+            clamp=clamp,
+            edge_m=edge_m,
+            thickness_m=None,
+            kept=kept,
+        )
+        made = _reduced(method, length, wanted, (low, high))
     # the cache holds finite numbers: -1 is an unknown error
     numbers = np.array([made.volume_m3, made.count, made.meshed, np.nan_to_num(made.error, nan=-1.0)])
     arrays = {
@@ -119,16 +119,14 @@ def _lame_shear() -> tuple[Array, Array]:
     return lame, shear
 
 
-def _reduced(
-    method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[float, float], say: Callable[[str], None]
-) -> Family:
+def _reduced(method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[float, float]) -> Family:
     """Build the family that the modes at two Poisson's ratios span, sector by sector."""
     accuracy = 0.01  # of the highest mode's frequency: as `analyse` has it by default
     from scipy.linalg import block_diag
 
     tensors = [np.asarray(mixed(nu, *_lame_shear())) for nu in poisson]
     while True:  # until there is a mode
-        method, sectors, _, _, error = converged(method, tensors, wanted, accuracy, say)
+        method, sectors, _, _, error = converged(method, tensors, wanted, accuracy)
         sectors = [sector for sector in sectors if any(len(value) for value, _ in sector.found)]
         if sectors:
             break

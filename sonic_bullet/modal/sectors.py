@@ -5,7 +5,7 @@ Lengths by the body's diagonal L, density one: λ = λ' C/(ρL²) for stiffness 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -81,7 +81,7 @@ class ModalMethod(Protocol):
         """Whether λ carries elements' errors."""
         ...
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6). Raises ModalError, MeshError."""
         ...
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sonic_bullet.machine.progress import progress_to, report_progress
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.model import diagonal_m
@@ -138,7 +139,6 @@ def tensor_family(
 
     poisson: about that of the anchors. fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
     """
-    say = progress or (lambda _: None)
     length = diagonal_m((shape,))
     count = min(count, SECTORS.most_modes)
     clamp = np.array(fixed, float).reshape(-1, 4)
@@ -162,9 +162,10 @@ def tensor_family(
         return _joined(
             a["part"], a["ends"], a["skin"], a["vertex"], a["face"], (length, float(volume), count, bool(meshed)), note
         )
-    made = _of_box(shape, length, count, poisson, say) if edge_m is None and not len(clamp) else None
-    if made is None:
-        made = _of_elements(shape, length, count, poisson, clamp, edge_m, say)
+    with progress_to(progress):
+        made = _of_box(shape, length, count, poisson) if edge_m is None and not len(clamp) else None
+        if made is None:
+            made = _of_elements(shape, length, count, poisson, clamp, edge_m)
     body = made.body
     numbers = np.array([body.volume_m3, body.meshed])
     store.save(
@@ -206,7 +207,7 @@ def _spanning(vector: Array, gram: Array) -> Array:
     return np.asarray(vector @ (turn[:, good] / np.sqrt(value[good])))
 
 
-def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callable[[str], None]) -> TensorFamily | None:
+def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFamily | None:
     """Build the family of a free box along the axes, without elements.
 
     None where the shape is no such box, or takes too many unknowns.
@@ -230,7 +231,9 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float, say: Callab
     terms = (int(x), int(y), int(z))
     if polynomials.unknowns(terms) > polynomials.MOST_UNKNOWNS:
         return None
-    say(f"solving {8 * polynomials.unknowns(terms)} unknowns of a box for {len(TENSOR_MODES.anchors)} tensors")
+    report_progress(
+        f"solving {8 * polynomials.unknowns(terms)} unknowns of a box for {len(TENSOR_MODES.anchors)} tensors"
+    )
     shell = structured.box(box.size_m, polynomials.skin_cells(size, wave))
     skin = surface(shell)
     point = shell.node_m[skin.node] / length
@@ -295,13 +298,12 @@ def _of_elements(
     poisson: float,
     clamp: Array,
     edge_m: float | None,
-    say: Callable[[str], None],
 ) -> TensorFamily:
     from sonic_bullet.modal import eigen, fem
     from sonic_bullet.modal.meshing.shape_meshes import fill
     from sonic_bullet.modal.meshing.solid import Solid
 
-    body = fill((shape,), edge_m, None, say)
+    body = fill((shape,), edge_m, None)
     unit = Solid(body.solid.node_m / length, body.solid.tet, body.solid.affine)
     corner = unit.node_m[body.skin.node][body.skin.face]
     area = float(np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2)
@@ -313,7 +315,7 @@ def _of_elements(
     rigid = 6 - (
         int(np.linalg.matrix_rank(fem.rigid_modes(unit.node_m)[np.repeat(held, 3)], tol=1e-9)) if held.any() else 0
     )
-    say(f"assembling {len(free)} unknowns for {len(ORTHOTROPIC)} constants")
+    report_progress(f"assembling {len(free)} unknowns for {len(ORTHOTROPIC)} constants")
     stiff: list[Any] = []
     mass: Any = None
     for tensor in unit_tensors():
@@ -325,7 +327,7 @@ def _of_elements(
     vectors = []
     wanted = min(int(TENSOR_MODES.spare * count), most)
     for number, anchor in enumerate([TENSOR_MODES.anchors[i] for i in TENSOR_MODES.fewer]):
-        say(f"tensor {number + 1} of {len(TENSOR_MODES.fewer)}")
+        report_progress(f"tensor {number + 1} of {len(TENSOR_MODES.fewer)}")
         whole = sum(c * matrix for c, matrix in zip(constants_of(anchored(*anchor, poisson)), stiff, strict=True))
         modes = eigen.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
         vectors.append(modes.vector)

@@ -28,10 +28,10 @@ def sound(gain: float) -> KeptSound:
 
 def made(place: Path) -> Path:
     a, b = (Side(HOSTILE + ".py", sound(gain), SR) for gain in (1.0, 0.7))
-    found = compared(a, b, lambda text: None)
+    found = compared(a, b)
     cause = Difference(HOSTILE, "mass", 1.0, 2.0, f"{HOSTILE}: mass 1 → 2 kg (+100 %)", True)
     found = replace(found, differences=(cause,), effects=(*found.effects, Consequence("level", HOSTILE)), exact=True)
-    write_page(str(place), [page_entry(found), page_entry(compared(a, a, lambda text: None))])
+    write_page(str(place), [page_entry(found), page_entry(compared(a, a))])
     return place
 
 

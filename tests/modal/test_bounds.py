@@ -76,7 +76,7 @@ def elements(body: Shape, material: str) -> Elements:
     of = _unit_of((body,), sb.load_material(material), ModalOptions(20_000.0, None, (), None, 0.01), None)
     place = (None, of.solid)
     wanted = Wanted(of.limit, 200)
-    return filled((body,), of.length_m, of.stiffness, wanted, of.clamp, (None, None), place, lambda text: None)
+    return filled((body,), of.length_m, of.stiffness, wanted, of.clamp, (None, None), place)
 
 
 @cache
@@ -109,7 +109,7 @@ def test_walls_that_nobody_gave_are_as_thick_as_a_lattice_needs() -> None:
 @pytest.mark.slow
 def test_walls_that_somebody_gave_are_never_made_thicker() -> None:
     with pytest.raises(TooThinError, match="give thicker walls"):
-        fill((crossing(),), None, 0.001, lambda text: None)
+        fill((crossing(),), None, 0.001)
 
 
 @pytest.mark.parametrize("gap_m", [0.0, 1e-5, 1e-4])

@@ -8,12 +8,12 @@ one that is not closed, or that Netgen still refuses: it passes through itself  
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from sonic_bullet import geometry
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.meshing import named_shapes, prisms
 from sonic_bullet.modal.meshing.on_surface import fitted
 from sonic_bullet.modal.meshing.sizes import chunkiness, curved_sizes, dof_budget, edge_within_m
@@ -76,7 +76,7 @@ def by_rule(skin: Skin, edge_m: float | None) -> Solid | None:
     return Solid(prism.node_m, prism.tet, note=prism.note + skin.note) if prism is not None else None
 
 
-def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, filler: Filler = "any") -> Solid:
+def filled(skin: Skin, edge_m: float | None, *, filler: Filler = "any") -> Solid:
     """Fill any prepared surface.
 
     edge_m: by default from a budget of unknowns. Raises MeshError.
@@ -91,18 +91,18 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
     tets = dof_budget(thickness, diagonal) / dof_per_tet
     edge = edge_m or edge_within_m(volume, thickness, tets)
     if filler == "lattice":
-        return _of_lattice(skin, edge, edge, say, "as before")
+        return _of_lattice(skin, edge, edge, "as before")
     of_lattice = edge_m or min((LATTICE.volume * volume / tets) ** (1 / 3), LATTICE.wall * thickness)
     finest = lattice_least * thickness
     if not geometry.is_closed(skin.face):
-        return _of_lattice(skin, of_lattice, finest, say, "its surface is open")
+        return _of_lattice(skin, of_lattice, finest, "its surface is open")
     whole, simple = skin, simplified(skin, FILLING.simpler * edge)
     detailed = filler == "simple" or has_detail(whole) or _slivers(whole, edge)
     attempts = [] if detailed else [(whole, edge)]
     refused: MeshError | None = None
     for tried, size in [*attempts, (simple, edge), (simple, FILLING.finer * edge)]:
         try:
-            return _by_netgen(skin, tried, size, say)
+            return _by_netgen(skin, tried, size)
         except EndlessError:
             raise
         except TooLargeError as error:
@@ -113,7 +113,7 @@ def filled(skin: Skin, edge_m: float | None, say: Callable[[str], None], *, fill
     assert refused is not None
     if filler != "any":
         raise refused
-    return _of_lattice(skin, of_lattice, finest, say, refused.what)
+    return _of_lattice(skin, of_lattice, finest, refused.what)
 
 
 def simplified(skin: Skin, tolerance_m: float) -> Skin:
@@ -148,8 +148,8 @@ def _slivers(skin: Skin, edge_m: float) -> bool:
     return bool(height.min() < FILLING.sliver * edge_m)
 
 
-def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None]) -> Solid:
-    say(f"filling {len(tried.face)} triangles with tetrahedra of {edge_m:.3g} m")
+def _by_netgen(skin: Skin, tried: Skin, edge_m: float) -> Solid:
+    report_progress(f"filling {len(tried.face)} triangles with tetrahedra of {edge_m:.3g} m")
     corner, tet = tetrahedra(tried.vertex_m, tried.face, edge_m, *curved_sizes(tried.vertex_m, tried.face, edge_m))
     _check_filled(skin, corner, tet)
     tet, said = _largest(corner, tet)
@@ -157,7 +157,7 @@ def _by_netgen(skin: Skin, tried: Skin, edge_m: float, say: Callable[[str], None
     return fitted(quadratic(corner, tet, note=note), skin.vertex_m, skin.face)
 
 
-def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str], None], why: str) -> Solid:
+def _of_lattice(skin: Skin, edge_m: float, finest_m: float, why: str) -> Solid:
     """Fill by a lattice, its edge reduced from edge_m until it holds the walls, down to finest_m or `LATTICE.tets`."""
     filled_m3 = LATTICE.more * LATTICE.volume * abs(geometry.volume_m3(skin.vertex_m, skin.face))
     edge, least = (
@@ -165,7 +165,7 @@ def _of_lattice(skin: Skin, edge_m: float, finest_m: float, say: Callable[[str],
         max(finest_m, (filled_m3 / LATTICE.tets) ** (1 / 3)),
     )
     while True:
-        say(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
+        report_progress(f"filling {len(skin.face)} triangles with a lattice of {edge:.3g} m: {why}")
         try:
             corner, tet = stuffed(skin.vertex_m, skin.face, edge)
             _check_filled(skin, corner, tet)

@@ -6,7 +6,6 @@ a mesh, or several shapes as one solid -> their surfaces together (surfaces.py) 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +49,6 @@ def fill(
     shapes: tuple[Shape, ...],
     edge_m: float | None,
     thickness_m: float | None,
-    say: Callable[[str], None],
     *,
     filler: Filler = "any",
 ) -> Filled:
@@ -68,14 +66,14 @@ def fill(
     else:
         skin_given = prepared(*soup(shapes), thickness_m)
         try:
-            made = filled(_united(skin_given), edge_m, say, filler=filler)
+            made = filled(_united(skin_given), edge_m, filler=filler)
         except TooThinError:
             if not skin_given.guessed or len(skin_given.face) > FILLING.whole_faces:
                 raise
             wall_m = thick_enough_m(skin_given)
             skin_given = prepared(*soup(shapes), wall_m)
             first = min(edge_m or np.inf, LATTICE.wall * wall_m)
-            made = filled(_united(skin_given), edge_m if filler == "lattice" else first, say, filler="lattice")
+            made = filled(_united(skin_given), edge_m if filler == "lattice" else first, filler="lattice")
         vertex, face = skin_given.vertex_m, skin_given.face
     order = dissection(made.node_m, made.tet)
     place = np.empty(len(order), np.int64)

@@ -8,6 +8,7 @@ from itertools import count
 
 import numpy as np
 
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import eigen, polynomials
 from sonic_bullet.modal.revolution import facets, rings, skin
 from sonic_bullet.modal.revolution.rings import Revolved
@@ -56,10 +57,10 @@ class Fourier:
         area = np.pi * (outline + after)[:, 0] * np.linalg.norm(after - outline, axis=1)
         return float(2 * self.volume / area.sum())
 
-    def sectors(self, tensors: Sequence[Array], wanted: Wanted, say: Callable[[str], None]) -> list[Sector]:
+    def sectors(self, tensors: Sequence[Array], wanted: Wanted) -> list[Sector]:
         """Solve for the modes wanted of each tensor (6, 6), a sector a wave number. Raises ModalError."""
         higher = 4.0  # factor on λ where the last try held too few modes
-        say(f"solving {3 * self.section.nodes} unknowns of a section for each wave around")
+        report_progress(f"solving {3 * self.section.nodes} unknowns of a section for each wave around")
         problems = series(self.section, list(tensors))
         high = self.high
         while True:
