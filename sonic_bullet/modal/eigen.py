@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.sparse.factor import factorise
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
@@ -62,7 +63,7 @@ def solve(
     rigid: int,
     enough: Callable[[Array], bool],
     most: int,
-    say: Callable[[str], None] | None = None,
+    told: bool = False,
 ) -> Modes:
     """Find the lowest elastic modes until ``enough(eigenvalues)``, at most ``most``; scipy sparse matrices (n, n).
 
@@ -70,6 +71,7 @@ def solve(
     ----------
     shift : σ < 0 in 1/s², about as large as the first elastic eigenvalue
     rigid : number of rigid modes that the body has
+    told : whether the number of modes found is reported as progress
 
     Raises
     ------
@@ -106,8 +108,8 @@ def solve(
         converged = int(np.argmax(np.append(residual > tolerance * np.abs(theta), True)))
         value = shift + 1 / theta[:converged]
         elastic = value[rigid:]
-        if say:
-            say(f"{format_count(max(0, len(elastic)), 'mode')} found")
+        if told:
+            report_progress(f"{format_count(max(0, len(elastic)), 'mode')} found")
         if len(elastic) and (len(elastic) >= most or enough(elastic) or used >= size - width):
             return _checked(value[: rigid + most], basis[:, :used] @ ritz[:, : min(converged, rigid + most)], rigid)
     raise ModalError(f"only {max(0, converged - rigid)} of {most} modes converged", "give a smaller count or to_hz")

@@ -229,11 +229,10 @@ def _of_box(shape: Shape, length: float, count: int, poisson: float) -> TensorFa
     wave = shorter * min(polynomials.wave_number_of(count, size), float(bulk))
     x, y, z = np.ceil(wave * size / 2 + 3 + 2 * np.minimum(1, wave * size / 8)).astype(int)
     terms = (int(x), int(y), int(z))
-    if polynomials.unknowns(terms) > polynomials.MOST_UNKNOWNS:
+    unknowns = polynomials.unknowns(terms)
+    if unknowns > polynomials.MOST_UNKNOWNS:
         return None
-    report_progress(
-        f"solving {8 * polynomials.unknowns(terms)} unknowns of a box for {len(TENSOR_MODES.anchors)} tensors"
-    )
+    report_progress(f"solving {8 * unknowns} unknowns of a box for {len(TENSOR_MODES.anchors)} tensors")
     shell = structured.box(box.size_m, polynomials.skin_cells(size, wave))
     skin = surface(shell)
     point = shell.node_m[skin.node] / length
