@@ -33,7 +33,7 @@ COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 LONGEST = 300  # characters of a line
 
 _SHOWN: list[Say] = []
-_HEARD: ContextVar[Say | None] = ContextVar("heard", default=None)
+_LISTENER: ContextVar[Say | None] = ContextVar("listener", default=None)
 
 
 @dataclass(slots=True)
@@ -143,7 +143,7 @@ def report_progress(text: str) -> None:
 
 def progress_listener() -> Say:
     """Return whoever listens, to be handed to code that takes a function of its own; without one, a deaf one."""
-    return _HEARD.get() or (lambda text: None)
+    return _LISTENER.get() or (lambda text: None)
 
 
 @contextmanager
@@ -152,11 +152,11 @@ def progress_to(say: Say | None) -> Iterator[None]:
     if say is None:
         yield
         return
-    before = _HEARD.set(say)
+    before = _LISTENER.set(say)
     try:
         yield
     finally:
-        _HEARD.reset(before)
+        _LISTENER.reset(before)
 
 
 def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made]], Callable[P, Made]]:

@@ -63,7 +63,7 @@ def solve(
     rigid: int,
     enough: Callable[[Array], bool],
     most: int,
-    told: bool = False,
+    report: bool = False,
 ) -> Modes:
     """Find the lowest elastic modes until ``enough(eigenvalues)``, at most ``most``; scipy sparse matrices (n, n).
 
@@ -71,7 +71,7 @@ def solve(
     ----------
     shift : σ < 0 in 1/s², about as large as the first elastic eigenvalue
     rigid : number of rigid modes that the body has
-    told : whether the number of modes found is reported as progress
+    report : whether the number of modes found is reported as progress
 
     Raises
     ------
@@ -108,7 +108,7 @@ def solve(
         converged = int(np.argmax(np.append(residual > tolerance * np.abs(theta), True)))
         value = shift + 1 / theta[:converged]
         elastic = value[rigid:]
-        if told:
+        if report:
             report_progress(f"{format_count(max(0, len(elastic)), 'mode')} found")
         if len(elastic) and (len(elastic) >= most or enough(elastic) or used >= size - width):
             return _checked(value[: rigid + most], basis[:, :used] @ ritz[:, : min(converged, rigid + most)], rigid)

@@ -171,7 +171,7 @@ class Elements:
             if held.any():
                 k_matrix, mass = k_matrix[free][:, free], mass[free][:, free]
             modes = eigen.solve(
-                k_matrix, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > bound), most=most, told=True
+                k_matrix, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > bound), most=most, report=True
             )
             keep = modes.lambda_per_s2 <= bound
             self.known[np.asarray(tensor).tobytes()] = modes.lambda_per_s2
