@@ -27,15 +27,7 @@ import click
 from sonic_bullet.cli.cache_command import cache
 from sonic_bullet.cli.compare_commands import baseline, compare
 from sonic_bullet.cli.console import run_and_exit
-from sonic_bullet.cli.examples import (
-    CASE_EPILOG,
-    DIAGNOSE_EPILOG,
-    FEATURES_EPILOG,
-    FIT_EPILOG,
-    GROUP_EPILOG,
-    MODES_EPILOG,
-    RESIDUAL_EPILOG,
-)
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.parameters import (
     ManyOptions,
     Numbers,
@@ -56,7 +48,9 @@ from sonic_bullet.cli.soundtrack.score_command import score
 DEFAULT_MODES_MATERIAL = "steel"
 
 
-@click.group(epilog=GROUP_EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    epilog=EXAMPLES["group"], context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
+)
 @click.version_option(package_name="sonic_bullet", prog_name="sonic-bullet")
 def cli() -> None:
     """PyBullet scenes that sound: impacts, rolling and sliding from physics alone, in pascals."""
@@ -73,7 +67,7 @@ cli.add_command(bake)
 cli.add_command(dataset)
 
 
-@cli.command(epilog=MODES_EPILOG)
+@cli.command(epilog=EXAMPLES["modes"])
 @click.argument("mesh", metavar="MESH")
 @click.option(
     "--material",
@@ -163,7 +157,7 @@ def doctor(scene: str, seconds: float, json_to: str | None) -> None:
     run_doctor(scene, seconds, json_to)
 
 
-@cli.command(epilog=FEATURES_EPILOG)
+@cli.command(epilog=EXAMPLES["features"])
 @click.argument("recording")
 @click.option(
     "--onset", "onset_s", type=click.FloatRange(0), metavar="S", help="When the impact starts. [default: found]"
@@ -182,7 +176,7 @@ def features(**options: Any) -> None:
     run_features(**options)
 
 
-@cli.command(epilog=FIT_EPILOG)
+@cli.command(epilog=EXAMPLES["fit"])
 @click.argument("sources", nargs=-1, required=True, metavar="RECORDING|CASE_DIR...")
 @click.option(
     "-o",
@@ -212,7 +206,7 @@ def fit(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> None:
     run_one_or_many("fit", sources, many, **options)
 
 
-@cli.command(epilog=RESIDUAL_EPILOG)
+@cli.command(epilog=EXAMPLES["residual"])
 @click.argument("source", metavar="RECORDING|CASE_DIR")
 @click.option(
     "-o",
@@ -235,7 +229,7 @@ def residual(**options: Any) -> None:
     run_residual(**options)
 
 
-@cli.command(epilog=DIAGNOSE_EPILOG)
+@cli.command(epilog=EXAMPLES["diagnose"])
 @click.argument("sources", nargs=-1, required=True, metavar="CASE_DIR...")
 @click.option(
     "-o",
@@ -276,12 +270,12 @@ def diagnose(sources: tuple[str, ...], many: ManyOptions, **options: Any) -> Non
     run_one_or_many("diagnose", sources, many, **options)
 
 
-@cli.group(epilog=CASE_EPILOG)
+@cli.group(epilog=EXAMPLES["case"])
 def case() -> None:
     """Make and check a case: a folder of recorded strikes with a case.json that describes them."""
 
 
-@case.command("new", epilog=CASE_EPILOG)
+@case.command("new", epilog=EXAMPLES["case"])
 @click.argument("folder")
 @click.argument("more", nargs=-1, metavar="[RECORDING]...")
 @click.option(

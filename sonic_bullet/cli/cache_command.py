@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sonic_bullet.cli.examples import CACHE_EPILOG
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.parameters import json_option
 from sonic_bullet.records.counts import format_count
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sonic_bullet.storage.cache import KeptFile
 
 
-@click.command(epilog=CACHE_EPILOG)
+@click.command(epilog=EXAMPLES["cache"])
 @click.option("--clear", is_flag=True, help="Remove all of it.")
 @click.option(
     "--limit",

@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
 from sonic_bullet.machine.progress import progress_listener, progress_to
@@ -22,13 +23,8 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 
-COMPARE_EPILOG = """\b
-Examples:
-  sonic-bullet compare old/bar.py new/bar.py --report bar.html
-  sonic-bullet compare scenes --ref main --json differences.json"""
 
-
-@click.command(epilog=COMPARE_EPILOG)
+@click.command(epilog=EXAMPLES["compare"])
 @click.argument("a", metavar="A")
 @click.argument("b", metavar="[B]", required=False)
 @click.option("--ref", metavar="REV", help="Compare A as it was at this git revision with A as it is now.")
@@ -224,13 +220,7 @@ def _exit(found: list[Any]) -> None:
         raise click.exceptions.Exit(1)
 
 
-BASELINE_EPILOG = """\b
-Example:
-  sonic-bullet baseline scenes/bar.py --reason "new cup"
-"""
-
-
-@click.command(epilog=BASELINE_EPILOG)
+@click.command(epilog=EXAMPLES["baseline"])
 @click.argument("scenes", metavar="SCENE.py...", nargs=-1, required=True)
 @click.option("-o", "--output", "folder", metavar="DIR", help="Where to. [default: sonic_baselines beside each scene]")
 @click.option("--reason", default="", metavar="WHY", help="Why it is to sound so, for whoever reads the file.")

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import click
 
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.parameters import cores, json_option
 
-DATASET_EPILOG = """\b
-Examples:
-  sonic-bullet dataset impacts -o out --count 200               (a ready recipe; no code)
-  sonic-bullet dataset my_recipe.py -o out --count 5000 --seed 7 --workers 8
-The same command again makes what is missing. Exit 1: some samples could not be made; failures.jsonl has the reasons."""
 
-
-@click.command(epilog=DATASET_EPILOG)
+@click.command(epilog=EXAMPLES["dataset"])
 @click.argument("recipe", metavar="RECIPE.py|impacts")
 @click.option("-o", "--output", "folder", required=True, metavar="DIR", help="Folder of the data set.")
 @click.option("--count", type=click.IntRange(1), required=True, metavar="N", help="How many samples.")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import json_option, scene_options
 from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, check_scene_file, is_log
@@ -23,18 +24,8 @@ if TYPE_CHECKING:
     from sonic_bullet.live import Playback, PlaybackReport
     from sonic_bullet.records import Sensor
 
-EPILOG = """\b
-Examples:
-  sonic-bullet play scenes/tabletop.py
-  sonic-bullet play my_sim.py --material wood --full-scale 2
-  sonic-bullet play drop.npz --device "USB Audio"
-  sonic-bullet play drop.npz --head kemar.sofa --facing 0,0,0
-  sonic-bullet play scenes/bar.py --device null      (no sound card: the same, unheard)
-The physics runs as fast as the card takes its sound. The last line says what was played, how late each step sounds,
-and how often there was nothing to play: then the scene is too much for this machine in real time; render it."""
 
-
-@click.command(epilog=EPILOG)
+@click.command(epilog=EXAMPLES["play"])
 @click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
 @click.option(
     "--device", metavar="D", help="Name or number of a sound card; 'null' for none. [default: the system's own]"

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from sonic_bullet.cli.examples import RENDER_EPILOG
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.parameters import json_option, scene_options
 from sonic_bullet.cli.scenes.room_options import room_options
 from sonic_bullet.cli.scenes.space_options import space_options
@@ -17,7 +17,7 @@ from sonic_bullet.cli.soundtrack.soundtrack_outputs import soundtrack_options
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 
 
-@click.command(epilog=RENDER_EPILOG)
+@click.command(epilog=EXAMPLES["render"])
 @click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
 @click.option(
     "-o",

@@ -6,11 +6,11 @@ from typing import Any
 
 import click
 
-from sonic_bullet.cli.examples import BAKE_EPILOG
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.parameters import Numbers, json_option
 
 
-@click.command(epilog=BAKE_EPILOG)
+@click.command(epilog=EXAMPLES["bake"])
 @click.argument("source", metavar="MESH|SCENE.py|LOG.npz")
 @click.option(
     "-o",

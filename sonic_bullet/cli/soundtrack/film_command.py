@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.output import clean_stdout, places, print_report, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option, scene_options
 from sonic_bullet.cli.scenes.room_options import OPTIONS as ROOM_OPTIONS
@@ -23,13 +24,6 @@ from sonic_bullet.soundtrack.film_codecs import CODECS, USUAL_CODECS
 if TYPE_CHECKING:
     from sonic_bullet.listener.pictures import Standing
     from sonic_bullet.soundtrack.film import FilmReport
-
-EPILOG = """\b
-Examples:
-  sonic-bullet film scenes/tabletop.py -o tabletop.mp4 --fps 60
-  sonic-bullet film scenes/rolling.py -o why.mov --overlay --follow ball
-  sonic-bullet film drop.npz -o drop.mkv --camera 0.5,-1,0.8 --look-at 0,0,0.1 --size 1920x1080
-Frame rates are fractions: 24, 25, 30000/1001. Needs PyAV: pip install 'sonic_bullet[film]'"""
 
 
 class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic since click 8.3
@@ -47,7 +41,7 @@ class Size(click.ParamType):  # type: ignore[type-arg,unused-ignore]  # generic 
         return int(width), int(height)
 
 
-@click.command(epilog=EPILOG)
+@click.command(epilog=EXAMPLES["film"])
 @click.argument("scene", metavar="SCENE.py|.gltf|LOG.npz")
 @click.option("-o", "--output", required=True, metavar="NAME.mp4", help="Film: .mp4 .mov .mkv")
 @click.option("--seconds", type=float, metavar="S", help="How long. [default: the scene's own, else 4; all of a log]")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.output import clean_stdout, places, progress_bar, quiet_stderr, write_json
 from sonic_bullet.cli.parameters import Numbers, json_option
 from sonic_bullet.cli.scenes.room_options import OPTIONS as ROOM_OPTIONS
@@ -22,18 +23,8 @@ if TYPE_CHECKING:
     from sonic_bullet.cli.scenes.scene_runs import Replay
     from sonic_bullet.scene import RenderResult
 
-EPILOG = """\b
-Examples:
-  sonic-bullet score take1.glb -o take1.wav --materials table.json
-  sonic-bullet score keys.npz -o keys.wav --contacts heard.npz
-  sonic-bullet render heard.npz -o again.wav --stems stems --events what.csv
-  sonic-bullet score shot.glb -o shot.wav --scale 0.01 --fps 24
-  sonic-bullet score shot.glb -o shot.wav --ambisonics 1 --room 6x4x3
-A contact log that it writes goes to render and film as any other. docs/how-to/score-an-animation.md has a table of
-materials and an export script for Blender."""
 
-
-@click.command(epilog=EPILOG)
+@click.command(epilog=EXAMPLES["score"])
 @click.argument("animation", metavar="ANIMATION|SCENE.py")
 @click.option("-o", "--output", required=True, metavar="NAME.wav", help="Sound file, as render has them.")
 @click.option("--materials", "table", metavar="TABLE.json", help="Who is made of what, by name patterns.")
