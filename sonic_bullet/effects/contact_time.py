@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from sonic_bullet.effects.common.pulses import PULSES, magnitude
+from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import Array
 
@@ -42,8 +42,6 @@ class _RollOff(NamedTuple):
 
 
 ROLL_OFF = _RollOff()
-
-ONSET_DELAYS_S, ONSET_FINER_S = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,8 @@ class ContactTime:
             return None
         reference = float(np.exp(np.log(level).mean()))
         grid = np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
-        pulses: tuple[str, ...] = PULSES
+        known_pulses = ("half-sine", "hertz", "raised-cosine")
+        pulses: tuple[str, ...] = known_pulses
         # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
         if isinstance(evidence.known, cls):
             grid, pulses = (
@@ -212,8 +211,9 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     def at(delay_s: float) -> float:
         return float(9 * np.log1p((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9).sum())
 
-    middle = min(ONSET_DELAYS_S, key=at)
-    return min(at(t) for t in middle + ONSET_FINER_S)
+    onset_delays_s, onset_finer_s = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
+    middle = min(onset_delays_s, key=at)
+    return min(at(t) for t in middle + onset_finer_s)
 
 
 def _golden(f: Any, low: float, high: float) -> float:

@@ -73,12 +73,10 @@ def effect_of(data: dict[str, Any]) -> Effect:
     return made
 
 
-PLAYED = (Stage.MATERIAL, Stage.MODES, Stage.BANK)
-"""Stages at which a material's effects act, in this order: the others belong to a strike or to a recording."""
-
-
 def check_effects(material: Material) -> None:
     """Raise MaterialError where a material has an effect that no scene plays, or something else in its place."""
+    # stages at which a material's effects act, in this order: the others belong to a strike or to a recording
+    played_stages = (Stage.MATERIAL, Stage.MODES, Stage.BANK)
     for number, effect in enumerate(material.effects):
         where = f"material '{material.name}': effects[{number}]"
         remedy = "give effects of sonic_bullet.effects"
@@ -88,7 +86,7 @@ def check_effects(material: Material) -> None:
             stage = effect.stage
         except AttributeError:
             raise MaterialError(f"{where} is {shown(effect)}", remedy) from None
-        if stage not in PLAYED:
+        if stage not in played_stages:
             raise MaterialError(
                 f"{where}, {shown(effect)}, belongs to a strike or a recording, not to a body", "leave it out"
             )

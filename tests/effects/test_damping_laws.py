@@ -12,11 +12,12 @@ import pytest
 
 from sonic_bullet import presets
 from sonic_bullet.effects.damping_law import DampingLaw, own_decay_per_s
-from sonic_bullet.effects.damping_law.damping_form import RAYLEIGH_HZ
 from sonic_bullet.records import Body, Shape
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.variation import vary_body
 from tests.cli.test_commands import error_of, run
+
+RAYLEIGH_HZ = (500.0, 8000.0)
 
 BAR = Shape("box", np.array([0.2, 0.05, 0.02]))
 OMEGA = 2 * np.pi * np.geomspace(50, 20_000, 40)

@@ -14,7 +14,7 @@ from sonic_bullet.effects import EFFECTS, Effect, Impact, Ring, Sound, Stage
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.common.pulses import PULSES, spectrum
+from sonic_bullet.effects.common.pulses import spectrum
 from sonic_bullet.effects.common.ringing import sounded
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -29,6 +29,8 @@ from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.records import Material
 from sonic_bullet.records.errors import RecordError
 from tests.made.body import SR, plate, struck, truth
+
+PULSES = ("half-sine", "hertz", "raised-cosine")
 
 SPOT = (0.05, 0.04, 0.0)
 STRONG: dict[type[Effect], tuple[Effect, Effect]] = {  # at work, and without strength

@@ -17,10 +17,12 @@ from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.measurement_chain import MeasurementChain
 from sonic_bullet.effects.protocol import Sound, Stage
-from sonic_bullet.effects.room import RT60, Room, _one, late
+from sonic_bullet.effects.room import Room, _one, late
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.few_cases import parametrize_few
 from tests.made.body import ALPHA, BETA, recorded, truth
+
+RT60 = float(np.log(1e3))
 
 
 def test_the_covariance_of_a_driven_tail() -> None:

@@ -8,7 +8,7 @@ import pytest
 from sonic_bullet.machine.borrowed import borrowed
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.grouping import gather
-from sonic_bullet.path.fractional_delay import AHEAD, KAISER_BETA, TAPS
+from sonic_bullet.path.fractional_delay import AHEAD, TAPS
 from sonic_bullet.path.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
 from sonic_bullet.path.path_places import (
     DONE,
@@ -25,6 +25,8 @@ from sonic_bullet.path.propagation import Path, PathState, append_bodies, empty_
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
 from tests.made.paths import propagate
+
+KAISER_BETA = 9.5
 
 SR = 48_000
 AIR = Air()

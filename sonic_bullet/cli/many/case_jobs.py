@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,11 +114,12 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
     Parameters
     ----------
     command
-        Of `COMMANDS`.
+        Of `commands_of`.
     options
         Of that command; those that name outputs hold names in the case's folder of results.
     """
     files = case.contents()
+    commands_of = {"fit": _fit, "diagnose": _diagnose}
     with TemporaryDirectory(prefix="sonic_bullet_") as place:
         root, out = Path(place, "case", case.name), Path(place, "made")
         for name, content in files.items():
@@ -130,7 +131,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
         try:
             # warnings and reports name files as they are named from here
             with chdir(root.parent), redirect_stdout(said), redirect_stderr(warned), shown_by(_silent):
-                COMMANDS[command](case.name, out, options)
+                commands_of[command](case.name, out, options)
         except click.exceptions.Exit:
             pass  # farther from the recordings than silence: its verdict says so
         except SonicBulletError as error:
@@ -168,6 +169,3 @@ def _inside(out: Path, name: str | None) -> str | None:
 
 def _silent(_: str) -> None:
     """Drop a line of progress: of many cases only their number is told."""
-
-
-COMMANDS: Mapping[str, Callable[[str, Path, Mapping[str, Any]], None]] = {"fit": _fit, "diagnose": _diagnose}

@@ -11,7 +11,7 @@ Exit 0: all done; 1: a case failed, or is farther from its recordings than silen
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -151,10 +151,14 @@ def _write_lists(command: str, place: Path, cases: Iterable[CaseFolder], failed:
 def _rows(command: str, place: Path, cases: Iterable[CaseFolder]) -> list[dict[str, Any]]:
     """Return a row for each case that has its result."""
     rows = []
+    values_of = {
+        "fit": _fit_values,
+        "diagnose": _diagnose_values,
+    }
     for case in cases:
         if (place / case.name / DONE_FILE).is_file():
             found = msgspec.json.decode((place / case.name / CASE_FILES.values).read_bytes())
-            rows.append({"case": case.name, "verdict": found["verdict"], **VALUES_OF[command](found)})
+            rows.append({"case": case.name, "verdict": found["verdict"], **values_of[command](found)})
     return rows
 
 
@@ -179,10 +183,6 @@ def _diagnose_values(found: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-VALUES_OF: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
-    "fit": _fit_values,
-    "diagnose": _diagnose_values,
-}
 MANY_COLUMNS = {
     "fit": (
         "case", "gamma_m2_s2", "gamma_sd", "poisson_ratio", "alpha_per_s", "beta_s", "modes", "distance_db", "verdict"

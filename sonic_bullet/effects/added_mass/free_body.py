@@ -20,8 +20,6 @@ import numpy as np
 from sonic_bullet.geometry import inertia, volume_m3
 from sonic_bullet.records import Array, ModalModel
 
-OPEN = 0.1  # of the volume: a surface that encloses another is no body's
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeBody:
@@ -47,7 +45,8 @@ class FreeBody:
         still = 1e-5  # of the largest motion on the surface: a vertex that moves less, in every mode, is held
         if not len(x.face) or not x.mode_count or x.mass_kg <= 0 or x.volume_m3 <= 0:
             return None
-        if abs(volume_m3(x.vertex_m, x.face) / x.volume_m3 - 1) > OPEN:
+        open_share = 0.1  # of the volume: a surface that encloses another is no body's
+        if abs(volume_m3(x.vertex_m, x.face) / x.volume_m3 - 1) > open_share:
             return None
         moves = np.abs(x.shape[np.unique(x.face)]).max(axis=(1, 2))
         if moves.min() < still * moves.max():

@@ -17,9 +17,6 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
 AXES_PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
-# relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they would
-# be two others
-ONE = 1e-4
 ANGLES = np.arange(18) * np.pi / 36  # a quarter turn changes the degenerate modes about, and no more
 
 
@@ -52,7 +49,10 @@ def degenerate(h: ObjectEvidence, k: int) -> bool:
 def split_apart(h: ObjectEvidence, k: int) -> bool:
     """Decide whether the modes of a line have different frequencies in the current model."""
     freq = h.model.freq_hz[h.mode[k]] if h.model is not None else np.zeros(0)
-    return bool(len(freq) > 1 and freq.max() / freq.min() - 1 > ONE)
+    # relative: degenerate modes that corrections have not brought nearer than this are played as two, and turned they
+    # would be two others
+    apart_share = 1e-4
+    return bool(len(freq) > 1 and freq.max() / freq.min() - 1 > apart_share)
 
 
 def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array, Array]:

@@ -16,8 +16,6 @@ import numpy as np
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
 
-STEADY_HUM = 1.6  # loudest over softest recording
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hum:
@@ -115,8 +113,9 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     parts = np.stack([np.hanning(half) * tail[:, i * half : (i + 1) * half] for i in (0, 1)])
     turn = np.exp(-2j * np.pi * exact * np.outer(np.arange(half) / sr, multiple))
     fades = np.diff(np.log(np.abs(parts @ turn) + 1e-300), axis=0)[0].mean(axis=0)  # (i,)
+    steady_hum = 1.6  # loudest over softest recording
     steady = (
-        (size.max(axis=0) < STEADY_HUM * size.min(axis=0))
+        (size.max(axis=0) < steady_hum * size.min(axis=0))
         & (np.abs(wave) ** 2 > above * least.T).all(axis=0)
         & (np.abs(fades) < still)
     )

@@ -14,8 +14,6 @@ import numpy as np
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 
-WIDTH = 0.004
-
 
 def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
     """Return the strongest lines of an object, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
@@ -46,7 +44,7 @@ def agreed(
     *,
     shift: float = 0.0,
     turns: int = 2,
-    width: float = WIDTH,
+    width: float = 0.004,
     strict: float = 1.0,
 ) -> tuple[float, Array, Array, float]:
     """Pair lines and modes at the least price.

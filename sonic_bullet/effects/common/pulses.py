@@ -16,8 +16,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-PULSES = ("half-sine", "hertz", "raised-cosine")
-
 
 def magnitude(pulse: str, x: Array) -> Array:
     """Compute F̂(f)/F̂(0) about the pulse's centre (real, as pulses are symmetric).
@@ -25,7 +23,7 @@ def magnitude(pulse: str, x: Array) -> Array:
     Parameters
     ----------
     pulse : str
-        One of PULSES, or "impulse".
+        One of "half-sine", "hertz", "raised-cosine", or "impulse".
     x : array
         fτ.
     """
@@ -56,7 +54,7 @@ def spectrum(pulse: str, tau_s: float, freq_hz: Array) -> Array:
     Parameters
     ----------
     pulse : str
-        One of PULSES, or "impulse".
+        One of "half-sine", "hertz", "raised-cosine", or "impulse".
     tau_s : float
         Its duration.
     freq_hz : (f,)

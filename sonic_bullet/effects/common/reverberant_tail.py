@@ -26,9 +26,6 @@ from sonic_bullet.records import Array
 FRAME_S = 0.012
 DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
 LEAST = 4  # frames: in less no tail shows
-DECAYS = np.geomspace(0.5, 600.0, 31)
-TAIL_SHARES = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
-PATTERN = 0.03  # of a line's strongest: what shapes are wrong by
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not identifiable
 # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
 LIKE = 0.7
@@ -92,8 +89,9 @@ def read(
     start, window = _frames(h)
     z, noise = _basebands(h, freq_hz, own, members, start, window)
     time = tuple((start / h.sr).tolist())
-    rows = [[_at(z, noise, time, float(d), float(one)) for d in DECAYS[::every]] for one in delta]
-    return _summed(delta, DECAYS[::every], rows)
+    decays = np.geomspace(0.5, 600.0, 31)
+    rows = [[_at(z, noise, time, float(d), float(one)) for d in decays[::every]] for one in delta]
+    return _summed(delta, decays[::every], rows)
 
 
 def modes(h: ObjectEvidence, delta: Array, lines: Array, *, every: int = 1) -> Read:
@@ -219,12 +217,13 @@ def _basebands(
     spectrum = 2 * np.einsum("snt,tk->ksn", piece, np.exp(-2j * np.pi * np.outer(at, freq)), optimize=True)
     spectrum *= np.exp(-2j * np.pi * freq[:, None] * start / h.sr)[:, None, :]
     mixed, noise = [], []
+    pattern = 0.03  # of a line's strongest: what shapes are wrong by
     for i, mine in enumerate(members):
         other = np.setdiff1d(np.flatnonzero(np.abs(h.all_hz - freq[i]) < 2 / FRAME_S), mine)
         through = np.abs(window @ np.exp(2j * np.pi * np.outer(at, h.all_hz[other] - freq[i])))
         near = h.push[:, other] * through
         size = float(np.linalg.norm(own[:, i]))
-        spread = near @ near.conj().T + ((PATTERN * size) ** 2 + 1e-300) * np.eye(len(own))
+        spread = near @ near.conj().T + ((pattern * size) ** 2 + 1e-300) * np.eye(len(own))
         row = np.linalg.solve(spread, own[:, i]).conj()
         row = row / (row @ own[:, i]) if size else np.zeros(len(own))
         mixed.append(row @ spectrum[i])
@@ -287,7 +286,8 @@ def _at(z: Array, noise: Array, time: tuple[float, ...], decay: float, delta: fl
     # (n,), (k, n, Δ) real and imaginary side by side
     m, b = turn[:, 0], turn[:, 1:] @ moved.view(float).reshape(len(z), len(at), -1)
     b = b.view(complex)
-    scale = (np.abs(z[:, 0] / mean) ** 2)[:, None] * TAIL_SHARES  # (k, w): |A|² w²
+    tail_shares = np.geomspace(1e-3, 4.0, 9)  # |A|² w² over what the first frame suggests |A|² to be
+    scale = (np.abs(z[:, 0] / mean) ** 2)[:, None] * tail_shares  # (k, w): |A|² w²
     over = 1 / (scale[:, :, None] * value + noise[:, None, None])  # (k, w, n)
     power, size = over @ (b.real**2 + b.imag**2), over @ m**2  # (k, w, Δ), (k, w)
     cross = ((over * m) @ b.view(float)).view(complex)

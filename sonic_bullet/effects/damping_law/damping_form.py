@@ -8,7 +8,7 @@ frequencies of `equal_at_hz` [Chopra, Dynamics of Structures, 4th ed. 2012, eq. 
 
 Between them the loss is smaller (at √(ω₁ω₂) by 2√(ω₁ω₂)/(ω₁+ω₂)), outside larger. Without `equal_at_hz` a loss factor
 is met at every frequency: the law that recordings support, with an `exponent` of frequency and a `floor_s` of T60 where
-they show them (`DampingLaw`). Who knows Rayleigh alone gets the pair that meets the law at `RAYLEIGH_HZ`.
+they show them (`DampingLaw`). Who knows Rayleigh alone gets the pair that meets the law at 500 Hz and 8 kHz.
 """
 
 from __future__ import annotations
@@ -26,10 +26,6 @@ from sonic_bullet.records.errors import MaterialError, RecordError
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
-
-OF_LAW = ("loss_factor", "equal_at_hz", "exponent", "floor_s")
-RAYLEIGH_HZ = (500.0, 8000.0)
-"""Frequencies in Hz at which Rayleigh's pair meets a law that is none, where nobody names others."""
 
 
 class PresetPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
@@ -94,13 +90,16 @@ def rayleigh_pair(damping: Damping, label: str) -> tuple[float, float]:
     Raises MaterialError, with the preset's label, where its damping is none of them.
     """
     numbers = msgspec.structs.asdict(damping)
-    given = {name for name in ("alpha_per_s", "beta_s", *OF_LAW) if numbers[name] is not None}
+    of_law = ("loss_factor", "equal_at_hz", "exponent", "floor_s")
+    given = {name for name in ("alpha_per_s", "beta_s", *of_law) if numbers[name] is not None}
     if given == {"alpha_per_s", "beta_s"}:
         return damping.alpha_per_s or 0.0, damping.beta_s or 0.0
     if given == {"loss_factor", "equal_at_hz"} and damping.equal_at_hz:
         return rayleigh_of_loss_factor(damping.loss_factor or 0.0, *damping.equal_at_hz)
-    for law in law_of(damping) if given <= set(OF_LAW) else ():
-        omega = 2 * np.pi * np.array(RAYLEIGH_HZ)
+    # frequencies in Hz at which Rayleigh's pair meets a law that is none, where nobody names others
+    rayleigh_hz = (500.0, 8000.0)
+    for law in law_of(damping) if given <= set(of_law) else ():
+        omega = 2 * np.pi * np.array(rayleigh_hz)
         decay = law.decay_per_s(omega)
         beta = max(0.0, float(2 * np.diff(decay)[0] / np.diff(omega**2)[0]))
         return max(0.0, float(2 * decay[0] - beta * omega[0] ** 2)), beta

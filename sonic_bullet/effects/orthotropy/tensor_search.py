@@ -23,7 +23,6 @@ import numpy as np
 
 from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, BodyLines, Seen, body_lines_of, paired, seen_by
 from sonic_bullet.effects.orthotropy.tensors import (
-    MILD,
     NAMES,
     RATIOS,
     SYMMETRIES,
@@ -89,8 +88,9 @@ def search(evidence: Evidence) -> tuple[Tensor, Tensor] | None:
     blind = all(
         t.amplitude is None for t in bodies
     )  # without patterns some start or other says more by chance, the likelier the softer it is: modes are denser there
+    mild = (0.16, 0.4, 1.0, 2.5, 6.0)
     sifted = [("cubic", s) for s in _sifted(bodies, cubes(start))] + [
-        ("orthorhombic", s) for s in _sifted(bodies, bricks(start, MILD if blind else RATIOS))
+        ("orthorhombic", s) for s in _sifted(bodies, bricks(start, mild if blind else RATIOS))
     ]
     ends = parallel_map(lambda one: fitted(bodies, *one, start), sifted)
     best = min((e for e in ends if e.symmetry == "orthorhombic"), key=lambda e: e.bic)

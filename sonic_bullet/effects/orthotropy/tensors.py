@@ -18,7 +18,6 @@ from sonic_bullet.records import ORTHOTROPIC, Array
 SYMMETRIES = {"isotropic": 2, "cubic": 3, "hexagonal-x": 5, "hexagonal-y": 5, "hexagonal-z": 5, "orthorhombic": 9}
 NAMES = ("youngs_x", "youngs_y", "youngs_z", "n_yz", "n_xz", "n_xy", "shear_yz", "shear_xz", "shear_xy")
 RATIOS = (0.04, 0.1, 0.25, 0.6, 1.5, 4.0, 10.0)
-MILD = (0.16, 0.4, 1.0, 2.5, 6.0)
 
 
 class _TensorSearch(NamedTuple):

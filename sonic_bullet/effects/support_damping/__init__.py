@@ -23,8 +23,6 @@ from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import SUPPORT_SEARCH, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
 
-LEAST = 0.02  # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
-
 
 @dataclass(frozen=True)
 class SupportDamping(ActsAtPlaces):
@@ -93,7 +91,9 @@ class SupportDamping(ActsAtPlaces):
                 trial, tuned(trial, refined(trial, evidence.known._on(observed.model), SUPPORT_SEARCH.nearer[-2:])[1])
             )
         found = sought(trial)
-        return cls._of(trial, found) if found and _most(trial, found) > LEAST else None
+        # of a decay: dashpots that add less to every one are none, though modes are identified anew with them
+        least = 0.02
+        return cls._of(trial, found) if found and _most(trial, found) > least else None
 
     @classmethod
     def _of(cls, trial: DashpotFit, found: tuple[Dashpot, ...]) -> Self:

@@ -28,9 +28,6 @@ from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting
 from sonic_bullet.records.simulated import Values, finite, with_body_id
 
-FLAT_KINDS = (pybullet.GEOM_BOX, pybullet.GEOM_PLANE)
-"""Shapes whose large faces are looked at where a body is not added: no file need be read for them."""
-
 
 def check_exists(client_id: int, body: int, link: int) -> None:
     """Raise SceneError unless the world holds this link.
@@ -128,7 +125,9 @@ def describe(client_id: int, body: int, link: int, epoch: int) -> Body:
     info = pybullet.getDynamicsInfo(body, link, physicsClientId=client_id)
     mass = checked_mass_kg(info, body, link)
     pieces = collision_pieces(client_id, body, link)
-    flat = [primitive(one, "") for one in pieces if mass == 0 and one.kind in FLAT_KINDS]
+    # shapes whose large faces are looked at where a body is not added: no file need be read for them
+    flat_kinds = (pybullet.GEOM_BOX, pybullet.GEOM_PLANE)
+    flat = [primitive(one, "") for one in pieces if mass == 0 and one.kind in flat_kinds]
     curvature = (
         1 / pieces[0].size[0]
         if len(pieces) == 1 and pieces[0].kind == pybullet.GEOM_SPHERE and pieces[0].size[0] > 0

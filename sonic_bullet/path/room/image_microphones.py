@@ -22,7 +22,6 @@ from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.records import Ambisonics, Array, Binaural, Head, Microphone, ShoeboxRoom
 from sonic_bullet.records.errors import AudioError
 
-EXTRA = "pip install 'sonic_bullet[room]'"
 LEFT_RIGHT = np.diag([1.0, -1.0, 1.0])
 
 
@@ -39,10 +38,11 @@ def find_images(room: ShoeboxRoom, corner_m: Array, centre_m: Array, radius_m: f
 
     Raises AudioError where pyroomacoustics is missing.
     """
+    extra = "pip install 'sonic_bullet[room]'"
     try:
         import pyroomacoustics
     except ImportError:
-        raise AudioError("a room needs pyroomacoustics, which is not installed", EXTRA) from None
+        raise AudioError("a room needs pyroomacoustics, which is not installed", extra) from None
     size, inside = room.size_m, np.asarray(centre_m - corner_m)
     most = int(np.ceil(radius_m / size).sum())
     box = pyroomacoustics.ShoeBox(size, fs=48_000, materials=pyroomacoustics.Material(0.5), max_order=most)

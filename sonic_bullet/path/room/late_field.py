@@ -25,9 +25,6 @@ from sonic_bullet.radiation.far_field import spread_directions
 from sonic_bullet.records import Air, Ambisonics, Array, Binaural, Microphone, ShoeboxRoom
 
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
-WAVES = 32
-"""Plane waves that noise comes as: more than the 16 channels of third order, which they tell apart."""
-LONGEST_NOISE_S = 30.0
 
 
 def reverberation_time_s(room: ShoeboxRoom, air: Air) -> Array:
@@ -63,7 +60,8 @@ def late_filters(
 ) -> Array:
     """Make filters (channels, 4, t) from the four far microphones, times their distance, to channels of receivers."""
     decay_db = 90.0  # how far the noise is followed down: 16 bits hold no more
-    longest_s = min(float(reverberation_time_s(room, air).max()) * decay_db / 60, LONGEST_NOISE_S)
+    longest_noise_s = 30.0
+    longest_s = min(float(reverberation_time_s(room, air).max()) * decay_db / 60, longest_noise_s)
     taps = int(np.ceil(max(longest_s - begin_s, 0.0) * sr))
     made = np.zeros((channels, len(TETRAHEDRON), taps))
     if not taps:
@@ -74,9 +72,10 @@ def late_filters(
     decay, time_s = _decay(room, air), begin_s + np.arange(taps) / sr
     weights = band_weights(frequency_hz, len(decay))
     x, y, z = room.size_m
-    level = np.sqrt(4 * np.pi * air.sound_speed_m_s / (x * y * z) / sr / len(TETRAHEDRON)) * np.sqrt(size / 2 / WAVES)
+    waves = 32  # plane waves that noise comes as: more than the 16 channels of third order, which they tell apart
+    level = np.sqrt(4 * np.pi * air.sound_speed_m_s / (x * y * z) / sr / len(TETRAHEDRON)) * np.sqrt(size / 2 / waves)
     middle = np.mean([one.position_m for one, _ in receivers], axis=0)
-    half = spread_directions(WAVES // 2)[0]
+    half = spread_directions(waves // 2)[0]
     spectrum = np.zeros((len(TETRAHEDRON), channels, len(frequency_hz)), complex)
     for direction in np.concatenate([half, -half]):
         hears = []

@@ -1,8 +1,8 @@
 """A measured room: what follows the direct sound of its impulse response, over that direct sound.
 
-    out = own + h' * own,   h'(t) = w(t) h(t0 + t)/A,   A² = Σ h² from t0 - DIRECT_S to t0 + DIRECT_S
+    out = own + h' * own,   h'(t) = w(t) h(t0 + t)/A,   A² = Σ h² from t0 - 2.5 ms to t0 + 2.5 ms
 
-t0: where the response first comes within 20 dB of its peak; A has the sign of that peak. w: 0 up to DIRECT_S after t0,
+t0: where the response first comes within 20 dB of its peak; A has the sign of that peak. w: 0 up to 2.5 ms after t0,
 a quarter of a cosine later 1 [Zahorik, JASA 112(5), 2002: 2.5 ms part direct from reverberant sound]. The render's own
 direct sound stays as it is, distance and all; no level is chosen. A wall or a floor nearer than 0.4 m is lost, as part
 of the direct sound.
@@ -19,11 +19,6 @@ from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.path.space.ear_filters import ONSET_SHARE, resampled
 from sonic_bullet.records import Array, Microphone, RoomResponse, channels_of
 from sonic_bullet.records.errors import SceneError
-
-DIRECT_S = 2.5e-3
-FADE_S = 0.5e-3
-TENTH = 10
-"""Part of a response, its last, whose mean square is the noise that it was measured in."""
 
 
 def plan_response(room: RoomResponse, log: ContactLog) -> RoomPlan:
@@ -57,11 +52,13 @@ def plan_response(room: RoomResponse, log: ContactLog) -> RoomPlan:
 
 def late_part(response: Array, sr: int) -> Array:
     """Cut the direct sound from a response (n,), over it: (n - t0,), from t0 on."""
-    begin, direct = onset(response), round(DIRECT_S * sr)
+    direct_s = 2.5e-3
+    begin, direct = onset(response), round(direct_s * sr)
     own = response[max(0, begin - direct) : begin + direct]
     level = np.sqrt((own**2).sum()) * np.sign(own[np.argmax(np.abs(own))])
     late = response[begin:] / level
-    ramp = np.sin(np.pi / 2 * np.arange(round(FADE_S * sr)) / (FADE_S * sr)) ** 2
+    fade_s = 0.5e-3
+    ramp = np.sin(np.pi / 2 * np.arange(round(fade_s * sr)) / (fade_s * sr)) ** 2
     late[:direct] = 0.0
     late[direct : direct + len(ramp)] *= ramp[: len(late[direct:])]
     return np.asarray(late)
@@ -79,9 +76,10 @@ def decay_time_s(responses: Sequence[Array] | Array, sr: int) -> list[float]:
     ISO 3382-1:2009, T20; noise: Chu, JASA 63(5), 1978, eq. 4.
     """
     found = []
+    tenth = 10  # part of a response, its last, whose mean square is the noise that it was measured in
     for response in responses:
         square = response[onset(response) :] ** 2
-        noise = square[-max(1, len(square) // TENTH) :].mean()
+        noise = square[-max(1, len(square) // tenth) :].mean()
         left = np.cumsum((square - noise)[::-1])[::-1]
         level = 10 * np.log10(np.maximum(left, 1e-300) / max(float(left[0]), 1e-300))
         first, last = (int(np.argmax(level <= db)) for db in (-5.0, -25.0))

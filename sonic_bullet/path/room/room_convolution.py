@@ -13,9 +13,6 @@ from sonic_bullet.path.room.room_plan import RoomPlan
 from sonic_bullet.records import Array
 from sonic_bullet.storage.spooled_sound import KeptSound, SoundSpool
 
-SHORTEST = 1 << 15
-"""Samples of a transform: shorter ones cost more a sample."""
-
 
 def sum_rows(mixing: Array, channels: Array) -> Array:
     """Sum channels (b·c, n), body by body, to rows (b·r, n) by mixing (r, c); not by BLAS, whose threads cost more."""
@@ -29,7 +26,8 @@ def add_room(plan: RoomPlan, blocks: Iterable[Array]) -> Iterator[Array]:
     from scipy.fft import irfft, next_fast_len, rfft
 
     taps, own = plan.taps, plan.channels
-    size = next_fast_len(max(SHORTEST, 4 * taps), real=True)
+    shortest = 1 << 15  # samples of a transform: shorter ones cost more a sample
+    size = next_fast_len(max(shortest, 4 * taps), real=True)
     early, late = rfft(plan.early, size), rfft(plan.late, size)
     carried = np.zeros((own, taps - 1))
     for piece in in_pieces(blocks, size - taps + 1):

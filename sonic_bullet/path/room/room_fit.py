@@ -1,6 +1,6 @@
 """Where a room lies, and whether all that sounds and hears is in it.
 
-poses of the log, at most `MOMENTS` of them, and hulls of bodies -> box of each body over the run
+poses of the log, at most 1000 of them, and hulls of bodies -> box of each body over the run
     -> no corner given: middle of all boxes and microphones above the middle of the floor, the lowest on it
     -> each box within the walls, or an error that names what is not
 """
@@ -16,9 +16,6 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.records import Array, Microphone, ShoeboxRoom
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import with_body_id
-
-MOMENTS = 1000
-"""At most so many steps are looked at: of 4 s at 240 Hz every one."""
 
 
 class RoomPlace(NamedTuple):
@@ -70,7 +67,8 @@ def body_boxes(log: ContactLog) -> dict[int, Array]:
 
     hulls = {i: _hull(body.model.vertex_m) for i, body in enumerate(log.bodies) if body.model is not None}
     boxes: dict[int, Array] = {}
-    every = max(1, len(log.steps) // MOMENTS)
+    moments = 1000  # at most so many steps are looked at: of 4 s at 240 Hz every one
+    every = max(1, len(log.steps) // moments)
     first = 0
     for block in log.blocks():
         counts = block.counts("pose")

@@ -18,17 +18,6 @@ from sonic_bullet.path.room.late_field import TETRAHEDRON, early_filters, late_f
 from sonic_bullet.path.room.room_fit import RoomPlace, place_room
 from sonic_bullet.records import Array, Microphone, Sensor, ShoeboxRoom, channels_of
 
-IMAGES = 24
-"""Images that are followed, on average over places: up to 22 ms in 72 m³, where the echoes come too close to be told
-apart at 20 V/S + 12 = 25 ms [Lindau, Kosanke, Weinzierl, J. Audio Eng. Soc. 60(11), 2012, eq. 8]. Each costs 4 % of a
-table-top."""
-ECHO_DB = 10.0
-"""How far Eyring's law has fallen when the images end, at the latest: else those of absorbing walls, which fall more
-slowly [Kuttruff 2000, eq. 5.41], are all that T60 is read from."""
-
-TABLE_M2 = 4.0
-"""Of a room of unknown size, larger faces are its own: a table for ten."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomPlan:
@@ -47,7 +36,7 @@ class RoomPlan:
     t60_s: float
     note: str
     walls: Array = field(default_factory=lambda: np.zeros((0, 4)))
-    largest_m2: float = TABLE_M2
+    largest_m2: float = 4.0  # of a room of unknown size, larger faces are its own: a table for ten
 
     @property
     def taps(self) -> int:
@@ -65,7 +54,10 @@ def plan_room(room: ShoeboxRoom, log: ContactLog) -> RoomPlan:
     place = place_room(room, log, [one for one, _ in own])
     channels = channels_of(log.sensors)
     t60_s = reverberation_time_s(room, log.air)
-    radius_m = _early_radius_m(room, place, own, log.air.sound_speed_m_s * float(t60_s.max()) * ECHO_DB / 60)
+    # How far Eyring's law has fallen when the images end, at the latest: else those of absorbing walls, which fall more
+    # slowly [Kuttruff 2000, eq. 5.41], are all that T60 is read from.
+    echo_db = 10.0
+    radius_m = _early_radius_m(room, place, own, log.air.sound_speed_m_s * float(t60_s.max()) * echo_db / 60)
     images = find_images(room, place.corner_m, place.centre_m, radius_m)
     flat = len(room.absorption) == 1
     orders = np.unique(images.order)
@@ -107,8 +99,12 @@ def _walls(room: ShoeboxRoom, place: RoomPlace) -> Array:
 def _early_radius_m(
     room: ShoeboxRoom, place: RoomPlace, own: Sequence[tuple[Microphone, int]], fallen_m: float
 ) -> float:
-    """Find how far away images are followed: `IMAGES` of them, or to fallen_m, but beyond all that sounds and hears."""
-    dense_m = (3 * IMAGES * float(np.prod(room.size_m)) / (4 * np.pi)) ** (1 / 3)
+    """Find how far away images are followed: `images` of them, or to fallen_m, but beyond all that sounds and hears."""
+    # Images that are followed, on average over places: up to 22 ms in 72 m³, where the echoes come too close to be told
+    # apart at 20 V/S + 12 = 25 ms [Lindau, Kosanke, Weinzierl, J. Audio Eng. Soc. 60(11), 2012, eq. 8]. Each costs 4 %
+    # of a table-top.
+    images = 24
+    dense_m = (3 * images * float(np.prod(room.size_m)) / (4 * np.pi)) ** (1 / 3)
     places = [one.position_m[None] if one.path is None else one.path.position_m for one, _ in own]
     away_m = max((float(np.linalg.norm(at - place.centre_m, axis=1).max()) for at in places), default=0.0)
     return float(max(min(dense_m, max(fallen_m, away_m + place.reach_m)), 2 * place.reach_m))

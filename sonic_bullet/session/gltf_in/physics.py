@@ -33,9 +33,6 @@ class _ExtensionNames(NamedTuple):
 
 EXTENSION_NAMES = _ExtensionNames()
 
-UP_TO_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Turns a shape whose axis is z so that it is y."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyFrame:
@@ -149,10 +146,12 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
         size = np.array(own.get("size", (1.0, 1.0, 1.0)), float) * placed.scale
         _check_lengths(nodes, name, size)
         return [Shape("box", size, position, quaternion())]
+    # turns a shape whose axis is z so that it is y
+    up_to_y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     if kind == "plane":
         if "sizeX" in own or "sizeZ" in own:
             notes.append(f"{name} is a plane of finite size: it is endless here")
-        return [Shape("plane", np.zeros(3), position, quaternion(UP_TO_Y))]
+        return [Shape("plane", np.zeros(3), position, quaternion(up_to_y))]
     if kind not in ("sphere", "capsule", "cylinder"):
         raise tree.error(f"{name}: its shape is a {kind}", "give a box, sphere, capsule, cylinder, plane or mesh")
     if not placed.uniform:
@@ -167,7 +166,7 @@ def collider_shapes(nodes: Nodes, collider: int, frame: BodyFrame, notes: list[s
     height = as_number(own.get("height", 0.5), f"{name}: height", "give metres above 0", above=0)
     size = np.array([sum(ends) / 2 * scale, height * scale, 0.0])
     _check_lengths(nodes, name, size[:2])
-    return [Shape("capsule" if kind == "capsule" else "cylinder", size, position, quaternion(UP_TO_Y))]
+    return [Shape("capsule" if kind == "capsule" else "cylinder", size, position, quaternion(up_to_y))]
 
 
 def _check_lengths(nodes: Nodes, name: str, size: Array) -> None:
