@@ -60,17 +60,19 @@ def version() -> str:
     return said.split()[-1]
 
 
-def job(body: Bricks, youngs_pa: float, poisson: float, density_kg_m3: float, count: int, element: str) -> str:
-    """Text of a .inp file: the lowest ``count`` modes of a free body, in SI units; ccx reads twenty characters a
-    number.
+def job(
+    node_m: Array, cell: Array, youngs_pa: float, poisson: float, density_kg_m3: float, count: int, element: str
+) -> str:
+    """Text of a .inp file: the lowest ``count`` modes of a free body of cells (c, k) in ccx's order of their nodes, in
+    SI units; ccx reads twenty characters a number, and ten nodes a line.
     """
-    node = "\n".join(f"{i},{x:.12e},{y:.12e},{z:.12e}" for i, (x, y, z) in enumerate(body.node_m.tolist(), 1))
-    cell = (body.cell[:, ORDER] + 1).tolist()
-    brick = "\n".join(
-        f"{i},{','.join(map(str, row[:10]))},\n{','.join(map(str, row[10:]))}" for i, row in enumerate(cell, 1)
+    node = "\n".join(f"{i},{x:.12e},{y:.12e},{z:.12e}" for i, (x, y, z) in enumerate(node_m.tolist(), 1))
+    rows = ([i, *row] for i, row in enumerate((cell + 1).tolist(), 1))
+    elements = "\n".join(
+        ",\n".join(",".join(map(str, row[k : k + 11])) for k in range(0, len(row), 11)) for row in rows
     )
     return (
-        f"*NODE,NSET=ALL\n{node}\n*ELEMENT,TYPE={element},ELSET=BODY\n{brick}\n"
+        f"*NODE,NSET=ALL\n{node}\n*ELEMENT,TYPE={element},ELSET=BODY\n{elements}\n"
         f"*MATERIAL,NAME=M\n*ELASTIC\n{youngs_pa!r},{poisson!r}\n*DENSITY\n{density_kg_m3!r}\n"
         f"*SOLID SECTION,ELSET=BODY,MATERIAL=M\n*STEP\n*FREQUENCY\n{count}\n*END STEP\n"
     )
@@ -79,9 +81,23 @@ def job(body: Bricks, youngs_pa: float, poisson: float, density_kg_m3: float, co
 def modes(
     body: Bricks, youngs_pa: float, poisson: float, density_kg_m3: float, *, count: int = 15, element: str = "C3D20R"
 ) -> Run:
-    """The lowest ``count`` elastic modes by CalculiX, one thread. Raises CcxError."""
+    """The lowest ``count`` elastic modes of bricks by CalculiX, one thread. Raises CcxError."""
+    return solve(body.node_m, body.cell[:, ORDER], youngs_pa, poisson, density_kg_m3, count=count, element=element)
+
+
+def solve(
+    node_m: Array,
+    cell: Array,
+    youngs_pa: float,
+    poisson: float,
+    density_kg_m3: float,
+    *,
+    count: int = 15,
+    element: str = "C3D10",
+) -> Run:
+    """The lowest ``count`` elastic modes of cells (c, k) in ccx's order by CalculiX, one thread. Raises CcxError."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "job.inp").write_text(job(body, youngs_pa, poisson, density_kg_m3, count + 6, element))
+        (Path(folder) / "job.inp").write_text(job(node_m, cell, youngs_pa, poisson, density_kg_m3, count + 6, element))
         one = dict.fromkeys(("OMP_NUM_THREADS", "CCX_NPROC_EQUATION_SOLVER"), "1")
         with (Path(folder) / "said").open("w") as said:
             child = subprocess.Popen(
@@ -103,7 +119,7 @@ def modes(
     rigid, elastic = frequency[:6], frequency[6:]
     if len(elastic) < count or not rigid.max() < RIGID_SHARE * elastic[0]:
         raise CcxError(f"not six rigid modes and {count} others: {frequency[:8]} Hz")
-    return Run(elastic, 3 * len(body.node_m), usage.ru_utime + usage.ru_stime, peak)
+    return Run(elastic, 3 * len(node_m), usage.ru_utime + usage.ru_stime, peak)
 
 
 def _peak_bytes(process: int) -> int:
