@@ -1,1 +1,1 @@
-"""Twenty shapes of workshop and table against CalculiX: is the error that a model tells the true one?"""
+"""Twenty shapes of workshop and table against CalculiX: is the error that a model states the true one?"""

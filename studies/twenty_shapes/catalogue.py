@@ -28,7 +28,7 @@ Cells = tuple[Array, Array, str]
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
     """stuff; cells: of the coarse and of the fine mesh; surface: what a user has; ratio of their edges; truth: the name
-    under which it is kept.
+    under which it is kept; edge_mm: of a drawing's fine cells.
     """
 
     stuff: Stuff
@@ -36,6 +36,7 @@ class Entry:
     surface: Callable[[], Shape]
     ratio: float
     truth: str
+    edge_mm: float | None = None
 
     @property
     def material(self) -> Material:
@@ -80,7 +81,7 @@ def _drawn(name: str, edge_mm: float, stuff: Stuff = STEEL) -> Entry:
         vertex, face = triangles(DRAWINGS[name]())
         return Shape("mesh", vertex_m=vertex, face=face.astype(np.int32))
 
-    return Entry(stuff, cells, surface, LARGER, name)
+    return Entry(stuff, cells, surface, LARGER, name, edge_mm)
 
 
 ENTRIES: dict[str, Entry] = {
