@@ -256,7 +256,8 @@ def material_of(preset: Preset, where: str = "") -> Material:
         f"| impact: {preset.impact.source}",
     }
     try:
-        rest["form"] = waves_of(preset.surface.waviness_m or 0.0, preset.surface.waviness_length_m or 2e-3)
+        height_m = 0.0 if preset.surface.waviness_m is None else preset.surface.waviness_m
+        rest["form"] = waves_of(height_m, preset.surface.waviness_length_m or 2e-3)
         if elastic.stiffness_pa is not None and elastic.youngs_pa is None and elastic.poisson is None:
             return Material(preset.name, preset.density_kg_m3, np.array(elastic.stiffness_pa), **rest)
         if elastic.stiffness_pa is None and elastic.youngs_pa is not None and elastic.poisson is not None:

@@ -43,8 +43,8 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     now = problem.score(h)
     far = Score(100.0, now.floor_db)
     for c in found:
-        assert helps(c, problem, far, far, first=False), "much nearer than nothing, whatever it is"
-        assert not (helps(c, shapeless, far, far, first=False) or by_lines(c, shapeless, now)), (
+        assert helps(c, problem, far, far), "much nearer than nothing, whatever it is"
+        assert not (helps(c, shapeless, far, far) or by_lines(c, shapeless, now)), (
             "without a mesh, of a room's lines none is known to be a mode"
         )
     return found, any(by_lines(c, problem, now) for c in found)

@@ -151,7 +151,8 @@ def own_decay_per_s(material: Material, lambda_per_s2: Array) -> Array:
     Without what a body radiates, and without what depends on its shape.
     """
     square = np.asarray(lambda_per_s2, float)
-    found = np.asarray(0.5 * ((material.alpha_per_s or 0.0) + (material.beta_s or 0.0) * square))
+    alpha_per_s, beta_s = (0.0 if one is None else one for one in (material.alpha_per_s, material.beta_s))
+    found = np.asarray(0.5 * (alpha_per_s + beta_s * square))
     for law in (effect for effect in material.effects if isinstance(effect, DampingLaw)):
         found = law.decay_per_s(np.sqrt(np.maximum(square, 0.0)))
     return found

@@ -81,7 +81,8 @@ def law_of(damping: Damping) -> tuple[DampingLaw, ...]:
         return ()
     power = damping.exponent if damping.exponent is not None else 1.0
     law = "constant-loss" if power == 1.0 else "power"
-    return (DampingLaw(law, damping.loss_factor, power, floor_s=damping.floor_s or 0.0),)
+    floor_s = 0.0 if damping.floor_s is None else damping.floor_s
+    return (DampingLaw(law, damping.loss_factor, power, floor_s=floor_s),)
 
 
 def rayleigh_pair(damping: Damping, label: str) -> tuple[float, float]:
@@ -93,9 +94,9 @@ def rayleigh_pair(damping: Damping, label: str) -> tuple[float, float]:
     of_law = ("loss_factor", "equal_at_hz", "exponent", "floor_s")
     given = {name for name in ("alpha_per_s", "beta_s", *of_law) if numbers[name] is not None}
     if given == {"alpha_per_s", "beta_s"}:
-        return damping.alpha_per_s or 0.0, damping.beta_s or 0.0
+        return numbers["alpha_per_s"], numbers["beta_s"]
     if given == {"loss_factor", "equal_at_hz"} and damping.equal_at_hz:
-        return rayleigh_of_loss_factor(damping.loss_factor or 0.0, *damping.equal_at_hz)
+        return rayleigh_of_loss_factor(numbers["loss_factor"], *damping.equal_at_hz)
     # frequencies in Hz at which Rayleigh's pair meets a law that is none, where nobody names others
     rayleigh_hz = (500.0, 8000.0)
     for law in law_of(damping) if given <= set(of_law) else ():
