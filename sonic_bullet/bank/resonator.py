@@ -44,7 +44,7 @@ class Resonator:
     size_m : cube root of the volume
     translation : acceleration noise, dipole coefficient by [Chadwick 2012]
     dropped : number of modes not played
-    moving, side : mobility where it is touched, and its elastic properties there
+    mobility, side : where it is touched, and its elastic properties there
     bend, damping_growth : (m,) of frequency per |z|², of decay by (damping_growth·|z|)^damping_growth_power
         None in a linear body
     rigid_columns : 6 where its rigid motion is played too, else 0
