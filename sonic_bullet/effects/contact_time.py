@@ -12,12 +12,12 @@ be observed and are not count, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.pulses import magnitude
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Evidence, Impact, Number, ObjectEvidence, Owner, Stage
 from sonic_bullet.records import Array
 
 HERTZ = -0.2
@@ -42,34 +42,22 @@ class _RollOff(NamedTuple):
 
 
 ROLL_OFF = _RollOff()
+FORMS = ("half-sine", "hertz", "raised-cosine")
 
 
 @dataclass(frozen=True)
-class ContactTime:
-    """Duration of the contact as a function of the strike's impulse.
-
-    Attributes
-    ----------
-    tau_s : float
-        Duration at the impulse `impulse_n_s`.
-    impulse_n_s : float
-        Reference impulse.
-    exponent : float
-        The duration goes as impulse^exponent.
-    pulse : str
-        One of `pulses.PULSES`.
-    """
+class ContactTime(Effect):
+    """duration of the contact as a function of the strike's impulse."""
 
     id: ClassVar[str] = "contact-time"
     stage: ClassVar[Stage] = Stage.FORCE
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "Hunter 1957; Johnson 1985, section 11.4"
-    traits: ClassVar[Traits] = Traits()
 
-    tau_s: float
-    impulse_n_s: float
-    exponent: float = HERTZ
-    pulse: str = "half-sine"
+    tau_s: Annotated[float, Number("duration at the impulse `impulse_n_s`", least=0.0, free=1)]
+    impulse_n_s: Annotated[float, Number("reference impulse", least=0.0, key="J0_n_s")]
+    exponent: Annotated[float, Number("of the impulse: the duration goes as impulse^exponent", free=1)] = HERTZ
+    pulse: Annotated[str, Number("form of the force", known=FORMS)] = "half-sine"
 
     def duration_s(self, impulse_n_s: float) -> float:
         """Compute the duration at an impulse."""
@@ -78,14 +66,6 @@ class ContactTime:
     def apply(self, x: Impact) -> Impact:
         """Set the impact's pulse and its duration."""
         return replace(x, tau_s=self.duration_s(x.impulse_n_s), pulse=self.pulse)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        return {"tau_s": self.tau_s, "J0_n_s": self.impulse_n_s, "exponent": self.exponent, "pulse": self.pulse}
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 2
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
@@ -100,8 +80,7 @@ class ContactTime:
             return None
         reference = float(np.exp(np.log(level).mean()))
         grid = np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
-        known_pulses = ("half-sine", "hertz", "raised-cosine")
-        pulses: tuple[str, ...] = known_pulses
+        pulses: tuple[str, ...] = FORMS
         # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
         if isinstance(evidence.known, cls):
             grid, pulses = (

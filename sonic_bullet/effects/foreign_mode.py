@@ -9,7 +9,7 @@ Identified by lines that belong to no mode and whose amplitude goes with the imp
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -18,13 +18,14 @@ from sonic_bullet.effects.common.ringing import sounded
 from sonic_bullet.effects.protocol import (
     Evidence,
     Impact,
+    Number,
+    Numbers,
     ObjectEvidence,
     Owner,
     Ring,
     RingsAlong,
     Sound,
     Stage,
-    Traits,
 )
 from sonic_bullet.records import Array
 
@@ -41,28 +42,17 @@ FOREIGN = _Foreign()
 
 @dataclass(frozen=True)
 class ForeignMode(RingsAlong):
-    """Lines of another resonator that the same impact excites, one number a line.
-
-    Attributes
-    ----------
-    freq_hz, decay_per_s : (k,)
-        Frequencies and decays.
-    amplitude_per_n_s : (k,)
-        Amplitudes in units of the file per N·s.
-    phase_rad : (k,)
-        Phases at the onset.
-    """
+    """Lines of another resonator that the same impact excites, one number a line."""
 
     id: ClassVar[str] = "foreign-mode"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "physics of a second resonator driven by the same impact: Morse & Ingard 1968, ch. 2"
-    traits: ClassVar[Traits] = Traits()
 
-    freq_hz: tuple[float, ...]
-    decay_per_s: tuple[float, ...]
-    amplitude_per_n_s: tuple[float, ...]
-    phase_rad: tuple[float, ...]
+    freq_hz: Annotated[Numbers, Number("(k,), of each line", least=0.0, free=1, table="modes")]
+    decay_per_s: Annotated[Numbers, Number("(k,), of each line", least=0.0, free=1, table="modes")]
+    amplitude_per_n_s: Annotated[Numbers, Number("(k,), in units of the file per N·s", free=1, table="modes")]
+    phase_rad: Annotated[Numbers, Number("(k,), at the onset", table="modes")]
 
     def apply(self, x: Sound) -> Sound:
         """Add the lines to the sound."""
@@ -80,10 +70,6 @@ class ForeignMode(RingsAlong):
         return {
             "modes": [list(row) for row in zip(self.freq_hz, self.decay_per_s, self.amplitude_per_n_s, strict=True)]
         }
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 3 * len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -12,12 +12,12 @@ every recording.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.hum import hum_of
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Evidence, Number, Numbers, ObjectEvidence, Owner, Sound, Stage
 from sonic_bullet.records import Array
 
 
@@ -32,40 +32,26 @@ class _Chain(NamedTuple):
 
 
 CHAIN = _Chain()
+ORDERS = (1, 2, 3, 4)
 
 
 @dataclass(frozen=True)
-class MeasurementChain:
-    """Filters, limit and hum of the recording equipment.
-
-    Attributes
-    ----------
-    high_pass_hz, low_pass_hz : float
-        Corner frequencies, 0 for none.
-    high_order, low_order : int
-        Orders of the filters.
-    limit : float
-        In units of the file, 0 for none.
-    hum_hz : float
-        Fundamental of the hum, 0 for none.
-    hum_amplitude, hum_phase_rad : (i,)
-        Amplitudes in units of the file and phases at the onset of its harmonics.
-    """
+class MeasurementChain(Effect):
+    """Filters, limit and hum of the recording equipment."""
 
     id: ClassVar[str] = "measurement-chain"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.CHAIN
     reference: ClassVar[str] = "Oppenheim & Schafer 2010, app. B"
-    traits: ClassVar[Traits] = Traits()
 
-    high_pass_hz: float = 0.0
-    high_order: int = 1
-    low_pass_hz: float = 0.0
-    low_order: int = 1
-    limit: float = 0.0
-    hum_hz: float = 0.0
-    hum_amplitude: tuple[float, ...] = ()
-    hum_phase_rad: tuple[float, ...] = ()
+    high_pass_hz: Annotated[float, Number("corner, 0 for none", least=0.0, free=2, of="high_pass_hz")] = 0.0
+    high_order: Annotated[int, Number("order of the filter", known=ORDERS, of="high_pass_hz")] = 1
+    low_pass_hz: Annotated[float, Number("corner, 0 for none", least=0.0, free=2, of="low_pass_hz")] = 0.0
+    low_order: Annotated[int, Number("order of the filter", known=ORDERS, of="low_pass_hz")] = 1
+    limit: Annotated[float, Number("in units of the file, 0 for none", least=0.0, free=1, of="limit")] = 0.0
+    hum_hz: Annotated[float, Number("fundamental of the hum, 0 for none", least=0.0, free=1, of="hum_hz")] = 0.0
+    hum_amplitude: Annotated[Numbers, Number("(i,), of its harmonics, in units of the file", free=1, of="hum_hz")] = ()
+    hum_phase_rad: Annotated[Numbers, Number("(i,), at the onset", shown=False)] = ()
 
     def apply(self, x: Sound) -> Sound:
         """Filter and limit the sound, and add the hum."""
@@ -84,28 +70,6 @@ class MeasurementChain:
                 if a:
                     y = y + a * np.cos(2 * np.pi * i * self.hum_hz * t + phase)
         return replace(x, sample=np.clip(y, -self.limit, self.limit) if self.limit else y)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        found: dict[str, Any] = {}
-        if self.high_pass_hz:
-            found |= {"high_pass_hz": self.high_pass_hz, "high_order": self.high_order}
-        if self.low_pass_hz:
-            found |= {"low_pass_hz": self.low_pass_hz, "low_order": self.low_order}
-        if self.limit:
-            found |= {"limit": self.limit}
-        if self.hum_hz:
-            found |= {"hum_hz": self.hum_hz, "hum_amplitude": list(self.hum_amplitude)}
-        return found
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return (
-            2 * bool(self.high_pass_hz)
-            + 2 * bool(self.low_pass_hz)
-            + bool(self.limit)
-            + (1 + len(self.hum_amplitude)) * bool(self.hum_hz)
-        )
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.axes import AXES_PAIR, about_axes, pair_at
-from sonic_bullet.effects.common.proofs import finite, same_length
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
+from sonic_bullet.effects.protocol import Evidence, Number, Numbers, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -39,17 +38,7 @@ SPLITTING = _Splitting()
 
 @dataclass(frozen=True)
 class ModeSplitting(SplitsPairs):
-    """Split pairs of modes, one number a pair.
-
-    Attributes
-    ----------
-    freq_hz : (p,)
-        Middle frequency of each pair.
-    split : (p,)
-        ε, relative.
-    turn_rad : (p,)
-        ψ, from the pair's first mode in the mesh as it is solved.
-    """
+    """Split pairs of modes, one number a pair."""
 
     id: ClassVar[str] = "mode-splitting"
     stage: ClassVar[Stage] = Stage.MODES
@@ -57,16 +46,9 @@ class ModeSplitting(SplitsPairs):
     reference: ClassVar[str] = "Perrin & Charnley 1973"
     traits: ClassVar[Traits] = Traits(moves_modes=True, by_line=True)
 
-    freq_hz: tuple[float, ...]
-    split: tuple[float, ...]
-    turn_rad: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        finite("freq_hz", *self.freq_hz, least=1e-3)
-        finite("split", *self.split, least=0.0, most=2.0)
-        finite("turn_rad", *self.turn_rad)
-        same_length(freq_hz=self.freq_hz, split=self.split, turn_rad=self.turn_rad)
+    freq_hz: Annotated[Numbers, Number("(p,), middle frequency of each pair", least=1e-3, table="pairs")]
+    split: Annotated[Numbers, Number("(p,), ε, relative", least=0.0, most=2.0, free=1, table="pairs")]
+    turn_rad: Annotated[Numbers, Number("(p,), ψ from the pair's first mode in the mesh", free=1, table="pairs")]
 
     def apply(self, x: ModalModel) -> ModalModel:
         """Split the pairs of a body's modes and turn their axes."""
@@ -102,19 +84,6 @@ class ModeSplitting(SplitsPairs):
             if pair[0] >= 0:
                 off[pair] = f / freq_hz[pair].mean() - 1
         return off
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        return {
-            "pairs": [
-                {"freq_hz": f, "split": s, "turn_rad": t}
-                for f, s, t in zip(self.freq_hz, self.split, self.turn_rad, strict=True)
-            ]
-        }
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 2 * len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

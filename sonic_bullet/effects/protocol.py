@@ -11,10 +11,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from sonic_bullet.effects.common.declared_numbers import Number, Numbers, check_numbers, free_numbers, reported_numbers
 from sonic_bullet.effects.evidence import Elastic, Evidence, ObjectEvidence, Poisson
 from sonic_bullet.effects.stages import Impact, Ring, Sound, Stage
 from sonic_bullet.records import Array, ModalModel
@@ -31,6 +32,8 @@ __all__ = [
     "Evidence",
     "Impact",
     "Mixing",
+    "Number",
+    "Numbers",
     "ObjectEvidence",
     "Owner",
     "Poisson",
@@ -132,7 +135,49 @@ class BaselineChange:
     onset_gain: float = 1.0
 
 
-class ChangesBaseline(ABC):
+class Effect(ABC):
+    """One physical effect: a frozen dataclass of its parameters, each declared once by `Annotated[..., Number(...)]`.
+
+    Checks, reports and the count of free numbers follow from the declarations. The docstring of each gives its
+    equation. What only some effects can do is in the small classes below, from which they derive; a host asks for
+    those, never for a name.
+    """
+
+    id: ClassVar[str]
+    stage: ClassVar[Stage]
+    owner: ClassVar[Owner]
+    reference: ClassVar[str]
+    traits: ClassVar[Traits] = Traits()
+
+    def __post_init__(self) -> None:
+        """Check the numbers by their declarations.
+
+        Raises
+        ------
+        RecordError
+            A number is out of its range, or lists that belong together are not as long as each other.
+        """
+        check_numbers(self)
+
+    @abstractmethod
+    def apply(self, x: Any) -> Any:
+        """Apply the effect to its stage's value; x is not changed."""
+
+    @classmethod
+    def propose(cls, evidence: Evidence) -> Self | None:
+        """Fit the effect to the evidence; None where the evidence suggests none, as where nobody looks for it."""
+        return None
+
+    def parameters(self) -> dict[str, Any]:
+        """Return its numbers by name with unit, for reports and presets."""
+        return reported_numbers(self)
+
+    def freedom(self) -> int:
+        """Count the numbers that were free when it was proposed."""
+        return free_numbers(self)
+
+
+class ChangesBaseline(Effect):
     """An effect with which the baseline's own numbers are others."""
 
     @abstractmethod
@@ -140,7 +185,7 @@ class ChangesBaseline(ABC):
         """Return the changes."""
 
 
-class Dereverberates(ABC):
+class Dereverberates(Effect):
     """An effect that hides the modes' own decays and levels, and can be removed from the lines (a room)."""
 
     @abstractmethod
@@ -166,7 +211,7 @@ class Dereverberates(ABC):
         """
 
 
-class RotatesPairs(ABC):
+class RotatesPairs(Effect):
     """An effect under which the axes of degenerate pairs are observable, which a linear body does not show."""
 
     @abstractmethod
@@ -178,7 +223,7 @@ class RotatesPairs(ABC):
         """Count its free numbers that are such axes: all fitted strikes share those, like a correction."""
 
 
-class SplitsPairs(ABC):
+class SplitsPairs(Effect):
     """An effect that splits degenerate pairs: their corrections are its own, not the mesh's."""
 
     @abstractmethod
@@ -192,7 +237,7 @@ class SplitsPairs(ABC):
         """
 
 
-class RingsAlong(ABC):
+class RingsAlong(Effect):
     """An effect that adds another resonator: its lines are none of the body's modes, and no other effect's evidence."""
 
     @abstractmethod
@@ -200,43 +245,12 @@ class RingsAlong(ABC):
         """Return its frequencies in Hz and decays in 1/s."""
 
 
-class ActsAtPlaces(ABC):
+class ActsAtPlaces(Effect):
     """An effect at places of the surface, which may have images under the body's symmetry that do the same."""
 
     @abstractmethod
     def places(self) -> tuple[tuple[float, float, float], ...]:
         """Return its places (p, 3) in the mesh's frame, in metres."""
-
-
-class Effect(Protocol):
-    """One physical effect: a frozen dataclass of its parameters.
-
-    The docstring of each gives its equation. What only some effects can do is in the small classes above, from which
-    they derive; a host asks for those, never for a name.
-    """
-
-    id: ClassVar[str]
-    stage: ClassVar[Stage]
-    owner: ClassVar[Owner]
-    reference: ClassVar[str]
-    traits: ClassVar[Traits]
-
-    def apply(self, x: Any) -> Any:
-        """Apply the effect to its stage's value; x is not changed."""
-        ...
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        """Fit the effect to the evidence; None where the evidence suggests none."""
-        ...
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its numbers by name with unit, for reports and presets."""
-        ...
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        ...
 
 
 def ascending(x: ModalModel, freq_hz: Array, decay_per_s: Array, shape: Array | None = None) -> ModalModel:

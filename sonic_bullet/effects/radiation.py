@@ -12,13 +12,22 @@ area A. The decays give the order of ka, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from sonic_bullet.effects.common.points import solved
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import (
+    Effect,
+    Evidence,
+    Number,
+    ObjectEvidence,
+    Owner,
+    Stage,
+    Traits,
+    ascending,
+)
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -35,20 +44,8 @@ RADIATION = _RadiationNumbers()
 
 
 @dataclass(frozen=True)
-class Radiation:
-    """Loss of modes by radiation, of one equivalent source.
-
-    Attributes
-    ----------
-    radius_m : float
-        Radius a of the source.
-    strength : float
-        s, 1 by the law.
-    tilt : float
-        Exponent of σ in the level at the sensor, 0 or ½.
-    order : int
-        Of ka where it is small, 2 (monopole) or 4 (dipole: no net flow of volume).
-    """
+class Radiation(Effect):
+    """Loss of modes by radiation, of one equivalent source."""
 
     id: ClassVar[str] = "radiation"
     stage: ClassVar[Stage] = Stage.MODES
@@ -56,10 +53,10 @@ class Radiation:
     reference: ClassVar[str] = "Fahy & Gardonio 2007, ch. 3"
     traits: ClassVar[Traits] = Traits(needs_unknown_medium=True)
 
-    radius_m: float
-    strength: float
-    tilt: float = 0.0
-    order: int = 2
+    radius_m: Annotated[float, Number("radius a of the source", least=0.0, free=1)]
+    strength: Annotated[float, Number("s, 1 by the law", least=0.0, free=1)]
+    tilt: Annotated[float, Number("exponent of σ in the level at the sensor, 0 or ½")] = 0.0
+    order: Annotated[int, Number("of ka where it is small: 2 monopole, 4 dipole", known=(2, 4))] = 2
 
     def efficiency(self, freq_hz: Array) -> Array:
         """Compute σ (k,) at frequencies (k,) in Hz."""
@@ -76,14 +73,6 @@ class Radiation:
         if self.tilt:
             shape[-1] *= (sigma**self.tilt).astype(np.float32)  # the last vertex is the sensor's
         return ascending(x, freq, decay, shape)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        return {"radius_m": self.radius_m, "strength": self.strength, "tilt": self.tilt, "order": self.order}
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 2
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -11,12 +11,11 @@ calibration gives no pascals: sound energy per impulse is that of the body's own
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.common.proofs import finite, same_length
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Number, Numbers, Owner, Stage, Traits
 from sonic_bullet.geometry import outward_normals
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.counts import format_count
@@ -26,18 +25,8 @@ MOST_LINES = 512
 
 
 @dataclass(frozen=True)
-class RecordedLines:
-    """Recorded lines in place of modes, one number a line, ascending.
-
-    Attributes
-    ----------
-    freq_hz, decay_per_s : (k,)
-        Frequencies and decays.
-    amplitude : (k,)
-        Of a strike, relative to one another.
-    spread_db : (k,)
-        Standard deviation from strike to strike.
-    """
+class RecordedLines(Effect):
+    """Recorded lines in place of modes, one number a line, ascending."""
 
     id: ClassVar[str] = "recorded-lines"
     stage: ClassVar[Stage] = Stage.MODES
@@ -47,17 +36,14 @@ class RecordedLines:
     )
     traits: ClassVar[Traits] = Traits(replaces_rayleigh=True)
 
-    freq_hz: tuple[float, ...]
-    decay_per_s: tuple[float, ...]
-    amplitude: tuple[float, ...]
-    spread_db: tuple[float, ...]
+    freq_hz: Annotated[Numbers, Number("(k,), of each line", least=0.0, free=1, table="lines")]
+    decay_per_s: Annotated[Numbers, Number("(k,), of each line", least=0.0, free=1, table="lines")]
+    amplitude: Annotated[Numbers, Number("(k,), relative to one another", least=0.0, free=1, table="lines")]
+    spread_db: Annotated[Numbers, Number("(k,), standard deviation from strike to strike", least=0.0, table="lines")]
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        fields = self._columns()
-        same_length(**fields)
-        for name, values in fields.items():
-            finite(name, *values, least=0.0)
+        super().__post_init__()
         if not 0 < len(self.freq_hz) <= MOST_LINES:
             raise RecordError(f"{len(self.freq_hz)} lines", f"give 1 to {MOST_LINES}")
         if min(self.freq_hz) <= 0 or min(self.decay_per_s) <= 0 or list(self.freq_hz) != sorted(self.freq_hz):
@@ -92,25 +78,7 @@ class RecordedLines:
 
     def parameters(self) -> dict[str, Any]:
         """Return its parameters by name, in SI units, for reports and JSON."""
-        return {name: list(values) for name, values in self._columns().items()}
-
-    def _columns(self) -> dict[str, tuple[float, ...]]:
-        """Return the four fields by name."""
-        return {
-            "freq_hz": self.freq_hz,
-            "decay_per_s": self.decay_per_s,
-            "amplitude": self.amplitude,
-            "spread_db": self.spread_db,
-        }
-
-    def freedom(self) -> int:
-        """Count its numbers: frequency, decay and amplitude of each line."""
-        return 3 * len(self.freq_hz)
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        """Return None: a fit sets this effect where there is no shape."""
-        return None
+        return {name: list(values) for name, values in vars(self).items()}
 
 
 def _vertex_normals(x: ModalModel) -> tuple[Array, Array]:

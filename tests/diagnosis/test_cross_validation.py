@@ -23,7 +23,7 @@ from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.orthotropy import Orthotropy
-from sonic_bullet.effects.protocol import Cost, Evidence, Owner, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Cost, Effect, Evidence, Owner, Sound, Stage, Traits
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.support_damping import SupportDamping
@@ -40,7 +40,7 @@ WEAK = ((0.0477, 0.0371, 0.0), (0.0955, 0.0186, 0.0), (0.1432, 0.0464, 0.0))
 
 
 @dataclass(frozen=True)
-class Idle:
+class Idle(Effect):
     """Does nothing, and says that it moves modes, so that corrections are learnt again."""
 
     id: ClassVar[str] = "mode-splitting"
@@ -51,9 +51,6 @@ class Idle:
 
     def apply(self, x: ModalModel) -> ModalModel:
         return x
-
-    def parameters(self) -> dict[str, Any]:
-        return {}
 
     def freedom(self) -> int:
         return 2

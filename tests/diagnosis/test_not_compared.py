@@ -6,7 +6,7 @@ import ast
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
 from sonic_bullet.effects import EFFECTS
-from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Evidence, Owner, Sound, Stage
 from sonic_bullet.signal.log_spectral import noise_floor_db, white
 from tests.diagnosis.test_found_again import BAND, fitted
 from tests.made.body import SR, recorded, truth
@@ -142,20 +142,16 @@ def test_the_distance_of_silence_is_what_noise_makes_of_a_cell_that_just_stands_
 
 
 @dataclass(frozen=True)
-class Spoils:
+class Spoils(Effect):
     """Plays no numbers: a state that is rejected, as far off as can be."""
 
     id: ClassVar[str] = "spoils"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.CHAIN
-    traits: ClassVar[Traits] = Traits()
     reference: ClassVar[str] = "none"
 
     def apply(self, x: Sound) -> Sound:
         return replace(x, sample=x.sample * np.nan)
-
-    def parameters(self) -> dict[str, Any]:
-        return {}
 
     def freedom(self) -> int:
         return 1

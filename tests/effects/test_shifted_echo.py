@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from scipy.signal import resample
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
-from sonic_bullet.effects.protocol import Evidence, Owner, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Number, Owner, Sound, Stage
 from sonic_bullet.effects.room import Room
 from sonic_bullet.effects.room.shifted_echo import ECHO, copied
 from tests.diagnosis.test_found_again import BAND, fitted
@@ -20,15 +20,14 @@ from tests.made.body import recorded
 
 
 @dataclass(frozen=True)
-class Moving:
+class Moving(Effect):
     """x(t) + r x((1 − 2v/c)t − T): a reflector that goes away at v."""
 
     id: ClassVar[str] = "moving"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.ROOM
     reference: ClassVar[str] = "Pierce 1989, ch. 9"
-    traits: ClassVar[Traits] = Traits()
-    speed_m_s: float
+    speed_m_s: Annotated[float, Number("of the reflector", free=3)]
 
     def apply(self, x: Sound) -> Sound:
         n = len(x.sample)
@@ -36,16 +35,6 @@ class Moving:
         return replace(
             x, sample=x.sample + 0.6 * np.interp(when, np.arange(16 * n) / 16, resample(x.sample, 16 * n), left=0.0)
         )
-
-    def parameters(self) -> dict[str, Any]:
-        return {"speed_m_s": self.speed_m_s}
-
-    def freedom(self) -> int:
-        return 3
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> None:
-        return None
 
 
 def test_the_ratio_of_a_moving_echo_is_told_and_no_room_proposed() -> None:

@@ -9,33 +9,24 @@ ln d and ln level of every mode += Σ_i amount_i v_ik,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Evidence, Number, Numbers, Owner, Stage
 from sonic_bullet.records import ModalModel
 
 
 @dataclass(frozen=True)
-class ControlEffect:
-    """Changes of ln d and ln level of every mode along random directions.
-
-    Attributes
-    ----------
-    amount : tuple of float
-        One a direction, half of them of ln d.
-    seed : int
-        Of the directions.
-    """
+class ControlEffect(Effect):
+    """Changes of ln d and ln level of every mode along random directions, which `seed` draws."""
 
     id: ClassVar[str] = "null"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.FIXTURE  # after whatever acts on modes, as a candidate effect may
     reference: ClassVar[str] = "a control, not physics"
-    traits: ClassVar[Traits] = Traits()
 
-    amount: tuple[float, ...]
+    amount: Annotated[Numbers, Number("one a direction, half of them of ln d", free=1)]
     seed: int
 
     def apply(self, x: ModalModel) -> ModalModel:
@@ -50,19 +41,6 @@ class ControlEffect:
             else np.float32(1)
         )
         return replace(x, decay_per_s=decay, shape=shape)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, for reports and JSON."""
-        return {"amount": list(self.amount)}
-
-    def freedom(self) -> int:
-        """Count its numbers."""
-        return len(self.amount)
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        """Fit two numbers; see `fitted`."""
-        return cls.fitted(evidence, 2, 0)
 
     @classmethod
     def fitted(cls, evidence: Evidence, freedom: int, seed: int) -> Self | None:

@@ -15,7 +15,7 @@ lowered differently. A free body moves against the mass as a whole (free_body.py
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from sonic_bullet.effects.protocol import (
     Cost,
     Evidence,
     Mixing,
+    Number,
     Owner,
     Stage,
     Traits,
@@ -45,21 +46,7 @@ SEARCH_RESTARTS = 6
 
 @dataclass(frozen=True)
 class AddedMass(ChangesBaseline, ActsAtPlaces):
-    """A point mass on the surface, and what was fitted of the bare body with it.
-
-    Attributes
-    ----------
-    position_m : (3,)
-        In the mesh's frame.
-    mass_kg : float
-        The mass.
-    yield_m_n : (2,)
-        Compliance along the normal and across it of the modes above the model's, m/N.
-    stretch : float
-        ln of all frequencies of the bare body over the baseline's, which the host takes over.
-    poisson_ratio : float
-        ν of the bare body, which the host takes over; None for the baseline's.
-    """
+    """A point mass on the surface, and what was fitted of the bare body with it."""
 
     id: ClassVar[str] = "added-mass"
     stage: ClassVar[Stage] = Stage.MODES
@@ -67,11 +54,13 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
     reference: ClassVar[str] = "Rayleigh 1894, § 88-90; Rubin 1975"
     traits: ClassVar[Traits] = Traits(moves_modes=True, mixing=Mixing.ALL, cost=Cost.COSTLY)
 
-    position_m: tuple[float, float, float]
-    mass_kg: float
-    yield_m_n: tuple[float, float] = (0.0, 0.0)
-    stretch: float = 0.0
-    poisson_ratio: float | None = None
+    position_m: Annotated[tuple[float, float, float], Number("(3,), in the mesh's frame", free=1)]
+    mass_kg: Annotated[float, Number("the mass", least=0.0, free=1)]
+    yield_m_n: Annotated[
+        tuple[float, float], Number("(2,), m/N, of the modes above: along, across", least=0.0, free=1)
+    ] = (0.0, 0.0)
+    stretch: Annotated[float, Number("ln of the bare body's frequencies over the baseline's", free=1)] = 0.0
+    poisson_ratio: Annotated[float | None, Number("ν of the bare body, None: the baseline's", free=1)] = None
 
     def apply(self, x: ModalModel) -> ModalModel:
         """Compute the modes of the body with the mass."""
@@ -93,15 +82,6 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
     def places(self) -> tuple[tuple[float, float, float], ...]:
         """Return the mass's place."""
         return (self.position_m,)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        place = {"mass_kg": self.mass_kg, "position_m": list(self.position_m), "yield_m_n": list(self.yield_m_n)}
-        return {**place, "stretch": self.stretch, "poisson_ratio": self.poisson_ratio}
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 8
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

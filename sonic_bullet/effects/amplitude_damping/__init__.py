@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
@@ -28,11 +28,12 @@ from sonic_bullet.effects.amplitude_damping.damped_lines import (
 from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
 from sonic_bullet.effects.common.axes import ANGLES, AXES_PAIR, turned
 from sonic_bullet.effects.common.envelope import envelopes, levels
-from sonic_bullet.effects.common.proofs import finite, one_of, same_length
 from sonic_bullet.effects.protocol import (
     BaselineChange,
     ChangesBaseline,
     Evidence,
+    Number,
+    Numbers,
     ObjectEvidence,
     Owner,
     Ring,
@@ -49,25 +50,7 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 @dataclass(frozen=True)
 class AmplitudeDamping(RotatesPairs, ChangesBaseline):
-    """Decay that grows with the level, and what was fitted with it.
-
-    Attributes
-    ----------
-    damping_growth : float
-        c, 1/level at which the decay has doubled.
-    measure : str
-        Measure of the level, one of `amplitude_pitch.MEASURES`.
-    alpha_per_s, beta_s : float
-        The material's α and β by the decays at low level; NaN for the baseline's.
-    louder : float
-        Modes at the onset over the linear model's, as its lines underestimate an envelope that is no exponential.
-    freq_hz : (p,)
-        Frequencies of degenerate modes.
-    turn_rad : (p,)
-        Angles by which their axes are turned from the mesh's.
-    power : float
-        p, 1 or 2.
-    """
+    """Decay that grows with the level, and what was fitted with it."""
 
     id: ClassVar[str] = "amplitude-damping"
     stage: ClassVar[Stage] = Stage.BANK
@@ -75,24 +58,14 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 3.3"
     traits: ClassVar[Traits] = Traits(by_line=True)
 
-    damping_growth: float
-    measure: str = "velocity"
-    alpha_per_s: float = float("nan")
-    beta_s: float = float("nan")
-    louder: float = 1.0
-    freq_hz: tuple[float, ...] = ()
-    turn_rad: tuple[float, ...] = ()
-    power: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        one_of("power", self.power, POWERS)  # of drag: others have no closed form
-        one_of("measure", self.measure, MEASURES)
-        finite("choke", self.damping_growth, least=0.0)
-        finite("louder", self.louder, least=1e-6)
-        finite("freq_hz", *self.freq_hz, least=1e-3)
-        finite("turn_rad", *self.turn_rad)
-        same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
+    damping_growth: Annotated[float, Number("c, 1/level that doubles the decay", least=0.0, free=1, key="choke")]
+    measure: Annotated[str, Number("of the level", known=MEASURES)] = "velocity"
+    alpha_per_s: Annotated[float, Number("by decays at low level", shown=False)] = float("nan")
+    beta_s: Annotated[float, Number("by decays at low level", shown=False)] = float("nan")
+    louder: Annotated[float, Number("modes at the onset over the linear model's", least=1e-6, shown=False)] = 1.0
+    freq_hz: Annotated[Numbers, Number("(p,), of degenerate modes", least=1e-3, table="twins")] = ()
+    turn_rad: Annotated[Numbers, Number("(p,), of their axes, from the mesh's", free=1, table="twins")] = ()
+    power: Annotated[float, Number("p: other powers have no closed form", known=POWERS, free=1)] = 1.0
 
     def apply(self, x: Ring) -> Ring:
         """Add the damping growth to the modes in the bank."""
@@ -115,17 +88,6 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
         if not np.isfinite(self.alpha_per_s):
             return BaselineChange(onset_gain=self.louder)
         return BaselineChange(self.alpha_per_s, self.beta_s, onset_gain=self.louder)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        degenerate = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
-        return {"choke": self.damping_growth, "measure": self.measure, "power": self.power} | (
-            {"twins": degenerate} if degenerate else {}
-        )
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 2 + len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -11,15 +11,24 @@ about their own axes (degenerate_pitch.py).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
 from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_with_axes
 from sonic_bullet.effects.common.axes import degenerate, turned
 from sonic_bullet.effects.common.envelope import Envelopes, envelopes, falls, levels
-from sonic_bullet.effects.common.proofs import finite, one_of, same_length
-from sonic_bullet.effects.protocol import Evidence, ObjectEvidence, Owner, Ring, RotatesPairs, Stage, Traits
+from sonic_bullet.effects.protocol import (
+    Evidence,
+    Number,
+    Numbers,
+    ObjectEvidence,
+    Owner,
+    Ring,
+    RotatesPairs,
+    Stage,
+    Traits,
+)
 from sonic_bullet.records import Array, ModalModel
 
 MEASURES = ("impulse", "velocity", "displacement")
@@ -55,19 +64,7 @@ class Slope:
 
 @dataclass(frozen=True)
 class AmplitudePitch(RotatesPairs):
-    """Rise of the frequency with the level.
-
-    Attributes
-    ----------
-    bend : float
-        b, relative rise of frequency per level².
-    measure : str
-        Measure of the level, one of MEASURES, in N·s, m/s or m.
-    freq_hz : (p,)
-        Frequencies of degenerate modes.
-    turn_rad : (p,)
-        Angles by which their axes are turned from the mesh's.
-    """
+    """Rise of the frequency with the level."""
 
     id: ClassVar[str] = "amplitude-pitch"
     stage: ClassVar[Stage] = Stage.BANK
@@ -75,18 +72,10 @@ class AmplitudePitch(RotatesPairs):
     reference: ClassVar[str] = "Nayfeh & Mook 1979, section 2.3"
     traits: ClassVar[Traits] = Traits(by_line=True)
 
-    bend: float
-    measure: str = "velocity"
-    freq_hz: tuple[float, ...] = ()
-    turn_rad: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        one_of("measure", self.measure, MEASURES)
-        finite("bend", self.bend)
-        finite("freq_hz", *self.freq_hz, least=1e-3)
-        finite("turn_rad", *self.turn_rad)
-        same_length(freq_hz=self.freq_hz, turn_rad=self.turn_rad)
+    bend: Annotated[float, Number("b, relative rise of frequency per level²", free=1)]
+    measure: Annotated[str, Number("of the level, in N·s, m/s or m", known=MEASURES)] = "velocity"
+    freq_hz: Annotated[Numbers, Number("(p,), of degenerate modes", least=1e-3, table="twins")] = ()
+    turn_rad: Annotated[Numbers, Number("(p,), of their axes, from the mesh's", free=1, table="twins")] = ()
 
     def apply(self, x: Ring) -> Ring:
         """Add the bend to the modes in the bank."""
@@ -99,15 +88,6 @@ class AmplitudePitch(RotatesPairs):
     def angles(self) -> int:
         """Count its numbers that are axes of degenerate pairs."""
         return len(self.turn_rad)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        pairs = [{"freq_hz": f, "turn_rad": t} for f, t in zip(self.freq_hz, self.turn_rad, strict=True)]
-        return {"bend": self.bend, "measure": self.measure} | ({"twins": pairs} if pairs else {})
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 1 + len(self.freq_hz)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

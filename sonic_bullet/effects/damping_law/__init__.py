@@ -15,15 +15,14 @@ with the least Bayes information criterion is proposed, where it is better than 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from sonic_bullet.effects.common.proofs import finite, one_of
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import Effect, Evidence, Number, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, Material, ModalModel
 
-LAWS = {"constant-loss": 1, "power": 2, "relaxation": 3}
+LAWS = ("constant-loss", "power", "relaxation")
 OMEGA_1 = 2000 * np.pi
 
 
@@ -39,24 +38,8 @@ LAW_SEARCH = _LawSearch()
 
 
 @dataclass(frozen=True)
-class DampingLaw:
-    """Loss of a material as a function of frequency.
-
-    Attributes
-    ----------
-    law : str
-        One of LAWS.
-    eta : float
-        Loss factor η (at 1 kHz for a power).
-    exponent : float
-        p, of the decay as a power of ω.
-    strength : float
-        Δ of the relaxation.
-    tau_s : float
-        τ of the relaxation.
-    floor_s : float
-        T₀, below which T60 does not fall; 0 without a floor, and none of a relaxation.
-    """
+class DampingLaw(Effect):
+    """Loss of a material as a function of frequency."""
 
     id: ClassVar[str] = "damping-law"
     stage: ClassVar[Stage] = Stage.MODES
@@ -64,20 +47,12 @@ class DampingLaw:
     reference: ClassVar[str] = "Cremer, Heckl, Petersson 2005, ch. 3; Nowick & Berry 1972, ch. 3"
     traits: ClassVar[Traits] = Traits(replaces_rayleigh=True)
 
-    law: str
-    eta: float
-    exponent: float = 1.0
-    strength: float = 0.0
-    tau_s: float = 0.0
-    floor_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        one_of("law", self.law, LAWS)
-        finite("exponent", self.exponent)
-        numbers = {"eta": self.eta, "strength": self.strength, "tau_s": self.tau_s, "floor_s": self.floor_s}
-        for name, value in numbers.items():
-            finite(name, value, least=0.0)
+    law: Annotated[str, Number("which", known=LAWS)]
+    eta: Annotated[float, Number("loss factor η (at 1 kHz for a power)", least=0.0, free=1)]
+    exponent: Annotated[float, Number("p, of the decay as a power of ω", free=1, of="exponent")] = 1.0
+    strength: Annotated[float, Number("Δ of the relaxation", least=0.0, free=1, of="strength")] = 0.0
+    tau_s: Annotated[float, Number("τ of the relaxation", least=0.0, free=1, of="tau_s")] = 0.0
+    floor_s: Annotated[float, Number("T₀, below which T60 does not fall", least=0.0, free=1, of="floor_s")] = 0.0
 
     def decay_per_s(self, omega_per_s: Array) -> Array:
         """Compute the decays (k,) at undamped ω (k,) in rad/s."""
@@ -96,17 +71,6 @@ class DampingLaw:
         decay = np.minimum(self.decay_per_s(omega), 0.99 * omega)
         freq = np.sqrt(omega**2 - decay**2) / (2 * np.pi)
         return ascending(x, freq, decay)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        if self.law == "relaxation":
-            return {"law": self.law, "eta": self.eta, "strength": self.strength, "tau_s": self.tau_s}
-        bent = {"exponent": self.exponent} if self.law == "power" else {}
-        return {"law": self.law, "eta": self.eta} | bent | ({"floor_s": self.floor_s} if self.floor_s else {})
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return LAWS[self.law] + bool(self.floor_s)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

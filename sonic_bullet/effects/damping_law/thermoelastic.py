@@ -15,50 +15,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, Self
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from sonic_bullet.effects.common.proofs import finite
-from sonic_bullet.effects.protocol import Evidence, Owner, Stage, Traits, ascending
+from sonic_bullet.effects.protocol import Effect, Number, Owner, Stage, ascending
 from sonic_bullet.records import Array, ModalModel
 
 
 @dataclass(frozen=True)
-class ThermoelasticLoss:
-    """Loss by heat that flows through bent walls; adds to what the material loses otherwise.
-
-    Attributes
-    ----------
-    youngs_pa, poisson, density_kg_m3 : float
-        E, ν, ρ of the isotropic material.
-    expansion_per_k : float
-        α, linear.
-    conductivity_w_m_k : float
-        k.
-    heat_capacity_j_kg_k : float
-        c.
-    """
+class ThermoelasticLoss(Effect):
+    """Loss by heat that flows through bent walls; adds to what the material loses otherwise."""
 
     id: ClassVar[str] = "thermoelastic"
     stage: ClassVar[Stage] = Stage.MODES
     owner: ClassVar[Owner] = Owner.MATERIAL
     reference: ClassVar[str] = "Zener 1937; Lifshitz & Roukes 2000; Norris & Photiadis 2005"
-    traits: ClassVar[Traits] = Traits()
 
-    youngs_pa: float
-    poisson: float
-    density_kg_m3: float
-    expansion_per_k: float
-    conductivity_w_m_k: float
-    heat_capacity_j_kg_k: float
-
-    def __post_init__(self) -> None:
-        """Check the numbers."""
-        finite("poisson", self.poisson)
-        numbers = self.parameters() | {"youngs_pa": self.youngs_pa, "density_kg_m3": self.density_kg_m3}
-        for name, value in numbers.items():
-            finite(name, value, least=0.0)
+    youngs_pa: Annotated[float, Number("E of the isotropic material", least=0.0, shown=False)]
+    poisson: Annotated[float, Number("ν", shown=False)]
+    density_kg_m3: Annotated[float, Number("ρ", least=0.0, shown=False)]
+    expansion_per_k: Annotated[float, Number("α, linear", least=0.0)]
+    conductivity_w_m_k: Annotated[float, Number("k", least=0.0)]
+    heat_capacity_j_kg_k: Annotated[float, Number("c", least=0.0)]
 
     @property
     def strength(self) -> float:
@@ -95,23 +74,6 @@ class ThermoelasticLoss:
         omega = np.sqrt(x.omega0_squared_per_s2)
         decay = np.minimum(x.decay_per_s + 0.5 * self.loss_factors(x) * omega, 0.99 * omega)
         return ascending(x, np.sqrt(omega**2 - np.nan_to_num(decay) ** 2) / (2 * np.pi), decay)
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        return {
-            "expansion_per_k": self.expansion_per_k,
-            "conductivity_w_m_k": self.conductivity_w_m_k,
-            "heat_capacity_j_kg_k": self.heat_capacity_j_kg_k,
-        }
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed: none, they are the material's."""
-        return 0
-
-    @classmethod
-    def propose(cls, evidence: Evidence) -> Self | None:
-        """Propose nothing: its numbers are known before anybody listens."""
-        return None
 
 
 def relaxation(xi: Array) -> Array:

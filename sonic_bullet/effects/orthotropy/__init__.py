@@ -17,12 +17,12 @@ import numpy as np
 from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, ringing
 from sonic_bullet.effects.orthotropy.tensor_search import Tensor, fitted, isotropic_p, search
 from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, TENSOR_SEARCH, p_of
-from sonic_bullet.effects.protocol import Cost, Evidence, ObjectEvidence, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import Cost, Effect, Evidence, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
 
 @dataclass(frozen=True)
-class Orthotropy:
+class Orthotropy(Effect):
     """Elastic constants with axes along the mesh's.
 
     Attributes

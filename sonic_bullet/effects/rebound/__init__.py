@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.ringing import direct_as_expected
-from sonic_bullet.effects.protocol import Evidence, Impact, ObjectEvidence, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import Effect, Evidence, Impact, Number, ObjectEvidence, Owner, Stage
 from sonic_bullet.effects.rebound.later_hits import LATER_HITS, MOST_HITS, hits_by_strike, second_hit, third_hit
 from sonic_bullet.records import Array
 
@@ -41,37 +41,20 @@ RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 
 
 @dataclass(frozen=True)
-class Rebound:
-    """Hits of one strike after the first.
-
-    Attributes
-    ----------
-    gap_s : float
-        First gap at the impulse `impulse_n_s`.
-    impulse_n_s : float
-        Reference impulse.
-    restitution : float
-        Each hit's impulse over that of the one before.
-    exponent : float
-        Gaps go as impulse^exponent.
-    shrink : float
-        Each gap over the one before; None for the restitution.
-    hits : int
-        Number of hits, the first included.
-    """
+class Rebound(Effect):
+    """Hits of one strike after the first."""
 
     id: ClassVar[str] = "rebound"
     stage: ClassVar[Stage] = Stage.FORCE
     owner: ClassVar[Owner] = Owner.STRIKER
     reference: ClassVar[str] = "Goldsmith 1960, ch. 1; Falcon et al. 1998"
-    traits: ClassVar[Traits] = Traits()
 
-    gap_s: float
-    impulse_n_s: float
-    restitution: float
-    exponent: float = 0.0
-    shrink: float | None = None  # of the gaps; the restitution where None
-    hits: int = MOST_HITS
+    gap_s: Annotated[float, Number("first gap at the impulse `impulse_n_s`", least=0.0, free=1)]
+    impulse_n_s: Annotated[float, Number("reference impulse", least=0.0, key="J0_n_s")]
+    restitution: Annotated[float, Number("each hit's impulse over that of the one before", least=0.0, free=1)]
+    exponent: Annotated[float, Number("of the impulse: gaps go as impulse^exponent", free=1)] = 0.0
+    shrink: Annotated[float | None, Number("each gap over the last, None: restitution", key="gap_ratio")] = None
+    hits: Annotated[int, Number("hits, the first included", least=1)] = MOST_HITS
 
     def apply(self, x: Impact) -> Impact:
         """Repeat the impact's hits."""
@@ -85,20 +68,8 @@ class Rebound:
         return replace(x, delay_s=delay, share=(x.share[:, None] * share).ravel())
 
     def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        shrink = self.restitution if self.shrink is None else self.shrink
-        return {
-            "gap_s": self.gap_s,
-            "J0_n_s": self.impulse_n_s,
-            "restitution": self.restitution,
-            "gap_ratio": shrink,
-            "exponent": self.exponent,
-            "hits": self.hits,
-        }
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 3
+        """Return its numbers by name; the ratio of gaps is the restitution where none is set."""
+        return super().parameters() | {"gap_ratio": self.restitution if self.shrink is None else self.shrink}
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -13,13 +13,13 @@ room, lines are identified as they would be without it (`dereverberated`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common import reverberant_tail
 from sonic_bullet.effects.foreign_mode import ForeignMode
-from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, Owner, Sound, Stage, Traits
+from sonic_bullet.effects.protocol import Dereverberates, Evidence, Number, ObjectEvidence, Owner, Sound, Stage
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
 
@@ -47,30 +47,15 @@ ROOM_SEARCH = _RoomSearch()
 
 @dataclass(frozen=True)
 class Room(Dereverberates):
-    """Reverberation of the room.
-
-    Attributes
-    ----------
-    rt60_s : float
-        Time in which the tail falls by 60 dB.
-    reverberant_level : float
-        w of the module's first equation.
-    seed : int
-        Of the noise, where there is no response.
-    response : (t,)
-        The tail's taps, the first at the direct sound; empty: noise of that law.
-    sr : int
-        Sampling rate of the response in Hz.
-    """
+    """Reverberation of the room."""
 
     id: ClassVar[str] = "room"
     stage: ClassVar[Stage] = Stage.SOUND
     owner: ClassVar[Owner] = Owner.ROOM
     reference: ClassVar[str] = "Schroeder 1965; Polack 1988; Kuttruff 2009, ch. 4"
-    traits: ClassVar[Traits] = Traits()
 
-    rt60_s: float
-    reverberant_level: float
+    rt60_s: Annotated[float, Number("time in which the tail falls by 60 dB", least=0.0, free=1)]
+    reverberant_level: Annotated[float, Number("w of the module's first equation", least=0.0, free=1, key="wet")]
     seed: int = 0
     response: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
     sr: int = 0
@@ -134,14 +119,6 @@ class Room(Dereverberates):
             response=identified(signal, sound, noise, sr, RT60 / self.rt60_s, self.reverberant_level, start, turns),
             sr=sr,
         )
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        return {"rt60_s": self.rt60_s, "wet": self.reverberant_level}
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 2
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

@@ -12,13 +12,13 @@ is left.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.dashpots import damped
 from sonic_bullet.effects.common.points import nearest, vertex_normals
-from sonic_bullet.effects.protocol import ActsAtPlaces, Cost, Evidence, Mixing, Owner, Stage, Traits
+from sonic_bullet.effects.protocol import ActsAtPlaces, Cost, Evidence, Mixing, Number, Numbers, Owner, Stage, Traits
 from sonic_bullet.effects.support_damping.dashpot_fit import Dashpot, DashpotFit
 from sonic_bullet.effects.support_damping.support_search import SUPPORT_SEARCH, refined, sought, tuned
 from sonic_bullet.records import Array, ModalModel
@@ -26,17 +26,7 @@ from sonic_bullet.records import Array, ModalModel
 
 @dataclass(frozen=True)
 class SupportDamping(ActsAtPlaces):
-    """Dashpots on the surface, one entry a dashpot.
-
-    Attributes
-    ----------
-    position_m : (j, 3)
-        In the mesh's frame.
-    strength_n_s_m : (j,)
-        c in N·s/m.
-    along : (j,)
-        "normal" to the surface, or "every" direction; () all normal.
-    """
+    """Dashpots on the surface, one entry a dashpot."""
 
     id: ClassVar[str] = "support-damping"
     stage: ClassVar[Stage] = Stage.MODES
@@ -44,9 +34,9 @@ class SupportDamping(ActsAtPlaces):
     reference: ClassVar[str] = "Zheng & James 2011, section 5 (contact damping); Woodhouse 1998, eq. 12"
     traits: ClassVar[Traits] = Traits(moves_modes=True, mixing=Mixing.NEIGHBOURS, cost=Cost.SEARCHES)
 
-    position_m: tuple[tuple[float, float, float], ...]
-    strength_n_s_m: tuple[float, ...]
-    along: tuple[str, ...] = ()
+    position_m: Annotated[tuple[tuple[float, float, float], ...], Number("(j, 3), in the mesh's frame", free=2)]
+    strength_n_s_m: Annotated[Numbers, Number("(j,), c in N·s/m", least=0.0, free=1, key="c_n_s_m")]
+    along: tuple[str, ...] = ()  # (j,): "normal" to the surface, or "every" direction; () all normal
 
     def apply(self, x: ModalModel) -> ModalModel:
         """Compute the modes of the body under the dashpots."""
@@ -65,14 +55,6 @@ class SupportDamping(ActsAtPlaces):
     def places(self) -> tuple[tuple[float, float, float], ...]:
         """Return the dashpots' places."""
         return self.position_m
-
-    def parameters(self) -> dict[str, Any]:
-        """Return its parameters by name, in SI units, for reports and JSON."""
-        return {"position_m": [list(p) for p in self.position_m], "c_n_s_m": list(self.strength_n_s_m)}
-
-    def freedom(self) -> int:
-        """Count the numbers that were free when it was proposed."""
-        return 3 * len(self.strength_n_s_m)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
