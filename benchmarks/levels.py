@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import sonic_bullet as sb
 from sonic_bullet.bank import ModeSet, Translation, append, empty_bank
-from sonic_bullet.contact.force_pulse import pulse_length, pulse_spectrum
+from sonic_bullet.contact.pulse_shape import pulse_length, pulse_spectrum
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.presets import load_material
 from sonic_bullet.radiation.far_field import jerk_coefficient

@@ -248,7 +248,7 @@ def modes(
     """Modes up to to_hz of a free body; load_kg: point masses at its surface's vertices; mass_points: of `matrices`."""
     from scipy.sparse import coo_array
 
-    from sonic_bullet.modal import eigen
+    from sonic_bullet.modal import lanczos
     from sonic_bullet.modal.sparse.ordering import dissection
 
     pascal = float(np.abs(stiffness_pa).max())
@@ -267,7 +267,7 @@ def modes(
     length = np.linalg.norm(np.ptp(body.node_m, axis=0))
     shift = -20 / length**2 * (2 * mass / density_kg_m3 / area / length) ** 2
     limit = (2 * np.pi * to_hz) ** 2 / rate
-    found = eigen.solve(
+    found = lanczos.solve(
         k_matrix[dof][:, dof], m_matrix[dof][:, dof], shift, rigid=6, enough=lambda v: bool(v[-1] > limit), most=300
     )
     keep = found.lambda_per_s2 <= limit

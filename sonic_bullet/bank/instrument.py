@@ -16,7 +16,7 @@ from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, FLUSH, LANE_PAIR, R
 from sonic_bullet.bank.mode_set import ModeSet, Translation
 from sonic_bullet.bank.tile import BLOCK
 from sonic_bullet.bank.transmission import OFF, SILENCED, TRANSMISSION
-from sonic_bullet.contact.force_pulse import pulse_table
+from sonic_bullet.contact.pulse_shape import pulse_table
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 

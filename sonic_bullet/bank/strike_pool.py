@@ -55,7 +55,7 @@ class BodyPulse(NamedTuple):
 
 @uncounted
 def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
-    """Interpolate the force at a fraction of the pulse in [0, 1], mean 1. hertz: table of `force_pulse`."""
+    """Interpolate the force at a fraction of the pulse in [0, 1], mean 1. hertz: table of `pulse_shape`."""
     if flat:
         return 0.5 * np.pi * np.sin(np.pi * share)
     cells = hertz.shape[1] - 1

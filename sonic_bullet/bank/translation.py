@@ -16,7 +16,7 @@ from __future__ import annotations
 from sonic_bullet.bank import drive
 from sonic_bullet.bank.kernels import uncounted
 from sonic_bullet.bank.layout import DRIVEN, FLOOR, FLUSH
-from sonic_bullet.contact.force_pulse import cumulated
+from sonic_bullet.contact.pulse_shape import cumulated
 
 
 @uncounted

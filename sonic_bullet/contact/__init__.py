@@ -2,8 +2,8 @@
 
     contact rows of a step -> contact_rows: pairs and their histories of load; contact_place: where on both surfaces
       -> load_splitting: what lasts is support, what is shorter a strike; friction is what moves under support
-           strike  -> strike_pulses: which strikes there are; strike_timing: their cause, and their time in the step;
-                      force_pulse: length and shape of the force; hertz: its law, as of all that follows
+           strike  -> strike_forces: its impulse and its pulse on both bodies' modes; strike_cause: how much of it has
+                      a cause; strike_timing: its time in the step; pulse_shape: length and shape; hertz: their law
            sliding -> friction: loads and speeds at audio rate; surface_kernel: the contact oscillator;
                       profile, track, octave_heights: heights of the surfaces it sweeps
            support -> contact_patches: points tracked and loads smoothed; coupling: springs, mobility, new poles

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.contact.load_splitting import HISTORY, NOW, SPAN
+from sonic_bullet.contact.load_splitting import HISTORY, NOW, opening
 from sonic_bullet.machine.compiled import njit
 
 
@@ -135,19 +135,3 @@ def _begin(pair, row):
         pair.direction[x] = 0.0
     for column in range(HISTORY):
         pair.force_n[column] = pair.struck_n[column] = 0.0
-
-
-@njit(nogil=True, error_model="numpy")
-def opening(force, column):
-    """Compute the opening of the load at a column: the best of the windows of SPAN steps around it.
-
-    Windows are cut where the future is not known.
-    """
-    best = 0.0
-    if force[column] > 0:
-        for first in range(max(column - SPAN + 1, 0), column + 1):
-            least = force[first]
-            for i in range(first + 1, min(first + SPAN, HISTORY)):
-                least = min(least, force[i])
-            best = max(best, least)
-    return best

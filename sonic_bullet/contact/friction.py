@@ -32,7 +32,7 @@ from sonic_bullet.contact.octave_heights import (
     height_octaves,
     slope_squared,
 )
-from sonic_bullet.contact.strike_pulses import STEEPEST
+from sonic_bullet.contact.strike_forces import STEEPEST
 from sonic_bullet.contact.surface_kernel import (
     DAMPING_RATIO,
     FASTEST_M_S,

@@ -8,7 +8,7 @@
     punch   K = 2E*√(A/π) of a disc [Johnson 1985, eq. 3.36],  π E* a/𝐊(e), e² = 1 − (b/a)², of an ellipse
             [Green & Sneddon 1950];   τ = π √(m*/K)
 
-All that knows these equations is here: strikes (`force_pulse`, `strike_pulses`), rolling and sliding (`surface_kernel`)
+All that knows these equations is here: strikes (`pulse_shape`, `strike_forces`), rolling and sliding (`surface_kernel`)
 and springs of bodies at rest (`coupling.springs`) call it.
 """
 # mypy: disable-error-code="no-untyped-def"

@@ -22,10 +22,9 @@ known) follows when the step itself is rendered, a step late.
 
 All impacts of a step share its time stamp; sounded there they would be a comb at the step rate. Surfaces met when gap
 and approach say; a neighbour that hands an impact on says when; where nothing does, impacts are spread over the step
-(`phase_in_step`).
-
-The loads themselves are split in `contact.strike_pulses`, on the tables of pairs.
+(`strike_timing`).
 """
+# mypy: disable-error-code="no-untyped-def"
 
 from __future__ import annotations
 
@@ -37,17 +36,61 @@ NOW = SPAN - 1
 LOOKAHEAD = SPAN - 1
 HISTORY = 2 * SPAN - 1
 """Steps of load that are stored for a pair; column SPAN - 1 is the step being rendered."""
-GOLDEN_SECTION = 0.6180339887498949
-EDGE_MARGIN = 0.02
-"""Fraction of a step next to its edges to which nothing is spread."""
+STEPS = SPAN - 1
+"""Steps that one strike takes at most."""
 
 
 @njit(nogil=True, error_model="numpy")
-def phase_in_step(seed: int, count: int) -> float:
-    """Compute the fraction of a step at which a body's count-th undated impact acts: EDGE_MARGIN … 1 - EDGE_MARGIN.
+def opening(force, column):
+    """Compute the opening of the load at a column: the best of the windows of SPAN steps around it.
 
-    Multiples of the golden ratio from a start of the body's own: of all such sequences the most even, however many
-    impacts there are [Knuth, The Art of Computer Programming 3, 1998, sec. 6.4, theorem S]. seed: 32 bits.
+    Windows are cut where the future is not known.
     """
-    phase = seed / 4294967296.0 + GOLDEN_SECTION * count
-    return EDGE_MARGIN + (1.0 - 2.0 * EDGE_MARGIN) * (phase - int(phase))
+    best = 0.0
+    if force[column] > 0:
+        for first in range(max(column - SPAN + 1, 0), column + 1):
+            least = force[first]
+            for i in range(first + 1, min(first + SPAN, HISTORY)):
+                least = min(least, force[i])
+            best = max(best, least)
+    return best
+
+
+@njit(nogil=True, error_model="numpy")
+def split_loads(ahead, number, window, pairs, strikes):
+    """Find the strikes in the loads of step ``number``, ``ahead`` after the one being rendered; mark them as used.
+
+    Returns the number of strikes; their bodies, fractions and rows are set. An opening that the future could still
+    lower is taken as high as it may be, so that support is never struck; a later call gives a strike what it lacked.
+    """
+    found, rows = 0, window.row
+    for i in range(pairs.count[0]):
+        pair, column = pairs.pair[pairs.active[i]], NOW + ahead
+        force = pair.force_n
+        if not force[column] > force[column - 1]:
+            continue
+        strike = strikes[found]
+        for j in range(STEPS):
+            strike.share[j] = 0.0
+        for j in range(STEPS):
+            load = force[column + j]
+            excess = load - opening(force, column + j) - pair.struck_n[column + j]
+            if not excess > 1e-9 * load:  # rounding of the sums is no impact
+                break
+            pair.struck_n[column + j] += excess
+            strike.share[j] = excess / load
+            first, last = window.step[(number + j) % SPAN].row
+            stop = last
+            while first < stop:  # its first row: they are sorted
+                middle = (first + stop) // 2
+                if rows[middle].key < pair.key:
+                    first = middle + 1
+                else:
+                    stop = middle
+            while stop < last and rows[stop].key == pair.key:
+                stop += 1
+            strike.row[j, 0], strike.row[j, 1] = first, stop
+        if strike.share[0] > 0:
+            strike.body[0], strike.body[1] = pair.body[0], pair.body[1]
+            found += 1
+    return found

@@ -2,10 +2,9 @@
 
 Recordings against the fitted model, candidate effects tried on strikes they were not fitted to, a verdict.
 
-Case -> CaseFit (estimator) -> Struck bodies (struck_bodies.py) + Hypothesis (hypothesis.py) -> Evidence
-    (effect_evidence.py)
-  -> every candidate's `propose` -> leave one strike out, render, compare; control effects alike (cross_validation.py)
-  -> the best is added, and again -> Diagnosis: verdict, errors, predictions (diagnose.py) -> report, preset, WAV
+Case -> CaseFit (estimator) -> prediction/: struck bodies under a hypothesis, rendered -> evidence/: what effects read
+  -> `propose` of every candidate of `effects` -> selection/: strikes left out and rendered, with and without each
+  -> the best is added, and again -> diagnose.py: Diagnosis, with verdict, errors, predictions -> report, preset, WAV
 """
 
 from sonic_bullet.diagnosis.diagnose import Diagnosis, diagnose

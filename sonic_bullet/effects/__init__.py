@@ -1,6 +1,7 @@
-"""The physical effects that a model may lack, one short file each.
+"""The physical effects that a model may lack: a file each, or a folder with its search beside it.
 
-An effect from elsewhere is passed with these: `EFFECTS + (Mine,)`.
+`protocol` says what an effect is, `stages` what it acts on, `evidence` what it reads; `presets_of_effects` lists those
+that presets hold. An effect from elsewhere is passed with these: `EFFECTS + (Mine,)`.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sonic_bullet.machine.progress import report_progress
-from sonic_bullet.modal import cost, eigen, fem, lagrange
+from sonic_bullet.modal import cost, fem, lagrange, lanczos
 from sonic_bullet.modal.cost import ELEMENT_LIMITS
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
@@ -170,7 +170,7 @@ class Elements:
             k_matrix, mass = fem.assemble(solid, tensor, 1.0, nodes)
             if held.any():
                 k_matrix, mass = k_matrix[free][:, free], mass[free][:, free]
-            modes = eigen.solve(
+            modes = lanczos.solve(
                 k_matrix, mass, shift, rigid=rigid, enough=lambda value: bool(value[-1] > bound), most=most, report=True
             )
             keep = modes.lambda_per_s2 <= bound

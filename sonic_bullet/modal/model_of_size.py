@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.modal.model import damped
+from sonic_bullet.modal.modal_analysis import damped
 from sonic_bullet.records import Array, Material, ModalModel, isotropic_stiffness_pa
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import ModalError

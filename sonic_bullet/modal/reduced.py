@@ -5,7 +5,7 @@
     V: modes at ν₁ and ν₂ together, VᵀMV = 1;   (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ     [Rayleigh-Ritz]
 
 They span those a little beyond as well. The error of λ is of the fourth order in the distances from ν₁ and ν₂. Lengths
-by the body's diagonal L, as in model.py. The method for the modes at both is that of `analyse` (methods.py).
+by the body's diagonal L, as in modal_analysis.py. The method for the modes at both is that of `analyse` (methods.py).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
-from sonic_bullet.modal.model import diagonal_m, solid_key
+from sonic_bullet.modal.modal_analysis import diagonal_m, solid_key
 from sonic_bullet.modal.sectors import SECTORS, ModalMethod, Wanted
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Shape

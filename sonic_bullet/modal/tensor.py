@@ -20,7 +20,7 @@ import numpy as np
 from sonic_bullet.machine.progress import progress_to, report_progress
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
-from sonic_bullet.modal.model import diagonal_m
+from sonic_bullet.modal.modal_analysis import diagonal_m
 from sonic_bullet.modal.sectors import SECTORS
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import ORTHOTROPIC, Array, Shape
@@ -298,7 +298,7 @@ def _of_elements(
     clamp: Array,
     edge_m: float | None,
 ) -> TensorFamily:
-    from sonic_bullet.modal import eigen, fem
+    from sonic_bullet.modal import fem, lanczos
     from sonic_bullet.modal.meshing.shape_meshes import fill
     from sonic_bullet.modal.meshing.solid import Solid
 
@@ -328,7 +328,7 @@ def _of_elements(
     for number, anchor in enumerate([TENSOR_MODES.anchors[i] for i in TENSOR_MODES.fewer]):
         report_progress(f"tensor {number + 1} of {len(TENSOR_MODES.fewer)}")
         whole = sum(c * matrix for c, matrix in zip(constants_of(anchored(*anchor, poisson)), stiff, strict=True))
-        modes = eigen.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
+        modes = lanczos.solve(whole, mass, shift, rigid=rigid, enough=lambda value: len(value) >= wanted, most=wanted)
         vectors.append(modes.vector)
     every = np.concatenate(vectors, axis=1)
     basis = _spanning(every, every.T @ (mass @ every))

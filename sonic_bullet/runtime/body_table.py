@@ -15,8 +15,8 @@ import numpy as np
 from sonic_bullet.bank.resonator import Resonator
 from sonic_bullet.bank.rigid_motion import rigid_shape
 from sonic_bullet.contact.coupling import ContactSide
-from sonic_bullet.contact.force_pulse import spectrum_table
 from sonic_bullet.contact.load_splitting import SPAN
+from sonic_bullet.contact.pulse_shape import spectrum_table
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.records.roughness import track_slopes
 from sonic_bullet.records.touching.surface_form import SurfaceForm

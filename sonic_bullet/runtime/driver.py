@@ -26,7 +26,7 @@ from sonic_bullet.contact.contact_patches import choose_bodies, count_separation
 from sonic_bullet.contact.contact_rows import enter_loads, orient
 from sonic_bullet.contact.friction import advance_friction
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, SPAN
-from sonic_bullet.contact.strike_pulses import STRIKE, find_pulses
+from sonic_bullet.contact.strike_forces import STRIKE, find_pulses
 from sonic_bullet.contact.surface_kernel import VOICE
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.grouping import grouping

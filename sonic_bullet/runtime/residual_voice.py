@@ -24,7 +24,7 @@ import numpy as np
 from sonic_bullet.bank import ModeSet, audible
 from sonic_bullet.bank.resonator import Resonator, build_resonator
 from sonic_bullet.bank.rigid_motion import with_rigid
-from sonic_bullet.contact.force_pulse import pulse_spectrum
+from sonic_bullet.contact.pulse_shape import pulse_spectrum
 from sonic_bullet.machine.while_alive import WhileAlive
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
@@ -58,7 +58,7 @@ class ForcePulse:
     modes_low, modes_high : (m,)
         Uᵀj of the whole impulse in N·s/√kg.
     share
-        Transmitted fraction of all these (contact.force_pulse.compliance).
+        Transmitted fraction of all these (contact.pulse_shape.compliance).
     """
 
     low: int

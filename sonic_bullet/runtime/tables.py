@@ -138,7 +138,7 @@ PULSE = np.dtype(
         ("start_s", "f8"),  # after the start of the step it was found in; before it, where negative
         ("length_s", "f8"),
         ("flat", "i8"),  # half-sine, not Hertz'
-        ("share", "f8"),  # transmitted fraction of the impulse (contact.force_pulse.compliance)
+        ("share", "f8"),  # transmitted fraction of the impulse (contact.pulse_shape.compliance)
         ("impulse_n_s", "f8", (3,)),  # on the lower body, world frame
         ("ahead", "i8"),  # 0: found in the step being rendered, 1: in the one after it
     ],

@@ -6,7 +6,7 @@
 
 Table, cues, overlay and picture show this one list.
 
-Nothing is judged here a second time: an impact is a pulse that the run time plays (contact.strike_pulses), a roll or a
+Nothing is judged here a second time: an impact is a pulse that the run time plays (contact.strike_forces), a roll or a
 slide a pair whose contact oscillator makes a force (contact.friction). Slip decides which of both: a contact slides
 where it slips faster than the least audible sweep, and than half of its own. What carries load and does neither is
 support; a load that leaps and is not accepted is a strike without a cause.

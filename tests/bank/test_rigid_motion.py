@@ -11,7 +11,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.bank.rigid_motion import LOWEST_HZ
-from sonic_bullet.contact.force_pulse import pulse_spectrum
+from sonic_bullet.contact.pulse_shape import pulse_spectrum
 from sonic_bullet.files import read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.modal import analyse

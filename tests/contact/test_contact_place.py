@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sonic_bullet.contact import force_pulse as pulse
+from sonic_bullet.contact import pulse_shape as pulse
 from sonic_bullet.contact.contact_place import add_modal_impulse, effective_mass, flat_area_m2, touch
 from sonic_bullet.contact.hertz import contact_modulus
 from sonic_bullet.geometry import closest_point

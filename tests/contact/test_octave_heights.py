@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sonic_bullet.contact import octave_heights
-from sonic_bullet.contact.force_pulse import rough_share
 from sonic_bullet.contact.profile import sweep_profile
+from sonic_bullet.contact.pulse_shape import rough_share
 from sonic_bullet.contact.track import sweep_track
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.vector import At

@@ -248,7 +248,7 @@ def missing_modules(text: str) -> list[str]:
 
 
 def test_docstrings_name_modules_that_exist() -> None:
-    assert missing_modules("pour.py, contact/force_pulse.py, `sonic_bullet.bank`, `files.write_audio`") == []
+    assert missing_modules("pour.py, contact/pulse_shape.py, `sonic_bullet.bank`, `files.write_audio`") == []
     assert missing_modules("bank/tally.py `bank.tally` sonic_bullet.bank.tally") == [
         "bank/tally.py", "bank.tally", "sonic_bullet.bank.tally"
     ]  # fmt: skip

@@ -23,7 +23,7 @@ NOWHERE = np.zeros(3)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strike:
-    """A finite force pulse on one body (contact.force_pulse).
+    """A finite force pulse on one body (contact.pulse_shape).
 
     start: absolute time of its begin in samples (any fraction). length_s, flat (half-sine, else Hertz'): its shape.
     gain (m,): φᵀĵ of the body's modes in N·s/√kg. rigid_impulse_n_s (3,): the impulse, for its translations.

@@ -11,7 +11,7 @@ from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.contact.contact_patches import CONTACT_PATCH
 from sonic_bullet.contact.contact_rows import enter_loads, orient
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, SPAN
-from sonic_bullet.contact.strike_pulses import STRIKE, find_pulses
+from sonic_bullet.contact.strike_forces import STRIKE, find_pulses
 from sonic_bullet.machine.grouping import gather
 from sonic_bullet.path.images.image_gains import IMAGE
 from sonic_bullet.records import Air, Array, Body

@@ -18,7 +18,7 @@ from sonic_bullet.modal.meshing.filling import LATTICE, Filler, TooThinError
 from sonic_bullet.modal.meshing.shape_meshes import Filled, fill
 from sonic_bullet.modal.meshing.surfaces import prepared
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.model import _unit_of
+from sonic_bullet.modal.modal_analysis import _unit_of
 from sonic_bullet.modal.sectors import Wanted
 from sonic_bullet.records import Shape
 from sonic_bullet.records.errors import MeshError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sonic_bullet.modal import analyse, eigen, fem
+from sonic_bullet.modal import analyse, fem, lanczos
 from sonic_bullet.modal.meshing import structured
 from sonic_bullet.records import Material, Shape, isotropic_stiffness_pa
 from sonic_bullet.records.errors import MeshError, ModalError
@@ -28,7 +28,7 @@ def quick(shape: Shape, material: Material, **more: object):  # type: ignore[no-
 def test_six_rigid_modes_and_mass_normalised_shapes() -> None:
     solid = structured.box(np.array([0.2, 0.02, 0.02]), (10, 2, 2))
     stiffness, mass = fem.assemble(solid, isotropic_stiffness_pa(200e9, 0.3), 7850.0)
-    modes = eigen.solve(stiffness, mass, -1e7, rigid=6, enough=lambda v: len(v) >= 10, most=10)
+    modes = lanczos.solve(stiffness, mass, -1e7, rigid=6, enough=lambda v: len(v) >= 10, most=10)
     assert len(modes.rigid_per_s2) == 6
     assert np.abs(modes.rigid_per_s2).max() < 1e-6 * modes.lambda_per_s2[0]
     assert np.abs(modes.vector.T @ (mass @ modes.vector) - np.eye(modes.vector.shape[1])).max() < 1e-10
@@ -39,7 +39,7 @@ def test_no_mode_is_missed() -> None:
     """Sylvester's law of inertia: as many negative pivots of K − μM as eigenvalues below μ [Parlett 1980, ch. 3.3]."""
     solid = structured.sphere(1.0, 2)
     stiffness, mass = fem.assemble(solid, isotropic_stiffness_pa(1.0, 0.3), 1.0)
-    modes = eigen.solve(stiffness, mass, -1.0, rigid=6, enough=lambda v: len(v) >= 40, most=40)
+    modes = lanczos.solve(stiffness, mass, -1.0, rigid=6, enough=lambda v: len(v) >= 40, most=40)
     inside = (modes.lambda_per_s2[30] + modes.lambda_per_s2[31]) / 2
     if modes.lambda_per_s2[31] - modes.lambda_per_s2[30] < 1e-6:
         inside = modes.lambda_per_s2[30] * 1.001
@@ -147,7 +147,7 @@ def test_cache_gives_the_same_bits_and_survives_damage(
     fresh = quick(BAR, steel, cache=tmp_path)
     files = sorted(tmp_path.glob("*.npz"))
     assert len(files) == 2 and not list(tmp_path.glob("*partial*"))
-    monkeypatch.setattr(eigen, "solve", lambda *_, **__: pytest.fail("solved again"))
+    monkeypatch.setattr(lanczos, "solve", lambda *_, **__: pytest.fail("solved again"))
     again = quick(BAR, replace(steel, alpha_per_s=5.0), cache=tmp_path)  # damping alone does not solve again
     assert again.shape.tobytes() == fresh.shape.tobytes()
     monkeypatch.undo()

@@ -11,7 +11,7 @@ import pytest
 from sonic_bullet import bank
 from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.bank.rigid_motion import LOWEST_HZ
-from sonic_bullet.contact.force_pulse import pulse_spectrum
+from sonic_bullet.contact.pulse_shape import pulse_spectrum
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.radiation.far_field import jerk_coefficient, radiation
 from sonic_bullet.records import Air, Array, Microphone, ModalSum, Vibrometer

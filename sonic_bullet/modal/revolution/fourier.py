@@ -9,7 +9,7 @@ from itertools import count
 import numpy as np
 
 from sonic_bullet.machine.progress import report_progress
-from sonic_bullet.modal import eigen, polynomials
+from sonic_bullet.modal import lanczos, polynomials
 from sonic_bullet.modal.revolution import facets, rings, skin
 from sonic_bullet.modal.revolution.rings import Revolved
 from sonic_bullet.modal.revolution.section import Section, sectioned
@@ -98,7 +98,7 @@ class Fourier:
         stiff, mass = problems.problem(m)
         solved, lowest = [], []
         for matrix, bound in zip(stiff, bounds, strict=True):
-            modes = eigen.solve(
+            modes = lanczos.solve(
                 matrix,
                 mass,
                 -SECTORS.shift * self.thickness**2,

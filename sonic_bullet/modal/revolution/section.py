@@ -4,7 +4,7 @@
     size inside: the least of size + slope x distance over the outline
     outline -> points so far apart -> Delaunay, lattices inside, one a halving of the size -> sides bent to the outline
 
-Lengths are those of a body without units (see model.py).
+Lengths are those of a body without units (see modal_analysis.py).
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from sonic_bullet.contact.coupling import (
 from sonic_bullet.contact.coupling.mobility import BodyMobility
 from sonic_bullet.contact.coupling.springs import ContactSide
 from sonic_bullet.contact.load_splitting import SPAN
-from sonic_bullet.contact.strike_pulses import STRUCK_FLAT
+from sonic_bullet.contact.strike_forces import STRUCK_FLAT
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.supports.patch_points import make_ready, placed_points
 from sonic_bullet.runtime.supports.turned_modes import turn_modes

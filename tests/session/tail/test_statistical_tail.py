@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonic_bullet.contact.force_pulse import compliance, spectrum_table
+from sonic_bullet.contact.pulse_shape import compliance, spectrum_table
 from sonic_bullet.files import read_model, write_model
 from sonic_bullet.presets import load_material
 from sonic_bullet.radiation.radiated import radiation_of

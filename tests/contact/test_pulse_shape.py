@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sonic_bullet.contact import force_pulse as pulse
+from sonic_bullet.contact import pulse_shape as pulse
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from tests.made.pulses import cumulated_force, pulse_nodes

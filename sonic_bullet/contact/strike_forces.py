@@ -1,4 +1,4 @@
-"""Strikes of one physics step, from the pairs' loads and contact rows to force pulses on modes.
+"""Where a contact becomes a force: from pairs' loads and contact rows to the strikes' force pulses on modes.
 
     PAIR: load F - opening of F, over a rising edge -> STRIKE, with its fraction of up to three steps   [load_splitting]
         + ROW of these steps -> impulse, normal, lever, approach; what of it has a cause
@@ -21,12 +21,12 @@ from sonic_bullet.contact.contact_place import (
     touch,
     turn_modal_impulse,
 )
-from sonic_bullet.contact.contact_rows import opening
 from sonic_bullet.contact.coupling.springs import PERSSON
-from sonic_bullet.contact.force_pulse import compliance, pulse_length, rough_share
 from sonic_bullet.contact.hertz import ball_stiffness, contact_modulus, impact_depth_m
-from sonic_bullet.contact.load_splitting import NOW, SPAN
-from sonic_bullet.contact.strike_timing import accept, date_strikes
+from sonic_bullet.contact.load_splitting import NOW, SPAN, STEPS, split_loads
+from sonic_bullet.contact.pulse_shape import compliance, pulse_length, rough_share
+from sonic_bullet.contact.strike_cause import accept, is_recreated, set_unheld_steps
+from sonic_bullet.contact.strike_timing import date_by_gap, date_others, set_starts
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records.roughness import WAVE_M
 
@@ -39,14 +39,6 @@ STRUCK_FLAT = 0.02
 LEAST_JUMP_M_S = 1e-6
 """An impact that changes the speed of its effective mass by less is ignored: a body of 10 cm sends 0 dB SPL to 1 m
 then."""
-STEPS = SPAN - 1
-"""Steps that one strike takes at most."""
-RECREATED = 3.0
-"""How many times its fixed point a bounce that gravity and the integration repeat reaches: a point that bounces with
-restitution e on steps of dt stops losing speed at g·dt·e/(1-e); corners of bars, plates and boxes do up to 2.8 times as
-much (Bullet, e 0.3 … 0.8, 1/60 … 1/1000 s).
-"""
-
 STRIKE = np.dtype(
     [
         ("body", "i8", (2,)),
@@ -77,8 +69,8 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
 
     They are written to scratch.pulse and modal_impulse (pulses, 2, columns) from ``found`` on; returns the new number.
     Loads that they use are marked as used. Call with ahead = 0 first. Pairs that cannot sound (no modes, no moving
-    volume) are skipped, and those of which neither moves. A strike is dated by gap and approach (`_gather`), else by
-    `date_strikes`; where the bodies overlap as the step starts, back into the step being rendered.
+    volume) are skipped, and those of which neither moves. A strike of bodies that overlap as the step starts is dated
+    back into the step being rendered.
 
     Parameters
     ----------
@@ -102,7 +94,8 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
     caused = False
     for q in range(struck):
         strike = strikes[q]
-        _gather(strike, window.row, back_s, dt_s)
+        _gather(strike, window.row)
+        date_by_gap(strike, window.row, back_s, dt_s)
         n, low, high = strike.normal, strike.body[0], strike.body[1]
         # a tenth for a solver's remainder, a hundredth in every direction for wedged bodies
         fall = 1.1 * abs(n[0] * g[0] + n[1] * g[1] + n[2] * g[2]) * dt_s + 0.01 * gravity
@@ -121,120 +114,16 @@ def find_pulses(ahead, number, found, window, table, pairs, strikes, scratch):
             ):
                 strike.pulse, strike.length_s = found, pulse.length_s
                 found += 1
-        date_strikes(strikes, struck, bodies, held, back_s, dt_s)
-        for q in range(struck):
-            if strikes[q].pulse >= 0:
-                pulse, meets_s = scratch.pulse[strikes[q].pulse], strikes[q].meets_s
-                late_s = 0.0 if ahead or meets_s >= 0.0 else back_s  # found a step late: it keeps its phase
-                pulse.start_s, pulse.ahead = min(meets_s + late_s, dt_s), ahead
+        date_others(strikes, struck, bodies, held, back_s, dt_s)
+        set_starts(strikes, struck, scratch.pulse, ahead, back_s, dt_s)
     return found
 
 
 @njit(nogil=True, error_model="numpy")
-def is_recreated(bodies, low, high, approach_m_s, fall_m_s, number):
-    """Return whether gravity and the integration repeat a strike of a body at rest; else record it as the last cause.
-
-    fall_m_s: speed that gravity gives along the normal in a step. Bounces of restitution e lose speed at g (1-e)/(2e)
-    [a flight 2ve/g long loses (1-e)v]. Half of that is required of them, for solvers give back up to 15 % more than e,
-    and gravity of a step as well. A strike that comes sooner than after a flight of that speed, no faster than
-    `RECREATED` allows, and faster than the last cause leaves it by now, has no cause but the steps' length.
-
-    A body that leaves at v is back after 2v/g at most: its fastest strike since then is all that is left of that cause.
-    Corners of a plate strike many times in a flight, and lose sooner what a ball would keep.
-    """
-    e = min(bodies[low].rebound * bodies[high].rebound, 1.0)
-    limit = RECREATED * max(1.0, e / max(1.0 - e, 1e-9))
-    loss_m_s = fall_m_s * (1.0 - e) / (4.0 * max(e, 1e-9))  # a step
-    left, recent = 0.0, True
-    for body in (low, high):
-        one = bodies[body]
-        if one.mass_kg > 0:
-            if one.since_m_s > 0 and (number - one.cause_step) * fall_m_s >= 2.0 * one.cause_m_s:
-                one.cause_m_s, one.cause_step, one.since_m_s = one.since_m_s, one.since_step, 0.0
-            left = max(left, one.cause_m_s - loss_m_s * max(number - one.cause_step, 0))
-            recent = recent and number - one.loaded <= 2.0 * limit + 2.0
-    if recent and left < approach_m_s <= limit * fall_m_s:
-        return True
-    for body in (low, high):
-        one = bodies[body]
-        if approach_m_s >= one.cause_m_s - loss_m_s * max(number - one.cause_step, 0):
-            one.cause_m_s, one.cause_step, one.since_m_s = approach_m_s, number, 0.0
-        elif approach_m_s >= one.since_m_s - loss_m_s * max(number - one.since_step, 0):
-            one.since_m_s, one.since_step = approach_m_s, number
-    return False
-
-
-@njit(nogil=True, error_model="numpy")
-def split_loads(ahead, number, window, pairs, strikes):
-    """Find the strikes in the loads of step ``number``, ``ahead`` after the one being rendered; mark them as used.
-
-    Returns the number of strikes; their bodies, fractions and rows are set. An opening that the future could still
-    lower is taken as high as it may be, so that support is never struck; a later call gives a strike what it lacked.
-    """
-    found, rows = 0, window.row
-    for i in range(pairs.count[0]):
-        pair, column = pairs.pair[pairs.active[i]], NOW + ahead
-        force = pair.force_n
-        if not force[column] > force[column - 1]:
-            continue
-        strike = strikes[found]
-        for j in range(STEPS):
-            strike.share[j] = 0.0
-        for j in range(STEPS):
-            load = force[column + j]
-            excess = load - opening(force, column + j) - pair.struck_n[column + j]
-            if not excess > 1e-9 * load:  # rounding of the sums is no impact
-                break
-            pair.struck_n[column + j] += excess
-            strike.share[j] = excess / load
-            first, last = window.step[(number + j) % SPAN].row
-            stop = last
-            while first < stop:  # its first row: they are sorted
-                middle = (first + stop) // 2
-                if rows[middle].key < pair.key:
-                    first = middle + 1
-                else:
-                    stop = middle
-            while stop < last and rows[stop].key == pair.key:
-                stop += 1
-            strike.row[j, 0], strike.row[j, 1] = first, stop
-        if strike.share[0] > 0:
-            strike.body[0], strike.body[1] = pair.body[0], pair.body[1]
-            found += 1
-    return found
-
-
-@njit(nogil=True, error_model="numpy")
-def set_unheld_steps(ahead, number, pairs, bodies, held):
-    """Set held (b,): steps for which gravity may have moved each mobile body although it rests.
-
-    1 where it carried load on any pair within the STEPS before, SPAN where it was just placed: Bullet finds the corners
-    of a resting box one a step, and it tilts meanwhile.
-    """
-    for i in range(len(bodies)):
-        held[i] = 0.0
-    for i in range(pairs.count[0]):
-        pair = pairs.pair[pairs.active[i]]
-        for column in range(NOW + ahead - STEPS, NOW + ahead):
-            if pair.force_n[column] > 0:
-                held[pair.body[0]] = held[pair.body[1]] = 1.0
-    for i in range(len(bodies)):
-        if bodies[i].mass_kg <= 0:
-            held[i] = 0.0
-        elif number - bodies[i].placed < SPAN:
-            held[i] = SPAN
-
-
-@njit(nogil=True, error_model="numpy")
-def _gather(strike, rows, back_s, dt_s):
-    """Sum over a strike's rows, each weighted by the fraction of its step that is strike; no budget as yet.
-
-    It is dated to gap/approach of the row with the largest product of load and approach, of those that met within the
-    step or the one before, dt_s and back_s long. A gap of exactly 0 is one that nobody knows.
-    """
+def _gather(strike, rows):
+    """Sum over a strike's rows, each weighted by the fraction of its step that is strike; no budget as yet."""
     j, n, arm, centre = strike.impulse_n_s, strike.normal, strike.arm_m, strike.centre_m
-    raw, approach, most = 0.0, 0.0, 0.0
-    strike.dated = strike.overlaps = 0
+    raw, approach = 0.0, 0.0
     for x in range(3):
         j[x] = n[x] = arm[0, x] = arm[1, x] = centre[x] = 0.0
     for delay in range(STEPS):
@@ -245,12 +134,6 @@ def _gather(strike, rows, back_s, dt_s):
                 load, speed = row.load_n_s * share, row.approach_m_s
                 raw += load
                 approach = max(approach, speed)
-                if delay == 0 and row.gap_m < 0.0:
-                    strike.overlaps = 1
-                if delay == 0 and load * speed > most and row.gap_m != 0.0:
-                    meets_s = row.gap_m / speed
-                    if -back_s <= meets_s <= dt_s:
-                        most, strike.meets_s, strike.dated = load * speed, meets_s, 1
                 for x in range(3):
                     j[x] += share * row.impulse_n_s[x]
                     n[x] += load * row.normal[x]

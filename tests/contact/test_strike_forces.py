@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sonic_bullet.contact import strike_pulses
-from sonic_bullet.contact.force_pulse import spectrum_table
+from sonic_bullet.contact import load_splitting, strike_cause
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, NOW, SPAN
-from sonic_bullet.contact.strike_pulses import STRIKE
+from sonic_bullet.contact.pulse_shape import spectrum_table
+from sonic_bullet.contact.strike_forces import STRIKE
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import Contacts
@@ -23,17 +23,17 @@ DT = 1 / 240
 
 @njit(nogil=True)
 def split_loads(*arguments: Any) -> Any:
-    return strike_pulses.split_loads(*arguments)
+    return load_splitting.split_loads(*arguments)
 
 
 @njit(nogil=True)
 def accept(*arguments: Any) -> None:
-    strike_pulses.accept(*arguments)
+    strike_cause.accept(*arguments)
 
 
 @njit(nogil=True)
 def set_unheld_steps(*arguments: Any) -> None:
-    strike_pulses.set_unheld_steps(*arguments)
+    strike_cause.set_unheld_steps(*arguments)
 
 
 def contacts(load_n: dict[tuple[int, int], float], *, points: int = 1) -> Contacts:
