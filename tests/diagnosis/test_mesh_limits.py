@@ -100,11 +100,6 @@ def test_a_mode_below_the_bands_edge_that_nobody_hears_is_the_meshs(reach: float
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="five strikes whose gap is mostly the mesh's own say 1.8 for the name, not 6 (2 Δ ln L): what the mesh "
-    "leaves has to be taken from each strike's gap first; the answer is unexplained, and no name",
-)
 def test_a_name_is_judged_by_what_a_finer_mesh_would_leave() -> None:
     """More than half of what is open is the mesh's: a name that closes the rest is the right one; not where something
     else is open beside it.

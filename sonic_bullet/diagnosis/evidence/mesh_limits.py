@@ -60,6 +60,15 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
     return h, most
 
 
+def finer_mesh_db(h: Hypothesis, problem: DiagnosisProblem) -> Array:
+    """Compute how much nearer a finer mesh would come (s,), in dB, at each strike: what moved modes take away."""
+    far, most = beyond(h, problem)
+    if not most:
+        return np.zeros(len(problem.takes))
+    now, then = problem.predict(h), problem.predict(far)
+    return np.array([max(t.distance(now[t.body]) - t.distance(then[t.body]), 0.0) for t in problem.takes])
+
+
 def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
     """Move a body's modes near the band's upper edge outside it, from the top, where strikes are nearer so."""
     nearer_db = 0.05  # without a mode, that ought to be silent

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
+from sonic_bullet.diagnosis.evidence.mesh_limits import finer_mesh_db
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
@@ -138,7 +139,7 @@ class Fold:
     least : float
         The same, or a smaller distance by corrections alone where they are learnt again.
     noise : float
-        Distance by noise alone.
+        Distance by noise alone, and what a finer mesh would take away: no effect closes that.
     """
 
     take: Judged
@@ -159,7 +160,7 @@ def _folds(
     """
     rng = np.random.default_rng([problem.seed, 1])
     made = []
-    for take in problem.takes:
+    for take, mesh_db in zip(problem.takes, finer_mesh_db(h, problem), strict=True):
         if isinstance(take, Listed):
             mine, start = take.rest(problem.bodies, h)
             less = evidence_of(start, mine, evidence.band_hz, seed=problem.seed)
@@ -170,7 +171,7 @@ def _folds(
         p = predict(base, take.body)
         before = take.distance(p)
         if np.isfinite(before):  # of the others alone a model may come that cannot be played
-            made.append(Fold(take, mine, less, base, before, before, take.least(p)))
+            made.append(Fold(take, mine, less, base, before, before, take.least(p) + mesh_db))
     return made
 
 
