@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sonic_bullet.diagnosis.evidence.mesh_limits import FAR_FOR_MESH, beyond
+from sonic_bullet.diagnosis.evidence.mesh_limits import FAR_FOR_MESH, beyond, finer_mesh_db
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import ordered
@@ -120,3 +120,11 @@ def test_nothing_is_put_anywhere_where_every_mode_has_its_line() -> None:
     far, most = beyond(h, posed((body,), takes))
     assert most == 0.0 and far is h
     assert closed(h, (body,), takes, (), BAND).verdict == "none"
+
+
+def test_modes_of_another_tensor_are_no_coarse_meshs() -> None:
+    """A tensor's modes are as many as its own solve gives: none is paired with a line of the bare body's."""
+    body, h, takes = misjudged(np.zeros(18))
+    h = replace(h, correction={body.name: np.zeros(20)})
+    assert beyond(h, posed((body,), takes)) == (h, 0.0)
+    assert not finer_mesh_db(h, posed((body,), takes)).any()

@@ -40,15 +40,10 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
     Hypothesis, float
         With these corrections, and the largest move, relative: 0 where there was none.
     """
-    start, most = h, 0.0
-    mine = [
-        b
-        for b in problem.bodies
-        if b.recorded is not None
-        and b.family is not None
-        and len(b.fitted) >= LEAST_STRIKES
-        and b.name in (h.correction or {})
-    ]
+    start, most, learnt = h, 0.0, h.correction or {}
+    fitted = [b for b in problem.bodies if b.recorded is not None and b.family is not None]
+    # modes of another tensor have no lines yet
+    mine = [b for b in fitted if len(b.fitted) >= LEAST_STRIKES and len(learnt.get(b.name, ())) == len(b.line)]
     for body in mine:
         found, off = _put(predict(h, body))
         if off:
