@@ -1,13 +1,16 @@
 """Finite elements as a method (methods.py): tetrahedra for any body, clamped or free, of any material.
 
 Polynomials are of degree 3 (lagrange.py); of degree 2 where the user gives elements smaller than a bar is thick. The
-first size comes from the shortest wave asked for. Elements are too stiff: f falls as they get smaller, and two sizes
-give an estimate of what to subtract [Richardson 1911]:
+first size comes from the shortest wave asked for.
 
-    f(h) = f + C h^p,   (f(rh) − f(h)) / (r^p − 1) is subtracted from f(h) with a middle p, 1 % at most.
+Elements are too stiff: a frequency is too high by something between nothing and the least of two estimates,
 
-The true p is not known. The error may be what the least p makes of it, or none: where the coarser size misses a part of
-the body, both differ by far more than the finer one errs. The distance to the farther of these two is reported.
+    by recovered stress                               (element_errors.py)
+    (f(p − 1) − f(p)) / ((p/(p − 1))^s − 1), s = 2    same elements, one degree less (p): spaces contain each other,
+
+errors fall as p^-4μ beside a crease [Babuška & Suri 1994, sec. 3], and no crease has a μ below 1/2 [Williams 1952].
+Half of it is subtracted, 1 % at most. The distance to the farther end is reported. Where the size changes the body,
+too, its change from another size is reported if it is more.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ import numpy as np
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, fem, lagrange, lanczos
 from sonic_bullet.modal.cost import ELEMENT_LIMITS
+from sonic_bullet.modal.element_errors import extended, log_changes, recovered_errors
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
@@ -117,39 +121,40 @@ class Elements:
         """
         raw = self._solved(tensors, wanted)
         nodes, free, _ = raw.place
-        less = self._less(tensors[0], raw.found[0][0])
-        most_off = 0.01  # where two sizes differ by more, errors do not follow a power yet
-        off = np.clip(np.nan_to_num(less[1]), -most_off, most_off) if self._same_body else np.zeros(less.shape[1])
-        left = np.maximum(np.abs(less[0]) - np.abs(off), np.abs(off))
-        found = tuple((value * np.exp(-2 * _as_long(off, len(value))), vector) for value, vector in raw.found)
+        most = self._most(tensors[0], raw)
+        most_off = 0.01  # where elements err by more, their stress tells it badly
+        off = np.minimum(np.nan_to_num(most) / 2, most_off) if self._same_body else np.zeros(len(most))
+        left = np.maximum(most - off, off)
+        found = tuple((value * np.exp(-2 * extended(off, len(value))), vector) for value, vector in raw.found)
         return [raw._replace(found=found, place=(nodes, free, left))]
 
-    def _less(self, tensor: Array, fine: Array) -> Array:
-        """Estimate ln f of modes with λ ``fine`` (m,) minus its limit for h → 0: (2, m) by `orders`.
+    def _most(self, tensor: Array, raw: Sector) -> Array:
+        """Estimate the most by which ln f of a tensor's modes (m,) may be too high; NaN where the user gave a size.
 
-        Where no coarser body can be made, the same elements with polynomials of one degree less give the largest, and 0
-        is the middle. NaN where the user gave the size.
+        Of a body that another size changes, the most by which that changes them if it is more.
         """
-        # Orders of convergence of frequencies in h, by degree: least and middle. Smooth lumps have 4 [Strang & Fix
-        # 1973, ch. 6.3]. Lower orders are measured where walls are an element thick, and along creases, where stress
-        # is singular.
-        orders = {2: (2.0, 3.0), 3: (2.0, 2.5)}
+        fine = raw.found[0][0]
         if self.at_size is None or not len(fine):
-            return np.full((2, len(fine)), np.nan)
-        sized, ratio = self._coarser()
-        coarser = sized or self._with_degree(self.degree - 1)
+            return np.full(len(fine), np.nan)
+        power = 2.0  # 4μ of a cut, μ = 1/2: no crease is sharper. Of the size, where nothing is singular: the least
+        held = fem.clamped(self.solid, self.clamp / self.length_m)
+        most = recovered_errors(self.solid, raw.place[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
+        lower = self._lost(self._with_degree(self.degree - 1), tensor, fine)
+        most = np.fmin(most, np.maximum(lower, 0) / ((self.degree / (self.degree - 1)) ** power - 1))
+        coarser, ratio = (None, np.nan) if self._same_body else self._coarser()
+        if coarser is not None:
+            lower = self._lost(coarser, tensor, fine) / (ratio**power - 1)
+        return most if self._same_body else np.asarray(np.fmax(most, np.abs(lower)))
+
+    def _lost(self, other: Elements, tensor: Array, fine: Array) -> Array:
+        """Compute ln f of other elements minus that of modes with λ ``fine`` (m,), NaN where they have none."""
         name = np.asarray(tensor).tobytes()
         try:
-            if len(coarser.known.get(name, ())) < len(fine):
-                coarser._solved([tensor], Wanted(np.inf, len(fine)))
+            if len(other.known.get(name, ())) < len(fine):
+                other._solved([tensor], Wanted(np.inf, len(fine)))
         except ModalError:  # walls too thin for its rigid motions to be told from its modes
-            return np.full((2, len(fine)), np.nan)
-        coarse = coarser.known[name][: len(fine)]
-        lost = np.log(_as_long(coarse / fine[: len(coarse)], len(fine))) / 2
-        # modes closer to one another than their correction may have changed places: they get its mean
-        apart = np.flatnonzero(np.diff(np.log(fine)) / 2 > np.abs(lost[:-1])) + 1
-        lost = np.concatenate([np.full(len(few), few.mean()) for few in np.split(lost, apart) if len(few)])
-        return np.array([lost / (ratio**order - 1) for order in orders[self.degree]] if sized else [lost, 0 * lost])
+            return np.full(len(fine), np.nan)
+        return log_changes(other.known[name], fine)
 
     def _solved(self, tensors: Sequence[Array], wanted: Wanted) -> Sector:
         """Solve for the modes wanted of each tensor (6, 6) by these elements alone. Raises ModalError, MeshError."""
@@ -182,18 +187,13 @@ class Elements:
     def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
         """Evaluate vectors (n, b) on the surface."""
         skin = self.body.skin
-        ((vector,), (nodes, free, _)) = vectors, sectors[0].place
-        whole = np.zeros((3 * len(nodes.node_m), vector.shape[1]))
-        whole[free] = vector
+        nodes, whole = sectors[0].place[0], _whole(sectors[0], vectors[0])
         on_skin = lagrange.at_nodes(nodes, self.body.solid, skin.node) @ whole.reshape(len(nodes.node_m), -1)
         shape = np.ascontiguousarray(on_skin.reshape(len(skin.node), 3, -1), np.float32)
         return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Return the largest relative error estimated of the frequencies up to mode top[1].
-
-        NaN where the user gave the size, or no coarser body can be solved.
-        """
+        """Return the largest relative error estimated of the modes up to top[1], NaN where the user gave the size."""
         return float(sectors[0].place[2][: top[1] + 1].max())
 
     def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
@@ -320,10 +320,7 @@ class Elements:
         return replace(self, body=self.at_size(edge_m, filler), edge_m=edge_m, coarser=None, known={})
 
     def _refilled(self, edge_m: float, filler: Filler | None = None) -> Elements | None:
-        """Fill the body with another edge, by its own filler or by ``filler``; None where that fails.
-
-        Raises EndlessError: an end by the clock is an error and decides no result.
-        """
+        """Fill anew by its own filler or ``filler``, None where that fails. Raises EndlessError."""
         try:
             return self._of_size(edge_m, filler or self._filler("netgen"))
         except EndlessError:
@@ -344,6 +341,9 @@ def coarse(thin: bool) -> float:
     return float(ELEMENT_LIMITS.finer_edge ** (2 if thin else 3))
 
 
-def _as_long(values: Array, count: int) -> Array:
-    """Cut or extend values (m,) to count, the last repeated."""
-    return np.asarray(values[np.minimum(np.arange(count), len(values) - 1)]) if len(values) else np.zeros(count)
+def _whole(sector: Sector, vector: Array) -> Array:
+    """Extend vectors (n, b) of a sector by the clamped unknowns."""
+    nodes, free, _ = sector.place
+    whole = np.zeros((3 * len(nodes.node_m), vector.shape[1]))
+    whole[free] = vector
+    return whole

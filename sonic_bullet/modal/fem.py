@@ -26,7 +26,7 @@ ELEMENTS_AT_ONCE = 1000  # elements at a time: keeps their (k, k) blocks out of 
 VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
-def _rule(order: int) -> tuple[Array, Array]:
+def rule(order: int) -> tuple[Array, Array]:
     """Return points (q, 3) and weights (q,) of a rule exact to ``order`` on the reference tetrahedron."""
     from skfem import ElementTetP1
     from skfem.quadrature import get_quadrature
@@ -35,7 +35,7 @@ def _rule(order: int) -> tuple[Array, Array]:
     return point.T, weight
 
 
-def _geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
+def geometry(solid: Solid, tet: Array, point: Array) -> tuple[Array, Array]:
     """Compute det J (t, q) and ∂ξ/∂x (t, q, 3, 3) at reference points (q, 3)."""
     jacobian = np.einsum("tid,ikq->tqdk", solid.node_m[tet], lagrange.gradients(2, point), optimize=True)
     determinant = np.linalg.det(jacobian)
@@ -89,19 +89,19 @@ def assemble(
 def _blocks(solid: Solid, tet: Array, stiffness_pa: Array, degree: int, *, curved: bool) -> tuple[Array, Array]:
     """Compute K_ij^ab (t, 9, k²) and ∫ NᵢNⱼ (t, k²) of elements tet (t, 10)."""
     tensor = stiffness_pa[VOIGT[:, :, None, None], VOIGT[None, None]]
-    point, weight = _rule(2 * degree if curved else 2 * degree - 2)
+    point, weight = rule(2 * degree if curved else 2 * degree - 2)
     gradient = lagrange.gradients(degree, point)
     product = np.einsum("ikq,jlq->klqij", gradient, gradient).reshape(9, len(weight), -1)
     if not curved:  # one point stands for all
         product, point, weight = np.einsum("pqi,q->pi", product, weight)[:, None], point[:1], np.ones(1)
-    determinant, inverse = _geometry(solid, tet, point)
+    determinant, inverse = geometry(solid, tet, point)
     half = np.einsum("tqkd,adbe->tqkabe", inverse, tensor, optimize=True)
     bracket = np.einsum("tqkabe,tqle,tq->tabklq", half, inverse, determinant * weight, optimize=True)
     blocks = bracket.reshape(len(tet) * 9, -1) @ product.reshape(9 * len(weight), -1)
-    point, weight = _rule(2 * degree + 2 if curved else 2 * degree)
+    point, weight = rule(2 * degree + 2 if curved else 2 * degree)
     shape = lagrange.values(degree, point)
     if curved:
-        volume = _geometry(solid, tet, point)[0] * weight
+        volume = geometry(solid, tet, point)[0] * weight
     else:
         volume = 6 * np.abs(corner_volume_m3(solid.node_m, tet))[:, None] * weight
     masses = volume @ np.einsum("iq,jq->qij", shape, shape).reshape(len(weight), -1)
@@ -112,10 +112,10 @@ def volume_m3(solid: Solid) -> float:
     """Compute the volume of a solid, curved elements integrated."""
     if solid.affine:
         return float(np.abs(corner_volume_m3(solid.node_m, solid.tet)).sum())
-    point, weight = _rule(6)
+    point, weight = rule(6)
     return float(
         sum(
-            (_geometry(solid, solid.tet[s : s + ELEMENTS_AT_ONCE], point)[0] * weight).sum()
+            (geometry(solid, solid.tet[s : s + ELEMENTS_AT_ONCE], point)[0] * weight).sum()
             for s in range(0, len(solid.tet), ELEMENTS_AT_ONCE)
         )
     )

@@ -254,7 +254,7 @@ def _solve(
                 f", more than the {100 * asked.accuracy:g} % asked for: finer elements need more unknowns than allowed"
             )
     elif found.method.meshed and len(found.value):
-        note += "; error not known: no coarser elements tell it"
+        note += "; error not known: the size of its elements was given"
     left_open = found.method.surface_error(found.sectors, of.stiffness)
     if left_open >= LEAST_ERROR:
         note += (

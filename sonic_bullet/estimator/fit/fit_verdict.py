@@ -106,7 +106,7 @@ def _mesh_warning(family: Family) -> list[str]:
     if not family.meshed or 2 * family.error <= gamma_moves:
         return []
     if np.isnan(family.error):
-        return ["the mesh's error is not known: no coarser mesh could be made"]
+        return ["the mesh's error is not known: the size of its elements was given"]
     return [f"the mesh may move gamma by up to {2 * family.error:.1%}: its frequencies are up to half that uncertain"]
 
 

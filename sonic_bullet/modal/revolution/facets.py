@@ -10,6 +10,8 @@ surface moved out by g:  δλ = ∫ g (ε:C:ε − λ |u|²) dA for uᵀMu = 1  
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from functools import partial
 
 import numpy as np
 
@@ -48,7 +50,10 @@ def facets_error(body: Revolved, section: Section, sectors: Sequence[Sector], te
     if not gap.any():
         return 0.0
     factor = _gap_of_sides(body, section, gap)[~section.on_axis]
-    rim = FacetBasis(section.basis.mesh, ElementTriP3(), facets=section.facet[~section.on_axis], intorder=6)
+    near_enough = 1e-8  # of a triangle's side: points on the smallest ones cannot be placed to 1e-12 of theirs
+    mapping = copy(section.basis.mapping)
+    mapping.invF = partial(mapping.invF, newton_tol=near_enough)
+    rim = FacetBasis(section.basis.mesh, ElementTriP3(), mapping, facets=section.facet[~section.on_axis], intorder=6)
     most = 0.0
     for sector in sectors:
         m, problems = sector.place

@@ -127,15 +127,23 @@ class Fourier:
         return Shown(vertex, face, curvature / self.length_m, np.ascontiguousarray(shape))
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
-        """Estimate the relative error of the frequency of mode top[1] of sector top[0] by a finer section."""
+        """Estimate the largest relative error of the frequencies up to mode top[1] of sector top[0] by a finer section.
+
+        Of that sector and of those of few waves around, whose modes strain corners and joints as a whole.
+        """
         left = 1.75  # 1/(1 - 1.5^-q), which is 1.1 to 2.8
+        few_around = 2  # swelling and twist, bending, ovals
         finer = self.finer()
         if finer is None:
             return float("nan")
-        m, value = sectors[top[0]].place[0], sectors[top[0]].found[0][0]
-        most = (top[1] + 1) * sectors[top[0]].multiplicity
-        other, _ = finer._around(series(finer.section, [tensor]), m, most, [np.inf])
-        return left * abs(float(value[top[1]] / other.found[0][0][top[1]]) - 1) / 2
+        problems, highest, most = series(finer.section, [tensor]), sectors[top[0]].found[0][0][top[1]], 0.0
+        for sector in sectors:
+            value = sector.found[0][0][sector.found[0][0] <= highest]
+            if len(value) and (sector.place[0] <= few_around or sector is sectors[top[0]]):
+                count = len(value) * sector.multiplicity
+                (true, _), *_ = finer._around(problems, sector.place[0], count, [np.inf])[0].found
+                most = max(most, float(np.abs(value / true[: len(value)] - 1).max()))
+        return left * most / 2
 
     def surface_error(self, sectors: Sequence[Sector], tensor: Array) -> float:
         """Estimate by how much frequencies change where the facets of the meridian are arcs."""

@@ -2,7 +2,8 @@
 
     size at the outline: of the wall's thickness t there, more away from corners, or of the shortest bending wave of t
     size inside: the least of size + slope x distance over the outline
-    outline -> points so far apart -> Delaunay, lattices inside, one a halving of the size -> sides bent to the outline
+    outline -> points so far apart -> Delaunay, lattices inside, one a halving of the size
+        -> graded towards corners that look inward (notches.py) -> sides bent to the outline
 
 Lengths are those of a body without units (see modal_analysis.py).
 """
@@ -15,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal.meshing.prisms import SAME_VOLUME, _gap, _inside
+from sonic_bullet.modal.revolution.notches import Triangulated, graded
 from sonic_bullet.modal.revolution.rings import Revolved, turns
 from sonic_bullet.records import Array
 
@@ -169,7 +172,14 @@ def sectioned(body: Revolved, wave_number: WaveNumber, finer: float = 1.0) -> Se
         rim, middle, which = _cut(outline, finer)
         made = _filled(rim, outline.size[which] / finer)
         if made is not None:
-            return _section(*made, rim, middle, body.on_axis[outline.owner[which]], outline.curvature[which])
+            turn = turns(rim)
+            inward = np.flatnonzero((turn < -CREASE_RAD) & (rim[:, 0] > 0))
+            fine = graded(Triangulated(*made, middle, which), inward)
+            rim = fine.point[: len(fine.middle)]
+            owner = outline.owner[fine.owner]
+            return _section(
+                fine.point, fine.triangle, rim, fine.middle, body.on_axis[owner], outline.curvature[fine.owner]
+            )
         finer *= 1.5
     return None
 

