@@ -21,7 +21,6 @@ from numba.extending import intrinsic
 from sonic_bullet.bank.layout import FLUSH, LANE_PAIR, ROOM
 from sonic_bullet.machine.vector import LANES, Emit, Value, constant
 
-BIT = ir.IntType(1)
 VECTORS = 4
 SAMPLE_NUMBERS = VECTORS * LANES  # numbers a sample and pair
 TILE = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # samples whose sums fit the registers
@@ -298,6 +297,7 @@ def sum_impulses(typingctx, axis_impulse, width, forces, direction0, direction1,
     In whole vectors. forces: `Forces`; direction0, direction1: flat (drives, 3), on the lower body, the
     negative on the higher.
     """
+    bit = ir.IntType(1)
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -307,7 +307,7 @@ def sum_impulses(typingctx, axis_impulse, width, forces, direction0, direction1,
         def vector(k: Value, _: list[Value]) -> list[Value]:
             def force(f: Value, total: list[Value]) -> list[Value]:
                 which = builder.load(builder.gep(side, [builder.add(first, f)]))
-                drive, higher = builder.lshr(which, e.index(1)), builder.trunc(which, BIT)
+                drive, higher = builder.lshr(which, e.index(1)), builder.trunc(which, bit)
                 early = builder.add(builder.mul(drive, builder.shl(stride, e.index(1))), k)
                 a0, a1 = (
                     builder.select(higher, builder.fneg(a), a)

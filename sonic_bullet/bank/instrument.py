@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.bank.layout import BANK_BODY, BANK_STRIKE, FLUSH, LANE_PAIR, RINGING
 from sonic_bullet.bank.mode_set import ModeSet, Translation
 from sonic_bullet.bank.tile import BLOCK
-from sonic_bullet.bank.transmission import OFF, SILENCED, TRANSMISSION
+from sonic_bullet.bank.transmission import PHASE, SILENCED, TRANSMISSION
 from sonic_bullet.contact.pulse_shape import pulse_table
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
@@ -267,7 +267,7 @@ def subset(bank: Bank, state: BankState, keep: Array) -> tuple[Bank, BankState]:
     number[keep] = np.arange(len(keep))
     transmissions = state.transmissions[keep]
     transmissions["to"] = number[transmissions["to"]]
-    transmissions["phase"][transmissions["to"] < 0] = OFF
+    transmissions["phase"][transmissions["to"] < 0] = PHASE.off
     weights = np.take(state.transmission_weight, both, axis=1)
     return few, replace(
         state, **flat, transmissions=transmissions, transmission_weight=weights, ringing=state.ringing[keep]
@@ -290,7 +290,7 @@ def silence(state: BankState) -> BankState:
         state.ringing[name] = 0
     state.ringing["strike"] = -1
     state.transmissions["phase"] = SILENCED[state.transmissions["phase"]]
-    state.ringing["transmissions"] = np.count_nonzero(state.transmissions["phase"] != OFF, axis=1)
+    state.ringing["transmissions"] = np.count_nonzero(state.transmissions["phase"] != PHASE.off, axis=1)
     pool = len(state.strikes)
     state.free[...] = np.concatenate([[pool], np.arange(pool - 1, -1, -1)])
     return state

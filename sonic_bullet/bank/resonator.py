@@ -28,9 +28,6 @@ from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer
 from sonic_bullet.records.mounting import Mounting, loss_factor, radiating_share
 
-RIGID = ContactSide(np.inf, 0.3, 0.0, 0.0)
-"""Side of a partner of unknown material."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Resonator:
@@ -121,9 +118,10 @@ def build_resonator(body: Body, sensors: tuple[Sensor, ...], sr: int, air: Air) 
     (φ(q)·n); a plain modal sum reads a·sin(ωt) for each mode [Ren et al. 2013, eq. 13], hence the turn by -i/(1 + i
     d/ω).
     """
+    rigid = ContactSide(np.inf, 0.3, 0.0, 0.0)  # side of a partner of unknown material
     model = body.model
     readers, sets = weight_sets(sensors), weight_set_count(sensors)
-    side = RIGID if body.material is None else ContactSide.of(body.material)
+    side = rigid if body.material is None else ContactSide.of(body.material)
     if model is None:
         none = np.zeros(0)
         return Resonator(

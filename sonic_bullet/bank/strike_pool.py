@@ -26,8 +26,6 @@ from sonic_bullet.machine.vector import At
 from sonic_bullet.records import Array
 
 NODES_PER_PULSE = 24
-CELLS_PER_RADIAN = 4.0
-"""Cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is the error allowed in its level."""
 SHORTEST_PULSE = 1e-12
 """Shortest length of a pulse, in samples; shorter ones get it."""
 
@@ -129,10 +127,12 @@ def _enter_cells(slot, b, bank):  # pragma: no cover - compiled
 
     (1 + i d/ω) (e^{s/cells} - 1)/(s/cells): an impulse that acts evenly over the cell, at the cell's end.
     """
+    # cells of a pulse per 1/w of a rigid body: a third of (w·cell)³ = 0.5 % is the error allowed in its level
+    cells_per_radian = 4.0
     most_cells = 4096  # Cells a sample: a pulse shorter than one is even over it
     strike, body = bank.strikes[slot], bank.body[b]
     s = complex(body.rigid_log_pole[0], body.rigid_log_pole[1])
-    least = int(np.ceil(CELLS_PER_RADIAN * -s.real))
+    least = int(np.ceil(cells_per_radian * -s.real))
     cells = max(least, int(np.ceil(min(NODES_PER_PULSE / strike.length, 1.0 * most_cells))))
     strike.cells = cells
     strike.cell_first = int(np.floor(strike.start * cells))

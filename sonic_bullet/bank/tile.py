@@ -24,8 +24,6 @@ ROWS = 16
 BLOCK = TILE_ROW * ROWS
 CHUNK = 32
 
-_TILE_ROWS = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # accumulators that fit the registers
-
 
 @intrinsic
 def turn(typingctx, z, pole, block, lanes, floor, now, powers):  # type: ignore[no-untyped-def]
@@ -134,14 +132,15 @@ def columns(typingctx, now, weight, lanes, powers, column):  # type: ignore[no-u
 @intrinsic
 def outer(typingctx, column, table, count, sound):  # type: ignore[no-untyped-def]
     """Add Σ over the chunk's modes of column ⊗ table to sound (BLOCK,), mode after mode."""
+    tile_rows = 8 if binding.get_host_cpu_features().get("avx512f", False) else 2  # accumulators that fit the registers
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         column, table, count, sound = e.args
         halves = TILE_ROW // LANES
-        for first in range(0, ROWS, _TILE_ROWS):
+        for first in range(0, ROWS, tile_rows):
             places = [
-                e.index((first + q) * TILE_ROW + half * LANES) for q in range(_TILE_ROWS) for half in range(halves)
+                e.index((first + q) * TILE_ROW + half * LANES) for q in range(tile_rows) for half in range(halves)
             ]
 
             def body(k: Value, total: list[Value], first: int = first) -> list[Value]:
@@ -149,7 +148,7 @@ def outer(typingctx, column, table, count, sound):  # type: ignore[no-untyped-de
                 real = [e.load(table, e.shifted(base, half * LANES)) for half in range(halves)]
                 imag = [e.load(table, e.shifted(base, TILE_ROW + half * LANES)) for half in range(halves)]
                 new = []
-                for q in range(_TILE_ROWS):
+                for q in range(tile_rows):
                     x, y = (
                         e.broadcast(column, e.shifted(k, (first + q) * CHUNK)),
                         e.broadcast(column, e.shifted(k, (ROWS + first + q) * CHUNK)),

@@ -12,7 +12,7 @@ over its first block and out over its last: nothing jumps, and any split into ca
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,12 +26,24 @@ if TYPE_CHECKING:
 
 MOST_PARTNERS = 8
 """Partners to which a body transmits at a time, those that fade out among them."""
-OFF, STEADY, COMING, RISING, LEAVING, FALLING, BRIEF = range(7)
-"""States of a transmission. COMING, LEAVING: from the next block on RISING, FALLING; BRIEF: rises and is to fall."""
+
+
+class _Phases(NamedTuple):
+    """States of a transmission."""
+
+    off: int = 0
+    steady: int = 1
+    coming: int = 2  # from the next block on rising
+    rising: int = 3
+    leaving: int = 4  # from the next block on falling
+    falling: int = 5
+    brief: int = 6  # rises and is to fall
+
+
+PHASE = _Phases()
+
 TRANSMISSION = np.dtype([("to", "i8"), ("phase", "i8")], align=True)
-LEAVES = np.array([OFF, LEAVING, OFF, BRIEF, LEAVING, FALLING, BRIEF])
-"""State that each becomes where it is to end."""
-SILENCED = np.array([OFF, STEADY, STEADY, STEADY, OFF, OFF, OFF])
+SILENCED = np.array([PHASE.off, PHASE.steady, PHASE.steady, PHASE.steady, PHASE.off, PHASE.off, PHASE.off])
 """State that each becomes where nothing sounds any more, and nothing has to fade."""
 
 
@@ -41,23 +53,23 @@ def move_on(b, bank):  # pragma: no cover - compiled
     left, transmissions = 0, bank.transmissions
     for j in range(transmissions.shape[1] if bank.ringing[b].transmissions else 0):
         phase = transmissions[b, j].phase
-        if phase == COMING:
-            phase = RISING
-        elif phase == RISING:
-            phase = STEADY
-        elif phase in (LEAVING, BRIEF):
-            phase = FALLING
-        elif phase == FALLING:
-            phase = OFF
+        if phase == PHASE.coming:
+            phase = PHASE.rising
+        elif phase == PHASE.rising:
+            phase = PHASE.steady
+        elif phase in (PHASE.leaving, PHASE.brief):
+            phase = PHASE.falling
+        elif phase == PHASE.falling:
+            phase = PHASE.off
         transmissions[b, j].phase = phase
-        left += phase != OFF
+        left += phase != PHASE.off
     bank.ringing[b].transmissions = left
 
 
 @uncounted
 def sounds(phase):  # pragma: no cover - compiled
     """Return whether a transmission is active."""
-    return phase not in (OFF, COMING)
+    return phase not in (PHASE.off, PHASE.coming)
 
 
 @uncounted
@@ -82,7 +94,7 @@ def transmit(b, j, w, stretch, values, bank, transmitted):  # pragma: no cover -
     place, out = (stretch.at + stretch.i) % BLOCK, transmitted[w, to, stretch.i : stretch.i + stretch.count]
     for k in range(stretch.count):
         x = (place + k) / BLOCK
-        ramp = x if phase in (RISING, BRIEF) else (1.0 - x if phase == FALLING else 1.0)
+        ramp = x if phase in (PHASE.rising, PHASE.brief) else (1.0 - x if phase == PHASE.falling else 1.0)
         out[k] += ramp * values[k]
 
 
@@ -106,13 +118,15 @@ def set_transmissions(bank: Bank, state: BankState, b: int, wanted: Mapping[int,
     wanted: weights (W, m) complex by partner. Earlier ones end. Where there are too few places, the first of
     ``wanted`` have them.
     """
+    # state that each becomes where it is to end
+    leaves = np.array([PHASE.off, PHASE.leaving, PHASE.off, PHASE.brief, PHASE.leaving, PHASE.falling, PHASE.brief])
     start, m, modes = int(bank.body[b]["start"]), int(bank.body[b]["columns"]), bank.law.shape[1]
     now, mine, sets = state.ringing[b], state.transmissions[b], len(bank.observed)
     loud = now["ringing"] or now["driven"] or now["tiled"] or now["strike"] >= 0
-    mine["phase"] = LEAVES[mine["phase"]] if loud else OFF
-    places = np.flatnonzero(mine["phase"] == OFF)
+    mine["phase"] = leaves[mine["phase"]] if loud else PHASE.off
+    places = np.flatnonzero(mine["phase"] == PHASE.off)
     for j, (to, weight) in zip(places, wanted.items(), strict=False):
-        mine[j] = to, COMING if loud else STEADY
+        mine[j] = to, PHASE.coming if loud else PHASE.steady
         rows = state.transmission_weight[j * sets : (j + 1) * sets]
         rows[:, start : start + m], rows[:, modes + start : modes + start + m] = weight.real, weight.imag
     now["transmissions"] = np.count_nonzero(mine["phase"])

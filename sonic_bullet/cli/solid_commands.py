@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from sonic_bullet.presets import Preset
 
 MADE_HZ = (250, 1000, 4000)
-MADE_COLUMNS = ("name", "η", "exponent", "spread of ln η", *(f"T60 at {freq_hz} Hz in s" for freq_hz in MADE_HZ))
 RECORDED_COLUMNS = (
     "name",
     "lines",
@@ -141,6 +140,7 @@ def chosen_material(
 
 def run_materials(json_to: str | None) -> None:
     """Run `materials`; raises FileError."""
+    made_columns = ("name", "η", "exponent", "spread of ln η", *(f"T60 at {freq_hz} Hz in s" for freq_hz in MADE_HZ))
     from sonic_bullet.presets import load_material, made_names, named_preset, recorded_names, table_names
 
     found = [load_material(name) for name in table_names()]
@@ -163,7 +163,7 @@ def run_materials(json_to: str | None) -> None:
         ]
         print(table(head, rows))
         print("\nas things are made of them: the total loss of measured bodies, all else as above")
-        print(table(MADE_COLUMNS, [_made_row(material, preset) for material, preset in made]))
+        print(table(made_columns, [_made_row(material, preset) for material, preset in made]))
         print("\nof recordings by others: how near the file comes to takes of its object, in dB")
         print(table(RECORDED_COLUMNS, [_recorded_row(preset) for _, preset in recorded]))
         print("\nsources: 'sonic-bullet materials --json' and docs/explanation/materials.md")

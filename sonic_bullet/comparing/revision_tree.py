@@ -114,19 +114,17 @@ def unpinned_words(found: set[str]) -> tuple[str, ...]:
 
 def _is_installed(path: Path) -> bool:
     """Tell whether a file belongs to the interpreter, its packages, this package or its cache."""
+    installed_at = tuple(Path(one).resolve() for one in sonic_bullet.__path__)
     from sonic_bullet.storage.user_folder import cache_folders
 
     library = [Path(sysconfig.get_paths()[name]) for name in ("stdlib", "platstdlib")]
-    homes: list[Path] = [*library, *_PACKAGE, *cache_folders()]
+    homes: list[Path] = [*library, *installed_at, *cache_folders()]
     package_folders = ("site-packages", "dist-packages")
     # folders of installed packages' metadata, wherever a package itself is
     metadata_endings = (".egg-info", ".dist-info")
     return any(part in package_folders or part.endswith(metadata_endings) for part in path.parts) or any(
         path.is_relative_to(one) for one in homes
     )
-
-
-_PACKAGE = tuple(Path(one).resolve() for one in sonic_bullet.__path__)
 
 
 def _places(module: ModuleType) -> list[Path]:

@@ -1,7 +1,7 @@
 """Contact patches: points tracked and loads smoothed, without the flicker of a simulator's points.
 
     rows of the step being rendered, load less strikes -> each row to the tracked point near it, or a new one
-        -> n += a (load of its rows − n),   a = 1 − e^{−dt/SMOOTH_S}
+        -> n += a (load of its rows − n),   a = 1 − e^{−dt/30 ms}
         -> CONTACT_PATCH: up to PATCH_POINTS points a pair, sum and moment those of the rows, smoothed
     sets or loads that differ from those of the present poles -> SUPPORT_STATE.stale of both bodies
 
@@ -21,18 +21,8 @@ from sonic_bullet.machine.compiled import njit
 
 PATCH_POINTS = 4
 """Points of a pair: a solver of convex shapes gives no more at a time."""
-SMOOTH_S = 0.03
-"""Time constant of loads: of 20 to 50 ms, seven steps at 240 Hz, within which each corner of a box is loaded."""
-SAME_POINT = 0.15
-"""Of the smaller body's size: rows nearer than this to a tracked point are the same point."""
 LEAST_PATCH = 0.02
 """Fraction of a pair's load below which a point is dropped."""
-LEAST_N = 1e-9
-"""Newtons below which nothing is carried."""
-FAR_OFF, OFF_PATCH = 1.6, 1.1
-"""Factors by which a load must differ from the one of the present poles before new ones are computed: at once, 17 % of
-a Hertz spring, and after REST_S, 3 %."""
-REST_S = 0.2
 
 CONTACT_PATCH = np.dtype(
     [
@@ -63,13 +53,8 @@ SUPPORT_STATE = np.dtype(
 )
 """Support state of a body."""
 
-POLES_SHARE = 0.06
-"""Fraction of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes a third more,
-and live sound is never late for it. The body that waits longest is served first, moving ones before fixed ones."""
 SAVED_S = 0.03
 """Most of it that is saved up for a moment in which many come to rest."""
-AGAIN_S = 0.02
-"""A body's poles stay at least so long, four blocks of the bank."""
 
 
 @njit(nogil=True, error_model="numpy")
@@ -78,8 +63,11 @@ def track_contact_patches(here, rows, table, pairs, support_state):
 
     A patch without rows for SPAN steps is released.
     """
+    same_point = 0.15  # of the smaller body's size: rows nearer than this to a tracked point are the same point
+    # time constant of loads: of 20 to 50 ms, seven steps at 240 Hz, within which each corner of a box is loaded
+    smooth_s = 0.03
     (row, stop), dt_s, bodies = here.row, here.dt_s, table.bodies
-    follow = 1.0 - np.exp(-dt_s / SMOOTH_S)
+    follow = 1.0 - np.exp(-dt_s / smooth_s)
     target, place = np.empty(PATCH_POINTS), np.empty((PATCH_POINTS + 1, 2, 3))
     for i in range(pairs.count[0]):
         slot = pairs.active[i]
@@ -102,7 +90,7 @@ def track_contact_patches(here, rows, table, pairs, support_state):
         for side in range(2):
             if bodies[pair.body[side]].volume_m3 > 0.0:
                 size = min(size, bodies[pair.body[side]].size_m)
-        near = SAME_POINT * size if size < np.inf else np.inf
+        near = same_point * size if size < np.inf else np.inf
         share = min(pair.support_n[0] / pair.force_n[NOW], 1.0) / dt_s if pair.force_n[NOW] > 0.0 else 0.0
         _smooth(one, rows[begin:row], share, near, follow, target, place)
         one.used_s += dt_s
@@ -144,6 +132,7 @@ def _smooth(one, rows, share, near, follow, target, place):
 
     target (PATCH_POINTS,), place (PATCH_POINTS + 1, 2, 3): scratch for the rows' loads, and for their normals.
     """
+    least_n = 1e-9  # newtons below which nothing is carried
     old = one.count
     total = _take_rows(one, rows, share, near, target, place)
     if total > 0.0:
@@ -159,7 +148,7 @@ def _smooth(one, rows, share, near, follow, target, place):
                     one.point_m[k, side, x] += share * (place[k, side, x] / target[k] - one.point_m[k, side, x])
     kept = 0
     for k in range(one.count):
-        if one.load_n[k] >= max(LEAST_PATCH * whole, LEAST_N) or target[k] > 0.0:
+        if one.load_n[k] >= max(LEAST_PATCH * whole, least_n) or target[k] > 0.0:
             one.load_n[kept] = one.load_n[k]
             _copy(one.point_m[k], one.point_m[kept])
             kept += 1
@@ -230,9 +219,12 @@ def _length(vector):
 @njit(nogil=True, error_model="numpy")
 def _differs(one, near):
     """Return whether points or loads differ from those that the present poles were computed for."""
+    # factors by which a load must differ from the one of the present poles before new ones are computed: at once, 17 %
+    # of a Hertz spring, and after rest_s, 3 %
+    far_off, off_patch, rest_s = 1.6, 1.1, 0.2
     if one.count != one.used:
         return True
-    off = OFF_PATCH if one.used_s > REST_S else FAR_OFF
+    off = off_patch if one.used_s > rest_s else far_off
     for k in range(one.count):
         if not one.used_n[k] / off <= one.load_n[k] <= one.used_n[k] * off:
             return True
@@ -257,8 +249,13 @@ def choose_bodies(dt_s, table, pairs, supports, bank, scratch):
 
     Silent bodies wait.
     """
+    again_s = 0.02  # a body's poles stay at least so long, four blocks of the bank
+    # fraction of simulated time that may go into new poles: with it, sound costs a pile of a hundred boxes a third
+    # more, and live sound is never late for it. The body that waits longest is served first, moving ones before fixed
+    # ones.
+    poles_share = 0.06
     support_state, credit_s, bodies = supports.support_state, supports.credit_s, table.bodies
-    credit_s[0] = min(credit_s[0] + POLES_SHARE * dt_s, SAVED_S)
+    credit_s[0] = min(credit_s[0] + poles_share * dt_s, SAVED_S)
     some = False
     for b in range(len(support_state)):
         one = support_state[b]
@@ -287,7 +284,7 @@ def choose_bodies(dt_s, table, pairs, supports, bank, scratch):
             break
         one = support_state[best]
         sounds[best] = one.stale = 0
-        one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, AGAIN_S, points[best]
+        one.wanted, one.stale_s, one.wait_s, one.points = 1, 0.0, again_s, points[best]
         if points[best]:  # its free poles are known
             credit_s[0] -= price_s(bodies[best].modes, points[best])
         wanted += 1

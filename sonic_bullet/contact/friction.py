@@ -44,8 +44,6 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Body
 
 FOLLOW_S = 0.02
-FRICTION_FLAT = 0.25
-"""Radius, as a fraction of the smaller body's size, of the least area of friction of a flat face."""
 SWEEP_FLOOR_M_S = 2e-4
 """Slower sweeps make nothing audible: even waves of 10 µm pass at 20 Hz.
 
@@ -203,6 +201,8 @@ def _begin(pair, table, rows, begin, end, quaternion):
 
     The curvature is that where the load is highest. Without rows: as two flats of the bodies' size.
     """
+    # radius, as a fraction of the smaller body's size, of the least area of friction of a flat face
+    friction_flat = 0.25
     (low, high), bodies = pair.body, table.bodies
     pair.modulus_pa = contact_modulus(bodies[low].modulus_pa, bodies[high].modulus_pa)
     restitution, other = bodies[low].restitution, bodies[high].restitution
@@ -239,7 +239,7 @@ def _begin(pair, table, rows, begin, end, quaternion):
         touch(rows, strongest, table)
         bent = rows[strongest].curvature_per_m
         curvature = bent[0] + bent[1]
-    area = flat_area_m2(bodies, low, high, np.sqrt(square), curvature, FRICTION_FLAT)
+    area = flat_area_m2(bodies, low, high, np.sqrt(square), curvature, friction_flat)
     if area > 0.0:  # faces touch on the crests of their waves [Johnson 1985, sec. 13.2]
         curvature += bodies[low].crest_per_m + bodies[high].crest_per_m
     pair.radius_m = contact_radius_m(curvature, area)

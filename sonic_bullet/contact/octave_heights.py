@@ -12,7 +12,7 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records.roughness import LONGEST_M, OCTAVES, WAVE_M
 
-LATTICE = 0.30
+OCTAVE_LATTICE = 0.30
 """An octave on a lattice Δ carries most of the self-affine spectrum at λ = Δ/0.30: there x^2.5 sinc(x)^8 peaks."""
 _UNIT_RMS = np.sqrt(3.0 * 315 / 151)
 """Makes n_j unit variance: lattice values uniform on ±1 have 1/3, the mean square of the B-spline is 151/315."""
@@ -74,7 +74,7 @@ def close_round(length_m, out):
     A whole number, 4 to 7, of the points of the coarsest octave that has as many; coarser heights out (OCTAVES,) are
     0 then: waves nearly as long as the body is round only carry it.
     """
-    points, j = length_m / (LONGEST_M * LATTICE), 0
+    points, j = length_m / (LONGEST_M * OCTAVE_LATTICE), 0
     while points < 4.0 and j < OCTAVES - 1:
         points *= 2.0
         out[j] = 0.0

@@ -46,12 +46,10 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from sonic_bullet.contact.octave_heights import LATTICE, reach_of_ball
+from sonic_bullet.contact.octave_heights import OCTAVE_LATTICE, reach_of_ball
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
 from sonic_bullet.records.roughness import LONGEST_M, OCTAVES, WAVE_M
-
-SLOWEST_HZ = 8.0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -61,10 +59,11 @@ def gained_heights(height_m, speed_m_s, patch, sr, out):
     patch: its radius in m; the fraction c of it that is in contact, 0 where only spots are; R* of a ball that follows
     no more of the waves than it can, 0 where that is not asked.
     """
+    slowest_hz = 8.0
     patch_radius_m, touching, ball_m = patch
     for j in range(OCTAVES):
         f = speed_m_s / WAVE_M[j]
-        fine, slow = (0.4 - f / sr) / 0.2, f / SLOWEST_HZ - 1.0
+        fine, slow = (0.4 - f / sr) / 0.2, f / slowest_hz - 1.0
         fine, slow = 0.0 if fine < 0.0 else fine, 0.0 if slow < 0.0 else slow
         fine, slow = 1.0 if fine > 1.0 else fine, 1.0 if slow > 1.0 else slow
         height = height_m[j]
@@ -242,7 +241,7 @@ def sweep_profile(swept, speed, x, surface, heights, per_sample_s, work, rate):
         return swept, work
     while height0[coarsest] == 0.0 and height1[coarsest] == 0.0:
         coarsest += 1
-    inverse = 2.0**finest / (LONGEST_M * LATTICE) * (1.0 + stretch)
+    inverse = 2.0**finest / (LONGEST_M * OCTAVE_LATTICE) * (1.0 + stretch)
     first, last = (int(work[0] * inverse) - 1) & -2, (int(swept * inverse) + 2) | 1
     size = last - first + 1 + 4 * LANES  # with room for values written beyond the end
     if len(work) < 2 * whole + 4 * size:

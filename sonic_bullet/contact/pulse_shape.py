@@ -37,14 +37,15 @@ def pulse_spectrum(f_tau: Array, *, flat: bool = False) -> Array:
     )
 
 
-SPECTRUM_CELLS_PER_F_TAU, _SPECTRUM_TO = 40, 8
+SPECTRUM_CELLS_PER_F_TAU = 40
 """The table of pulse spectra: linear between its points, 0 beyond the last one."""
 
 
 @lru_cache(maxsize=1)
 def spectrum_table() -> Array:
     """Tabulate |F̂(f)/F̂(0)| (2, 321) of the Hertz and the flat pulse, at equidistant products f·τ from 0 to 8."""
-    f_tau = np.linspace(0.0, _SPECTRUM_TO, _SPECTRUM_TO * SPECTRUM_CELLS_PER_F_TAU + 1)
+    spectrum_to = 8
+    f_tau = np.linspace(0.0, spectrum_to, spectrum_to * SPECTRUM_CELLS_PER_F_TAU + 1)
     return np.ascontiguousarray([pulse_spectrum(f_tau, flat=flat) for flat in (False, True)])
 
 

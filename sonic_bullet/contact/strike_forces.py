@@ -36,9 +36,6 @@ friction.
 """
 STRUCK_FLAT = 0.02
 """Radius, as a fraction of the smaller body's size, of the least area that a nearly flat impact touches."""
-LEAST_JUMP_M_S = 1e-6
-"""An impact that changes the speed of its effective mass by less is ignored: a body of 10 cm sends 0 dB SPL to 1 m
-then."""
 STRIKE = np.dtype(
     [
         ("body", "i8", (2,)),
@@ -172,12 +169,15 @@ def _roughened(bodies, low, high, mass_kg, modulus_pa, curvature_per_m, speed_m_
 @njit(nogil=True, error_model="numpy")
 def _make(strike, quaternion, rows, table, pulse, modal_impulse):
     """Make a strike's pulse, but for its start, and its modal_impulse Uᵀj (2, columns); False where it is inaudible."""
+    # an impact that changes the speed of its effective mass by less is ignored: a body of 10 cm sends 0 dB SPL to 1 m
+    # then
+    least_jump_m_s = 1e-6
     low, high, bodies = strike.body[0], strike.body[1], table.bodies
     j, raw, accepted = strike.impulse_n_s, max(strike.raw_n_s, 1e-300), strike.accepted_n_s
     mass = effective_mass(bodies, low, high, quaternion, strike.arm_m[0], strike.arm_m[1], strike.normal)
     sounds = bodies[low].modes + bodies[low].rigid + bodies[high].modes + bodies[high].rigid > 0
     steep = np.sqrt(j[0] * j[0] + j[1] * j[1] + j[2] * j[2]) > raw * STEEPEST
-    if not sounds or steep or mass <= 0 or not accepted > LEAST_JUMP_M_S * mass:
+    if not sounds or steep or mass <= 0 or not accepted > least_jump_m_s * mass:
         return False
     for side in range(2):
         for c in range(modal_impulse.shape[1]):

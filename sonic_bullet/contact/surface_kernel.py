@@ -31,7 +31,7 @@ one substep adds (h²/m*)·k·√δ_lim = 2/3 of the force to u. The units follo
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -51,8 +51,6 @@ FASTEST_M_S = 50.0
 DAMPING_RATIO = 0.25
 """ζ, a model's choice: a rough contact sends waves into both bodies. With less, the level laws of rough, stiff, fast
 pairs bend (studies/surface_law.py)."""
-_STILL = 1e-9
-"""Below this fraction of the resting penetration, on surfaces that do not sweep, the contact is at rest."""
 
 VOICE = np.dtype(
     [
@@ -71,10 +69,24 @@ VOICE = np.dtype(
 )
 """A contact oscillator that moves, for one step: scratch."""
 
-# rows that `_law` writes for `_oscillate`, a lane each; two rows: at the step's start, and growth until its end
-_DEPTH, _LIFT, _REST, _DAMPING, _RATE_UNIT, _FORCE_UNIT, _SUBSTEPS, _STANDS, _PATCH = 0, 1, 2, 4, 6, 7, 8, 9, 10
-_TOUCHING = 12
-_ROWS = 14
+
+class _LawRows(NamedTuple):
+    """Rows that `_law` writes for `_oscillate`, a lane each."""
+
+    depth: int = 0
+    lift: int = 1
+    rest: int = 2  # as damping, patch and touching of two rows: at the step's start, and growth until its end
+    damping: int = 4
+    rate_unit: int = 6
+    force_unit: int = 7
+    substeps: int = 8
+    stands: int = 9
+    patch: int = 10
+    touching: int = 12
+    all: int = 14
+
+
+LAW_ROW = _LawRows()
 
 
 @njit(nogil=True, error_model="numpy")
@@ -118,25 +130,26 @@ def _law(pair, voice, sr, constants, at):
         least = 1e-3 * 9.81 * mass
         loss = 2.0 * pair.damping_ratio * np.sqrt(mass * soft) * (load if load > least else least) ** (-5.0 / 6.0)
         loss = pair.dissipation_s_m if pair.dissipation_s_m > loss else loss
-        constants[at + _REST + end] = depth / limit
-        constants[at + _DAMPING + end] = loss * limit / h
+        constants[at + LAW_ROW.rest + end] = depth / limit
+        constants[at + LAW_ROW.damping + end] = loss * limit / h
         patch = ball_patch_m(load, modulus, radius)
-        constants[at + _PATCH + end] = patch
+        constants[at + LAW_ROW.patch + end] = patch
         pressure = load / (np.pi * patch * patch) if patch > 0.0 else 0.0
         touching = math.erf(np.sqrt(np.pi) * pressure / (modulus * pair.slope)) if pair.slope > 0.0 else 0.0
-        constants[at + _TOUCHING + end] = touching
-    constants[at + _REST + 1] -= constants[at + _REST]
-    constants[at + _DAMPING + 1] -= constants[at + _DAMPING]
-    constants[at + _RATE_UNIT], constants[at + _FORCE_UNIT], constants[at + _SUBSTEPS] = h / limit, at_limit, substeps
+        constants[at + LAW_ROW.touching + end] = touching
+    constants[at + LAW_ROW.rest + 1] -= constants[at + LAW_ROW.rest]
+    constants[at + LAW_ROW.damping + 1] -= constants[at + LAW_ROW.damping]
+    constants[at + LAW_ROW.rate_unit], constants[at + LAW_ROW.force_unit] = h / limit, at_limit
+    constants[at + LAW_ROW.substeps] = substeps
     change = pair.substeps / substeps  # 0: a new contact
     square = change * change
-    constants[at + _DEPTH], constants[at + _LIFT] = (
+    constants[at + LAW_ROW.depth], constants[at + LAW_ROW.lift] = (
         pair.depth * (square * square),
         pair.separation_speed * (square * square * change),
     )
     sweep = voice.sweep_m_s
     still = sweep[0, 0] == 0.0 and sweep[0, 1] == 0.0 and sweep[1, 0] == 0.0 and sweep[1, 1] == 0.0
-    constants[at + _STANDS] = 1.0 if still else 0.0
+    constants[at + LAW_ROW.stands] = 1.0 if still else 0.0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -145,7 +158,7 @@ def _line_up(voices, count, constants):
     last = 0
     for substeps in range(1, int(MOST_SUBSTEPS) + 1):
         for v in range(count):
-            if constants[v * _ROWS + _SUBSTEPS] == substeps:
+            if constants[v * LAW_ROW.all + LAW_ROW.substeps] == substeps:
                 voices[last].order = v
                 last += 1
 
@@ -161,10 +174,10 @@ def sound_voices(pairs, voices, count, x, sr, tracks, force):
     if count == 0 or n == 0:
         return
     whole = (n + LANES - 1) & -LANES
-    constants, lanes = np.empty(count * _ROWS), np.empty(LANES * _ROWS)
+    constants, lanes = np.empty(count * LAW_ROW.all), np.empty(LANES * LAW_ROW.all)
     work, rate, height0, height1 = np.empty(2048), np.empty(LANES * whole), np.empty(OCTAVES), np.empty(OCTAVES)
     for v in range(count):
-        _law(pairs[voices[v].slot], voices[v], sr, constants, v * _ROWS)
+        _law(pairs[voices[v].slot], voices[v], sr, constants, v * LAW_ROW.all)
     _line_up(voices, count, constants)
     for first in range(0, count, LANES):
         for i in range(LANES * whole):
@@ -172,28 +185,32 @@ def sound_voices(pairs, voices, count, x, sr, tracks, force):
         for lane in range(LANES):
             filled = first + lane < count
             v = voices[first + lane if filled else count - 1].order  # unused lanes repeat the last
-            voice, at = voices[v], v * _ROWS
+            voice, at = voices[v], v * LAW_ROW.all
             pair = pairs[voice.slot]
             for side in range(2):
                 begin, end = voice.sweep_m_s[0, side], voice.sweep_m_s[1, side]
                 if filled and (begin != 0.0 or end != 0.0):
                     for last in range(2):
-                        patch = constants[at + _PATCH + last], constants[at + _TOUCHING + last], pair.ball_m
+                        patch = (
+                            constants[at + LAW_ROW.patch + last],
+                            constants[at + LAW_ROW.touching + last],
+                            pair.ball_m,
+                        )
                         speed, height = (end, height1) if last else (begin, height0)
                         gained_heights(pair.height_m[side], speed, patch, sr, height)
                     work = _sweep(
                         pair, side, (begin, end), x, (height0, height1), 1.0 / sr, work, (tracks, rate, lane * whole)
                     )
             if pair.substeps == 0:  # a new contact starts with the profile's velocity
-                constants[at + _LIFT] = rate[lane * whole] * constants[at + _RATE_UNIT]
-            for row in range(_ROWS):
+                constants[at + LAW_ROW.lift] = rate[lane * whole] * constants[at + LAW_ROW.rate_unit]
+            for row in range(LAW_ROW.all):
                 lanes[row * LANES + lane] = constants[at + row]
-        _oscillate(lanes, x, n, int(lanes[_SUBSTEPS * LANES + LANES - 1]), rate, whole)
+        _oscillate(lanes, x, n, int(lanes[LAW_ROW.substeps * LANES + LANES - 1]), rate, whole)
         for lane in range(LANES if first + LANES <= count else count - first):
             v = voices[first + lane].order
             pair = pairs[voices[v].slot]
             pair.depth, pair.separation_speed = lanes[lane], lanes[LANES + lane]
-            pair.substeps = int(constants[v * _ROWS + _SUBSTEPS])
+            pair.substeps = int(constants[v * LAW_ROW.all + LAW_ROW.substeps])
             for i in range(n):
                 force[v, i] = rate[lane * whole + i]
 
@@ -222,6 +239,8 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
 
     State lanes[:16] advances. most: the largest number of substeps among them.
     """
+    # below this fraction of the resting penetration, on surfaces that do not sweep, the contact is at rest
+    still = 1e-9
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
@@ -245,10 +264,10 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
                 builder.fcmp_ordered("<=", value, bound), builder.fcmp_ordered(">=", value, builder.fneg(bound))
             )
 
-        rest, rest_gain, damping, damping_gain = (row(k) for k in range(_REST, _REST + 4))
-        rate_unit, substeps = row(_RATE_UNIT), row(_SUBSTEPS)
-        unit = builder.fdiv(row(_FORCE_UNIT), substeps)
-        stands = builder.fcmp_ordered("==", row(_STANDS), one)
+        rest, rest_gain, damping, damping_gain = (row(k) for k in range(LAW_ROW.rest, LAW_ROW.rest + 4))
+        rate_unit, substeps = row(LAW_ROW.rate_unit), row(LAW_ROW.substeps)
+        unit = builder.fdiv(row(LAW_ROW.force_unit), substeps)
+        stands = builder.fcmp_ordered("==", row(LAW_ROW.stands), one)
         places = [builder.mul(apart, e.index(lane)) for lane in range(LANES)]
 
         def sample(i: Value, state: list[Value]) -> list[Value]:
@@ -277,7 +296,7 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
                 return [builder.select(runs, moved, z), separating, builder.fadd(total, f)]
 
             z, u, total = e.loop(most, 1, [*state, none], substep)
-            bound = builder.fmul(constant(_STILL), d0)
+            bound = builder.fmul(constant(still), d0)
             rests = builder.and_(stands, builder.and_(within(z, bound), within(u, bound)))
             z, u, total = (builder.select(rests, none, value) for value in (z, u, total))
             f = builder.fmul(total, unit)
@@ -285,7 +304,7 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
                 builder.store(builder.extract_element(f, ir.Constant(I32, lane)), spot)
             return [z, u]
 
-        for number, value in enumerate(e.loop(count, 1, [row(_DEPTH), row(_LIFT)], sample)):
+        for number, value in enumerate(e.loop(count, 1, [row(LAW_ROW.depth), row(LAW_ROW.lift)], sample)):
             e.store(value, lanes, e.index(number * LANES))
         return context.get_dummy_value()
 

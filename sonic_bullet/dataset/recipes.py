@@ -26,9 +26,6 @@ from sonic_bullet.session.scene_file import user_code
 from sonic_bullet.storage.json_text import json_bytes
 from sonic_bullet.storage.reading import reading
 
-READY = {"impacts": Path(__file__).with_name("impacts.py")}
-"""Recipes of the package, by name."""
-
 
 class _RecipeDefaults(NamedTuple):
     """Defaults of a recipe."""
@@ -126,9 +123,10 @@ class Recipe:
 
 def read_recipe(name: str) -> Recipe:
     """Read the recipe of that name or path and run its top level; SceneError where it is none."""
-    path = READY.get(name, Path(name))
+    ready = {"impacts": Path(__file__).with_name("impacts.py")}  # recipes of the package, by name
+    path = ready.get(name, Path(name))
     if not path.is_file():
-        near = nearest(name, list(READY))
+        near = nearest(name, list(ready))
         raise SceneError(f"there is no recipe {name}", f"give a Python file, or a ready one: {near}")
     with reading(path, "recipe", SceneError, "give a Python file"):
         recipe = Recipe(str(path.resolve()), path.read_text(encoding="utf-8"))

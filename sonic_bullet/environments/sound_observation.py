@@ -30,8 +30,6 @@ from sonic_bullet.session import Listener, attach
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.drawn_recording import ChainSpread, RecordingChain, RecordingState, draw_chain, record
 
-AUDIO, COUNT, DIFFER = "audio", "audio_count", "contacts_differ"
-
 
 class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """A gymnasium environment whose observation has "audio", the sound of its PyBullet or MuJoCo world.
@@ -131,10 +129,10 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         inner = env.observation_space
         self._is_dict = isinstance(inner, Dict)
         parts = dict(inner.spaces) if isinstance(inner, Dict) else {"observation": inner}
-        if AUDIO in parts:
-            raise SceneError(f"the observation has '{AUDIO}' already", "wrap the environment once")
+        if "audio" in parts:
+            raise SceneError("the observation has 'audio' already", "wrap the environment once")
         self._shape = 1 if self._average else channels_of(self._options["microphone"]), ceil(sr * self._step_s)
-        self.observation_space = Dict({**parts, AUDIO: Box(-np.inf, np.inf, self._shape, np.float32)})
+        self.observation_space = Dict({**parts, "audio": Box(-np.inf, np.inf, self._shape, np.float32)})
 
     @property
     def step_s(self) -> Fraction:
@@ -157,7 +155,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         observation, info = self.env.reset(seed=seed, options=options)
         self._listen()
         self._episodes.begin(None if options else seed)
-        info = {**info, COUNT: 0}
+        info = {**info, "audio_count": 0}
         if self._spread is not None:
             number = [0, self._begun] if seed is None else [1, seed]
             draw = np.random.default_rng([self._options["seed"], *number])
@@ -191,9 +189,9 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             new, self._recorded = record(new, self._options["sr"], self._chain, None, self._recorded)
         audio = np.zeros(self._shape, np.float32)
         audio[:, audio.shape[1] - new.shape[1] :] = new
-        info = {**info, COUNT: new.shape[1]}
+        info = {**info, "audio_count": new.shape[1]}
         if self._episodes.seeded and self._episodes.differ(self._action_bytes(action), world.steps):
-            info[DIFFER] = True
+            info["contacts_differ"] = True
         return self._with_audio(observation, audio), reward, terminated, truncated, info
 
     def close(self) -> None:
@@ -262,7 +260,7 @@ class SoundObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
             )
 
     def _with_audio(self, observation: Any, audio: Array) -> dict[str, Any]:
-        return {**(observation if self._is_dict else {"observation": observation}), AUDIO: audio}
+        return {**(observation if self._is_dict else {"observation": observation}), "audio": audio}
 
 
 def as_length(step_s: object) -> float:

@@ -4,5 +4,6 @@ r"""From recordings to materials [after Ren, Yeh, Lin 2013, sections 4 and 5; th
     mesh + guess -> Family (modal) -> pairs, least squares (fit) -> MaterialFit -> preset -> the run time
     case -> Observation        /
 
-The run time never imports this room: a preset is the only bridge. Values between its parts stand in line_values.py.
+The run time never imports this package: a preset is the only bridge. Values between its parts stand in
+lines/line_values.py.
 """

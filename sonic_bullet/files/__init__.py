@@ -4,8 +4,8 @@
     ContactLog | ModalModel  -> arrays + one JSON entry, no pickle -> partial file -> fsync -> NAME.EXT
 
 `audio` writes sound at the level that `levels` finds, `recordings` reads it, `logs` and `models` write contact logs and
-modal models (`logs` describes both), `container` is the npz below them, `meshes` and `cases` read meshes and cases,
-`reading` is the boundary of all readers, `atomic` replaces files.
+modal models (`logs` describes both), `meshes` and `cases` read meshes and cases. What they stand on is in storage: the
+npz of arrays (storage/container.py), the boundary of all readers (storage/reading.py), whole files (storage/atomic.py).
 """
 
 from sonic_bullet.files.audio import AudioWriter, check_audio_output, write_at_level, write_audio

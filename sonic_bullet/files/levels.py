@@ -21,7 +21,6 @@ from sonic_bullet.records.errors import AudioError
 from sonic_bullet.storage.spooled_sound import GainCurve, KeptSound
 
 LUFS_WITHIN = 0.01
-LIMITER_LOOKS, MOST_STEPS = 6, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +79,7 @@ def find_level(
 
 def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceiling_dbtp: float) -> FileLevel:
     """Find the level of a loudness below a true peak; raises AudioError."""
+    limiter_looks = 6
     from sonic_bullet.files.loudness.true_peak import find_true_peak, sample_true_peaks
 
     gain = _loudness_gain(sound, sr, peak_pa, lufs)
@@ -89,7 +89,7 @@ def _loudness_level(sound: KeptSound, sr: int, peak_pa: float, lufs: float, ceil
     # margin below the ceiling: excess that meters of other interpolations read, of noise up to half the rate
     margin_db = 0.25
     goal_db = ceiling_dbtp - margin_db
-    for _ in range(LIMITER_LOOKS):  # a varying factor creates new peaks between samples: tenths of a dB
+    for _ in range(limiter_looks):  # a varying factor creates new peaks between samples: tenths of a dB
         rise, factor = _rise(sound.scaled(gain), sr, peak_db, lufs, goal_db)
         left = sound.limited(factor)
         excess_db = 20 * math.log10(gain * rise * find_true_peak(left)) - (ceiling_dbtp - margin_db)
@@ -209,6 +209,7 @@ def _loudness_gain(sound: KeptSound, sr: int, peak_pa: float, lufs: float) -> fl
 
     The part of the sound above the gate depends on the gain.
     """
+    most_steps = 20
     from sonic_bullet.files.loudness.meter import CHANNEL_WEIGHT, integrated_lufs
 
     channels, frames = sound.shape
@@ -219,7 +220,7 @@ def _loudness_gain(sound: KeptSound, sr: int, peak_pa: float, lufs: float) -> fl
             f"loudness needs 0.4 s of sound, here are {frames / sr:.3f} s", "use --peak-dbfs, or render longer"
         )
     gain, best, nearest_lu = 1 / peak_pa, 0.0, math.inf
-    for _ in range(MOST_STEPS):
+    for _ in range(most_steps):
         measured = integrated_lufs(sound.scaled(gain), sr)
         if measured is None:
             break

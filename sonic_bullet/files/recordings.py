@@ -39,7 +39,7 @@ RECORDING_LIMITS = _RecordingLimits()
 # half a gibibyte as float64; or samples a byte of the file, which only packed silence exceeds
 MOST_SAMPLES, UNPACKED = 1 << 26, 64
 UNBROKEN = "give an unbroken audio file"
-T = TypeVar("T")
+Given = TypeVar("Given")
 
 
 def read_audio_scale(path: str | os.PathLike[str]) -> float | None:
@@ -69,7 +69,7 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Array, int]:
     return _read(path, read)
 
 
-def _read(path: str | os.PathLike[str], what: Callable[[Any, int], T]) -> tuple[T, int]:
+def _read(path: str | os.PathLike[str], what: Callable[[Any, int], Given]) -> tuple[Given, int]:
     """Read something from an open sound file and its descriptor; return it with the rate; raises FileError."""
     import soundfile
 

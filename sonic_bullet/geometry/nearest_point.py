@@ -32,8 +32,6 @@ NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", 
 
 # Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
 LOOKS = 1e-6
-# Boxes that wait in a search: a balanced tree of 2^64 faces leaves no more.
-_DEEPEST = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,8 +197,9 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, p, n):
     Its faces and nodes begin at face_at and node_at; the face is counted from there. p, n: tuples of three numbers, n
     the outward normal that the surface should have, 0 for any.
     """
+    deepest = 64  # boxes that wait in a search: a balanced tree of 2^64 faces leaves no more
     (px, py, pz), (nx, ny, nz) = p, n
-    stack, gaps = np.empty(_DEEPEST, np.int64), np.empty(_DEEPEST)
+    stack, gaps = np.empty(deepest, np.int64), np.empty(deepest)
     any_face, any2, any_u, any_v, any_w = 0, np.inf, 1.0, 0.0, 0.0  # nearest of all
     # of those that look along n: the chosen one, its distance, its place; its n·normal, the least distance
     same_face, same, same_u, same_v, same_w = -1, np.inf, 1.0, 0.0, 0.0

@@ -25,7 +25,6 @@ from sonic_bullet.records.errors import SonicBulletError, exception_words
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 ATTEMPTS = 3
-_CONTEXT = "fork" if sys.platform == "linux" else "spawn"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ def run_jobs(
 
     ``do`` depends on its item alone.
     """
-    context: Any = get_context(_CONTEXT)
+    context: Any = get_context("fork" if sys.platform == "linux" else "spawn")
     todo, again = ((item, 1) for item in items), deque[tuple[Item, int]]()
     running: dict[Connection, _Running] = {}
     try:

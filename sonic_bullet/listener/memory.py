@@ -11,7 +11,7 @@ import numpy as np
 from sonic_bullet.listener.frames import LINK_STATE, Motion, Roster
 from sonic_bullet.listener.known_bodies import KnownBodies
 from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
-from sonic_bullet.listener.rows import STRANGERS, UNKNOWN, contact_rows, place_bodies, take_step
+from sonic_bullet.listener.rows import NO_ROWS, contact_rows, place_bodies, take_step
 from sonic_bullet.listener.start import NOBODY, hooked_start
 from sonic_bullet.listener.sweep import Traces, TraceTables
 from sonic_bullet.records import Array
@@ -106,7 +106,7 @@ class Memory:
         Returns
         -------
         tuple
-            The rows, and how many are filled; STRANGERS where `start` marks links in their first contact.
+            The rows, and how many are filled; `NO_ROWS.strangers` where `start` marks links in their first contact.
 
         Raises
         ------
@@ -127,11 +127,11 @@ class Memory:
             TraceTables(traces.table, traces.count, traces.newest, traces.work),
             row,
         )
-        if count == UNKNOWN:
+        if count == NO_ROWS.unknown:
             raise SceneError(
                 "a contact names a body that is not in the world", "step the simulation once before listening on"
             )
-        if count < 0 and count != STRANGERS:
+        if count < 0 and count != NO_ROWS.strangers:
             Contacts.of(row)
         return row, count
 

@@ -16,9 +16,6 @@ from sonic_bullet.records import Body
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.simulated import Change, Simulator, Values, finite
 
-ENGINE = None
-"""The engine, in place of a body's index."""
-
 
 class SetValues:
     """Values set on engine and links since hooks are installed; a simulator does not report all of them when asked."""
@@ -80,7 +77,7 @@ class Properties:
 
     def first_step(self) -> None:
         """Read the engine's settings, with which the first step is made."""
-        self._engine = self._now[ENGINE] = self._engine_now()
+        self._engine = self._now[None] = self._engine_now()
 
     def link_changed(self, code: int, index: int, step: int) -> None:
         """Note that values of a link were set before that step."""
@@ -89,8 +86,8 @@ class Properties:
 
     def engine_changed(self, step: int) -> None:
         """Note that values of the engine were set before that step; those before the first are no change."""
-        if ENGINE in self._now:
-            self._note(ENGINE, self._engine_now(), step)
+        if None in self._now:
+            self._note(None, self._engine_now(), step)
 
     def simulator(self, versions: dict[str, str]) -> Simulator:
         """Return engine, versions and changes so far."""

@@ -8,6 +8,8 @@ Compiled; `take_step` makes a whole step in one call where no case is unusual.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sonic_bullet.listener.kinematics import relative_motion
@@ -17,11 +19,17 @@ from sonic_bullet.listener.sweep import TraceTables, sort_pairs, sweep
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records.arrays import LARGEST_SI
 
-SPAWN_DEPTH_M = 1e-4
 
-UNKNOWN, STRANGERS, ABSURD, UNUSUAL = -1, -2, -3, -4
-"""In place of a number of rows: a contact of a link that is not in the roster; links in their first contact
-(START.met); a number beyond `LARGEST`; a case that Python has to handle (`take_step`)."""
+class _NoRows(NamedTuple):
+    """In place of a number of rows."""
+
+    unknown: int = -1  # a contact of a link that is not in the roster
+    strangers: int = -2  # links in their first contact (START.met)
+    absurd: int = -3  # a number beyond `LARGEST_SI`
+    unusual: int = -4  # a case that Python has to handle (`take_step`)
+
+
+NO_ROWS = _NoRows()
 
 
 @njit(nogil=True, error_model="numpy")
@@ -73,11 +81,12 @@ def counts(touch, i, past, a, b, approach, dt):
     It does not where it is asleep, where a body was moved by hand, or where a body in its first step is deeper inside
     its partner than its speed explains. past: contacts of the step before.
     """
+    spawn_depth_m = 1e-4
     if a.moved or b.moved:
         return False
     if still(a) and still(b) and seen(touch, i, past):
         return False
-    inside = touch[i].gap_m < -(SPAWN_DEPTH_M + max(approach, 0.0) * dt)
+    inside = touch[i].gap_m < -(spawn_depth_m + max(approach, 0.0) * dt)
     return not (inside and (a.born or b.born))
 
 
@@ -115,7 +124,7 @@ def contact_rows(touch, count, past, start, dt, time, traces, row):
     Returns
     -------
     int
-        Number of rows, or UNKNOWN, STRANGERS or ABSURD.
+        Number of rows, or one of `NO_ROWS`.
     """
     made, strangers, fine, work = np.int64(0), False, True, traces.work[0]  # a literal 0 would compile sort_pairs twice
     trace = traces.table[traces.newest]
@@ -123,7 +132,7 @@ def contact_rows(touch, count, past, start, dt, time, traces, row):
         one = touch[i]
         at_a, at_b = find(start, one.code_a), find(start, one.code_b)
         if at_a < 0 or at_b < 0:
-            return UNKNOWN
+            return NO_ROWS.unknown
         a, b = start[at_a], start[at_b]
         approach = relative_motion(one, a, b, work.slip)
         if not counts(touch, i, past, a, b, approach, dt):
@@ -139,9 +148,9 @@ def contact_rows(touch, count, past, start, dt, time, traces, row):
         fine = fill(out, one, fresh, work.slip, approach) and fine
         made += 1
     if strangers:
-        return STRANGERS
+        return NO_ROWS.strangers
     if not fine:
-        return ABSURD
+        return NO_ROWS.absurd
     sort_pairs(row, made, trace)
     traces.contacts[traces.newest] = made
     return made
@@ -204,16 +213,16 @@ def take_step(  # noqa: PLR0917  called from Python, where groups would cost mor
     """Make a step of an unchanged roster; return how many contacts and rows it has, or why it has none.
 
     raw, before (k,) of RAW: polled after this step and the last. touch (k,) of TOUCH, start (n,) of START, row (k,) of
-    CONTACT, position, quaternion, teleported: filled. The rest: see `begin`, `contact_rows`, `place_bodies`. UNUSUAL:
-    a number is NaN or too large or, without hooks, a body was moved by hand or the step changed nothing; UNKNOWN,
-    STRANGERS, ABSURD: see there. The state that outlives the step is not changed then.
+    CONTACT, position, quaternion, teleported: filled. The rest: see `begin`, `contact_rows`, `place_bodies`. Unusual:
+    a number is NaN or too large or, without hooks, a body was moved by hand or the step changed nothing; the others of
+    `NO_ROWS`: see there. The state that outlives the step is not changed then.
     """
     count = load(raw, before, dt, touch)
     if not all_usable(touch, count) or (not hooked and unmoved(earlier, later)):
-        return count, UNUSUAL
+        return count, NO_ROWS.unusual
     moved = begin(earlier, later, dt, by_hand, hooked, start)
     if moved and not hooked:
-        return count, UNUSUAL
+        return count, NO_ROWS.unusual
     made = contact_rows(touch, count, past, start, dt, time, TraceTables(table, counted, newest, scratch), row)
     if made >= 0:
         place_bodies(start, position, quaternion, teleported)

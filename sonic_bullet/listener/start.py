@@ -5,7 +5,7 @@
 With hooks they were read before the step. Otherwise those left by the step before hold, except for bodies that are new
 or were moved since: there the simulator's own step is undone (`Undo`). A semi-implicit integrator has
 x(n+1) = x(n) + v(n+1)·dt, so a pose that jumps farther than its speeds allow was moved by hand. A body of mass 0 may be
-driven by resetting its pose each step: up to DRIVEN_SPEED_M_S that is motion, and the body has the velocity of that
+driven by resetting its pose each step: up to 10 m/s that is motion, and the body has the velocity of that
 move; above it, it is a jump.
 """
 # mypy: disable-error-code="no-untyped-def"
@@ -21,9 +21,6 @@ from sonic_bullet.listener.kinematics import rotation_between
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
-
-JUMP_FLOOR_M = 1e-3
-DRIVEN_SPEED_M_S = 10.0
 
 START = np.dtype(
     [
@@ -60,14 +57,15 @@ def start_table(roster: Roster) -> Array:
 
 @njit(nogil=True, error_model="numpy")
 def jump(earlier, later, static, dt):
-    """Tell whether a link moved farther than 1.5 × both speeds (static: DRIVEN_SPEED_M_S) explain."""
+    """Tell whether a link moved farther than 1.5 × both speeds (static: 10 m/s) explain."""
+    driven_speed_m_s, jump_floor_m = 10.0, 1e-3
     moved, v, w = 0.0, 0.0, 0.0
     for x in range(3):
         moved += (later.position_m[x] - earlier.position_m[x]) ** 2
         v += later.velocity_m_s[x] ** 2
         w += earlier.velocity_m_s[x] ** 2
-    reach = DRIVEN_SPEED_M_S if static else 1.5 * (np.sqrt(v) + np.sqrt(w))
-    return np.sqrt(moved) > reach * dt + JUMP_FLOOR_M
+    reach = driven_speed_m_s if static else 1.5 * (np.sqrt(v) + np.sqrt(w))
+    return np.sqrt(moved) > reach * dt + jump_floor_m
 
 
 @njit(nogil=True, error_model="numpy")

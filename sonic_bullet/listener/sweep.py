@@ -23,8 +23,6 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 
 MEMORY_STEPS = 5
-ROLL_MARGIN = 2.0
-SLIP_MARGIN = 0.05
 
 TRACE = np.dtype(
     [
@@ -38,9 +36,6 @@ TRACE = np.dtype(
     align=True,
 )
 """A contact of one step, and its place in the order of pairs."""
-
-SCRATCH = np.dtype([("x", "f8", (2, 3)), ("q", "f8", (2, 4)), ("slip", "f8", (3,))], align=True)
-"""Work space of a contact: poses of both bodies at its sub-step, and its slip."""
 
 
 class TraceTables(NamedTuple):
@@ -62,14 +57,16 @@ class Traces:
         Contacts of each table.
     newest
         Table of the coming step.
-    work : Array of SCRATCH, shape (1,)
+    work : Array, shape (1,)
+        Work space of a contact: poses of both bodies at its sub-step, and its slip.
     """
 
     def __init__(self) -> None:
+        scratch = np.dtype([("x", "f8", (2, 3)), ("q", "f8", (2, 4)), ("slip", "f8", (3,))], align=True)
         self.table: Array = np.zeros((MEMORY_STEPS + 1, 0), TRACE)
         self.count = np.zeros(MEMORY_STEPS + 1, np.int64)
         self.newest = 0
-        self.work = np.zeros(1, SCRATCH)
+        self.work = np.zeros(1, scratch)
 
     def clear(self) -> None:
         """Forget all contacts."""
@@ -180,14 +177,15 @@ def place(touch, a, b, work, fresh):
 def sweep(touch, a, b, pair, traces, work, fresh, speed):
     """Write the speeds (2,) in m/s of a contact over the bodies a and b (START rows), and its TRACE row `fresh`.
 
-    traces: TraceTables. work: SCRATCH, with the slip; the time of `fresh` is set. The distant centre of a static body
+    traces: TraceTables. work: with the slip; the time of `fresh` is set. The distant centre of a static body
     says nothing of its size.
     """
+    roll_margin, slip_margin = 2.0, 0.05
     far_a, far_b = place(touch, a, b, work, fresh)
     v, w, slip, u = a.spin_rad_s, b.spin_rad_s, work.slip, fresh.u_a_m_s
     rolled = np.sqrt((v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2)
     reach = max(0.0 if a.static else far_a, 0.0 if b.static else far_b)
-    limit = ROLL_MARGIN * rolled * reach + SLIP_MARGIN * np.sqrt(
+    limit = roll_margin * rolled * reach + slip_margin * np.sqrt(
         slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2]
     )
     if not recognise(fresh, pair, traces, work, touch.normal, limit):

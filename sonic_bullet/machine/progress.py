@@ -25,7 +25,7 @@ from functools import wraps
 from typing import ParamSpec, TypeVar
 
 Say = Callable[[str], None]
-P = ParamSpec("P")
+Params = ParamSpec("Params")
 Made = TypeVar("Made")
 
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
@@ -159,7 +159,7 @@ def progress_to(say: Say | None) -> Iterator[None]:
         _LISTENER.reset(before)
 
 
-def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made]], Callable[P, Made]]:
+def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[Params, Made]], Callable[Params, Made]]:
     """Decorate a function: where its caller gives neither argument of these names, `status` shows them.
 
     What it calls reaches the former by `report_progress`.
@@ -167,9 +167,9 @@ def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[P, Made
     text: name of the argument called with what is being done; fraction: of that called with the fraction done.
     """
 
-    def decorated(function: Callable[P, Made]) -> Callable[P, Made]:
+    def decorated(function: Callable[Params, Made]) -> Callable[Params, Made]:
         @wraps(function)
-        def called(*args: P.args, **options: P.kwargs) -> Made:
+        def called(*args: Params.args, **options: Params.kwargs) -> Made:
             names = [name for name in (text, fraction) if name]
             if any(options.get(name) is not None for name in names):
                 with progress_to(options.get(text)):  # type: ignore[arg-type]

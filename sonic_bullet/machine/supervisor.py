@@ -50,11 +50,7 @@ IDLE_S = 10.0
 END_S = 0.5
 """For an interrupted command to end by itself; it must be gone within 1 s."""
 PACKAGE = escaped(str(Path(__file__).resolve().parents[1]))
-STAND_INS = f"{PACKAGE}/listener/pybullet/"
-"""Functions that a script calls in place of PyBullet's: their time is the script's own."""
 TRACE_LINE = re.compile(r'File "(?P<file>[^"]*)", line (?P<line>\d+)')
-_FORKS_EARLY_ONLY = sys.platform != "linux"
-"""Whether libraries forbid a fork once they are loaded (macOS)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +136,9 @@ def supervised(run: Callable[[], int], *, alone: bool = True, command: str = "")
     caller goes on, and an interrupt of it ends the worker. command: heads lines of progress; "": no line before a first
     stage.
     """
+    forks_early_only = sys.platform != "linux"  # whether libraries forbid a fork once they are loaded (macOS)
     subreaper = 36  # prctl(2)
-    if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else _FORKS_EARLY_ONLY):
+    if ASK_WHERE is None or not hasattr(os, "fork") or (threading.active_count() > 1 if alone else forks_early_only):
         if alone:
             catch_stops()
         return Ending(run())
@@ -307,10 +304,12 @@ def _judgement(trace: str, scene: str) -> str:
 
     trace: its calls, the latest first, which come piece by piece.
     """
+    # functions that a script calls in place of PyBullet's: their time is the script's own
+    stand_ins = f"{PACKAGE}/listener/pybullet/"
     for one in TRACE_LINE.finditer(trace):
         if one["file"] == escaped(scene):
             return "own"
-        ours = one["file"].startswith(f"{PACKAGE}/") and not one["file"].startswith(STAND_INS)
+        ours = one["file"].startswith(f"{PACKAGE}/") and not one["file"].startswith(stand_ins)
         if ours or one["file"].startswith("<frozen importlib"):
             return "ours"
     return ""

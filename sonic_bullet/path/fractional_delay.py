@@ -30,7 +30,7 @@ TAPS = 24
 AHEAD = TAPS // 2
 LEAST_DELAY = float(AHEAD)
 HALF_DEGREE = 4
-FLUSH = 1e-30
+LEAST_PA = 1e-30
 MOST_FALL = 1.0 - 1.0 / 16.0
 """Sound emitted one sample later arrives at least 1/16 sample later: a source at or above the speed of sound is not
 overtaken by its own sound.
@@ -198,8 +198,8 @@ def flush(typingctx, out, at, count):
         def body(k: Value, load: Any, store: Any, one: Any) -> None:
             place = builder.add(at, k)
             value = load(out, place)
-            above = builder.fcmp_ordered(">=", value, one(FLUSH))
-            below = builder.fcmp_ordered("<=", value, one(-FLUSH))
+            above = builder.fcmp_ordered(">=", value, one(LEAST_PA))
+            below = builder.fcmp_ordered("<=", value, one(-LEAST_PA))
             store(builder.select(builder.or_(above, below), value, one(0.0)), out, place)
 
         _each(e, count, body)
@@ -245,7 +245,7 @@ def emit(typingctx, arrays, stride, tail, count, geometry, emitted, delay):
             inverse = builder.fdiv(constant(1.0), _greater(e, r, constant(1e-12)))
             spread = builder.select(builder.fcmp_ordered("<", inverse, known[7]), inverse, known[7])
             value = builder.fmul(e.fma(dot, inverse, given(0, source, source_at)), spread)
-            audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", VEC, value), constant(FLUSH))
+            audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", VEC, value), constant(LEAST_PA))
             e.store(builder.select(audible, value, constant(0.0)), emitted, k)
             late = _greater(e, builder.fmul(r, known[6]), constant(LEAST_DELAY))
             e.store(late, delay, k)

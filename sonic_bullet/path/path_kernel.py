@@ -33,11 +33,10 @@ from sonic_bullet.path.fractional_delay import (
     move,
     read,
 )
-from sonic_bullet.path.path_places import BLOCK, DONE, MIRRORED, move_body, survey
+from sonic_bullet.path.path_places import MIRRORED, OUTCOME, PATH_BLOCK, move_body, survey
 from sonic_bullet.records import Array
 
-_HISTORY = 3 * AHEAD
-_SPAN = BLOCK + LANES
+_SPAN = PATH_BLOCK + LANES
 WORK = 3 * _SPAN + 8 + 5 * LANES + KEPT
 """Doubles of scratch that `hear` uses."""
 AT_REST = np.zeros((0, 0, 0, 3))
@@ -113,8 +112,9 @@ def _remember(ring, at, start, n, work, before, steep):  # pragma: no cover - co
 @njit(nogil=True, error_model="numpy")
 def _wake(ring, n, late):  # pragma: no cover - compiled
     """Fill the history before sample n with silence at that delay."""
+    history = 3 * AHEAD
     memory, ring_at, late_at, mask = ring.memory, ring.at, ring.late_at, ring.mask
-    for k in range(n - _HISTORY, n):
+    for k in range(n - history, n):
         place = k & mask
         memory[ring_at + place], memory[late_at + place] = 0.0, late
         if place < MIRRORED:
@@ -224,7 +224,7 @@ def _gains(gain, b, c, fade):  # pragma: no cover - compiled
 def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR0912  # pragma: no cover - compiled
     """Compute the pressure (Pa) at samples at … at + n - 1 of the step into an `Arrivals`.
 
-    Bodies are summed in order; below 1e-30 Pa: 0. Returns DONE, or what is in the way (`path_places`).
+    Bodies are summed in order; below 1e-30 Pa: 0. Returns `OUTCOME.done`, or what is in the way.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR09
     emission, course, path, arrivals = borrowed(emission), borrowed(course), borrowed(path), borrowed(arrivals)
     scratch = borrowed(scratch)
     status = survey(step, n, emission, course, path)
-    if status != DONE:
+    if status != OUTCOME.done:
         return status
     begin_m, end_m, aim_m, out, apart = course.begin_m, course.end_m, course.aim_m, arrivals.out, arrivals.apart
     sources, places, microphone_m, first = path.sources, path.places, path.microphone_m, emission.first
@@ -277,7 +277,7 @@ def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR09
                 ring = _Ring(path.memory, ring_at, ring_at + place.size + MIRRORED, mask)
                 while lo < n:  # a block that lies in one piece
                     count = place.size - ((at + lo) & mask)
-                    count = count if count < BLOCK else BLOCK
+                    count = count if count < PATH_BLOCK else PATH_BLOCK
                     count = count if count < n - lo else n - lo
                     steep = _emit(b, emission.sets[c], first + lo, count, emission, course.x, fade, work)
                     _weaken(work.emitted, gains, course.x, first + lo, count)
@@ -288,4 +288,4 @@ def hear(at, step, n, emission, course, path, scratch, arrivals):  # noqa: PLR09
             p = place.next
     for row in range(rows):
         flush(out, row * out.shape[1] + arrivals.at, n)
-    return DONE
+    return OUTCOME.done

@@ -18,16 +18,25 @@ from sonic_bullet.machine.vector import LANES
 from sonic_bullet.path.fractional_delay import INFINITE, TAPS, greatest
 from sonic_bullet.records import Array
 
-DONE, MEMORY_SHORT, PLACES_SHORT, TOO_FAR, NOT_FINITE = range(5)
-"""Results of `hear`. But for DONE nothing has changed. After MEMORY_SHORT (a place's size is below its need) and
-PLACES_SHORT (one more a body are enough) it may be called again with longer tables: `path.grow`.
-"""
+
+class _Outcomes(NamedTuple):
+    """Results of `hear`: but for ``done`` nothing has changed."""
+
+    done: int = 0
+    # it may be called again with longer tables (`path.grow`): a place's size is below its need; one more a body are
+    # enough
+    memory_short: int = 1
+    places_short: int = 2
+    too_far: int = 3
+    not_finite: int = 4
+
+
+OUTCOME = _Outcomes()
+
 
 FARTHEST_M = 1000.0
-BLOCK = 256
+PATH_BLOCK = 256
 MIRRORED = TAPS + LANES
-MARGIN = BLOCK + 64
-"""Samples remembered beyond the longest delay: a block is emitted before any of it is read."""
 
 SOURCE = np.dtype(
     [
@@ -38,7 +47,7 @@ SOURCE = np.dtype(
         ("left", "i8"),  # step in which it was last teleported; -1: none
         ("sounds", "i8"),  # 1: emits something in this call
         ("fresh", "i8"),  # place it gets in this call; -1: none
-        ("away_m", "f8"),  # where `hear` says TOO_FAR: from the farthest microphone; else 0
+        ("away_m", "f8"),  # where `hear` says too far: from the farthest microphone; else 0
     ],
     align=True,
 )
@@ -50,7 +59,7 @@ PLACE = np.dtype(
         ("next", "i8"),  # the body's following place; -1: none
         ("rest_m", "f8", (3,)),  # where it lies, once left
         ("size", "i8"),  # samples remembered, a power of two
-        ("need", "i8"),  # where `hear` says MEMORY_SHORT: samples it must remember at least
+        ("need", "i8"),  # where `hear` says its memory is short: samples it must remember at least
         ("memory_at", "i8"),
     ],
     align=True,
@@ -145,18 +154,19 @@ def _hears(lines, body, c, channels):  # pragma: no cover - compiled
 
 @njit(nogil=True, error_model="numpy")
 def _fits(place, source, square, samples_per_m):  # pragma: no cover - compiled
-    """Return DONE, or what is wrong with a place that emits at the distance √square."""
+    """Return `OUTCOME.done`, or what is wrong with a place that emits at the distance √square."""
+    margin = PATH_BLOCK + 64  # samples remembered beyond the longest delay: a block is emitted before any of it is read
     away_m = np.sqrt(square)
     if not away_m < np.inf:
-        return NOT_FINITE
+        return OUTCOME.not_finite
     if away_m > FARTHEST_M:
         source.away_m = away_m
-        return TOO_FAR
-    need = int(away_m * samples_per_m) + 1 + MARGIN
+        return OUTCOME.too_far
+    need = int(away_m * samples_per_m) + 1 + margin
     if need <= place.size:
-        return DONE
+        return OUTCOME.done
     place.need = need
-    return MEMORY_SHORT
+    return OUTCOME.memory_short
 
 
 @njit(nogil=True, error_model="numpy")
@@ -181,12 +191,12 @@ def survey(step, n, emission, course, path):  # pragma: no cover - compiled
     """
     gain, channels, long = course.gain, len(path.microphone_m), emission.source.shape[2]
     sources, places, lines, first = path.sources, path.places, path.lines, emission.first
-    free, wrong = np.int64(0), DONE  # a plain 0 has its own type, and each callee would be compiled for it too
+    free, wrong = np.int64(0), OUTCOME.done  # a plain 0 has its own type, and each callee would be compiled for it too
     for b in range(len(sources)):
         body = sources[b]
         most = greatest(emission.source, b * long + first, emission.dipole, 3 * b * long + first, long, n)
         if most >= INFINITE:
-            return NOT_FINITE
+            return OUTCOME.not_finite
         body.sounds, body.fresh, body.away_m = 1 if most > 0 else 0, -1, 0.0
         start, stop = 0.0, 0.0
         for c in range(channels):
@@ -202,7 +212,7 @@ def survey(step, n, emission, course, path):  # pragma: no cover - compiled
         elif course.teleported[b] and observed:
             main, old = _free_place(places, lines, sources, step, free, channels), main
             if main == len(places):
-                return PLACES_SHORT
+                return OUTCOME.places_short
             body.fresh, free = main, main + 1
         elif start > stop or not start < np.inf:
             stop = start

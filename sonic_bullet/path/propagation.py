@@ -22,16 +22,7 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.path.fractional_delay import tap_polynomials
-from sonic_bullet.path.path_places import (
-    FARTHEST_M,
-    LINE,
-    MEMORY_SHORT,
-    MIRRORED,
-    PLACE,
-    PLACES_SHORT,
-    SOURCE,
-    TOO_FAR,
-)
+from sonic_bullet.path.path_places import FARTHEST_M, LINE, MIRRORED, OUTCOME, PLACE, SOURCE
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
 
@@ -143,15 +134,15 @@ def silent(path: Path, state: PathState) -> Array:
 
 
 def grow(path: Path, state: PathState, status: int) -> None:
-    """Lengthen the tables after `hear` has returned PLACES_SHORT or MEMORY_SHORT. Raises AudioError otherwise."""
-    if status == PLACES_SHORT:
+    """Lengthen the tables after `hear` has returned one of both that ask for it. Raises AudioError otherwise."""
+    if status == OUTCOME.places_short:
         _add_places(path, state, len(state.sources))
-    elif status == MEMORY_SHORT:
+    elif status == OUTCOME.memory_short:
         places = state.places
         short = np.maximum(places["need"], places["size"])
         _resize(path, state, 2 ** np.ceil(np.log2(short)).astype(np.int64))
         places["need"] = 0
-    elif status == TOO_FAR:
+    elif status == OUTCOME.too_far:
         away_m = state.sources["away_m"].copy()
         state.sources["away_m"] = 0.0
         body = int(np.flatnonzero(away_m)[0])

@@ -24,10 +24,9 @@ from sonic_bullet.files.levels import as_sound
 from sonic_bullet.records import Array, ContactMicrophone, Microphone, Sensor, Vibrometer
 from sonic_bullet.records.errors import AudioError, FileError
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
-from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, SoundEvent, find_sound_events
+from sonic_bullet.soundtrack.sound_events import SoundEvent, find_sound_events
 from sonic_bullet.storage.spooled_sound import READ_FRAMES, KeptSound
 
-BARS = {SUPPORT: "rests", ROLL: "rolls", SLIDE: "slides"}
 LANES_MAX = 24
 
 
@@ -48,14 +47,15 @@ class Events:
 
 def drawn_events(log: ContactLog, events: Sequence[SoundEvent]) -> Events:
     """Collect the strikes and the bars of rest, rolling or sliding of every body that has a model."""
+    verbs = {"support": "rests", "roll": "rolls", "slide": "slides"}  # of what lasts
     strikes: list[tuple[int, float, float]] = []
     bars: list[tuple[int, float, float, str]] = []
     for one in events:
         bodies = [i for i in (one.low, one.high) if log.bodies[i].model is not None]
-        if one.kind == IMPACT:
+        if one.kind == "impact":
             strikes += [(body, one.start_s, one.impulse_n_s) for body in bodies]
-        elif one.kind in BARS:
-            bars += [(body, one.start_s, one.end_s, BARS[one.kind]) for body in bodies]
+        elif one.kind in verbs:
+            bars += [(body, one.start_s, one.end_s, verbs[one.kind]) for body in bodies]
     return Events(
         np.array([s[0] for s in strikes], int),
         np.array([s[1] for s in strikes], float),

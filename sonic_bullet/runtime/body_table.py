@@ -22,14 +22,6 @@ from sonic_bullet.records.roughness import track_slopes
 from sonic_bullet.records.touching.surface_form import SurfaceForm
 from sonic_bullet.runtime.tables import BODY, FACE, NODE, TURN
 
-EDGE_RADIUS_SHARE = 0.005
-"""Radius of a body's edges, as a fraction of its size: broken, as made things have them."""
-EDGE_RADIUS_LEAST_M = 2e-4
-UNKNOWN_REBOUND = 0.7
-"""Restitution of a body whose log does not give it; a pair's is 0.5 then."""
-NEVER = -(1 << 40)
-"""Number of a step that was long ago."""
-
 
 @dataclass(frozen=True, slots=True)
 class _Place:
@@ -42,9 +34,6 @@ class _Place:
     node_at: int
     wall_m: float
     tie_m: float
-
-
-_NOWHERE = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
 
 
 def _stand(row: Any, place: _Place) -> None:
@@ -142,6 +131,10 @@ class BodyTable:
 
     def add(self, resonator: Resonator, follows: Array, surface_seed: int) -> int:
         """Add a body and return its index. follows (l,): the mode that each line of its residual is struck as."""
+        never = -(1 << 40)  # number of a step that was long ago
+        unknown_rebound = 0.7  # restitution of a body whose log does not give it; a pair's is 0.5 then
+        # radius of a body's edges, as a fraction of its size: broken, as made things have them
+        edge_radius_share, edge_radius_least_m = 0.005, 2e-4
         place = self._place(resonator, np.asarray(follows, np.int64))
         body = resonator.body
         material = body.material
@@ -156,7 +149,7 @@ class BodyTable:
         self._enter_form(row, None if material is None else material.form)
         row["size_m"], row["volume_m3"] = resonator.size_m, body.volume_m3
         row["curvature_per_m"] = body.curvature_per_m
-        row["edge_per_m"] = 1.0 / max(EDGE_RADIUS_SHARE * resonator.size_m, EDGE_RADIUS_LEAST_M)
+        row["edge_per_m"] = 1.0 / max(edge_radius_share * resonator.size_m, edge_radius_least_m)
         row["surface_seed"] = surface_seed
         row["rigid"] = resonator.translation is not None
         row["modes"] = resonator.mode_count
@@ -164,8 +157,8 @@ class BodyTable:
         _stand(row, place)
         # a silent partner's record begins where it first touches, not where it was put
         row["placed"] = -SPAN if material is None else body.since_step
-        row["rebound"] = body.dynamics.get("restitution", UNKNOWN_REBOUND)
-        row["loaded"] = row["cause_step"] = row["since_step"] = NEVER
+        row["rebound"] = body.dynamics.get("restitution", unknown_rebound)
+        row["loaded"] = row["cause_step"] = row["since_step"] = never
         row["turn_at"] = -1
         return self._bodies.append(row)
 
@@ -237,9 +230,10 @@ class BodyTable:
 
     def _place(self, resonator: Resonator, follows: Array) -> _Place:
         """Return the place of the arrays of the body's model, added if it is the first that has it."""
+        nowhere = _Place(0, 0, 0, 0, 0, 0.0, 0.0)
         model, index = resonator.body.model, resonator.index
         if model is None or index is None:
-            return _NOWHERE
+            return nowhere
         key = (model, follows.tobytes(), resonator.rigid_columns)  # records are compared by identity
         place = self._places.get(key)
         if place is None:

@@ -15,6 +15,7 @@ calls again. Sums in a fixed order: rows as they came, pairs by key, bodies by i
 from __future__ import annotations
 
 from struct import Struct
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,14 +34,32 @@ from sonic_bullet.machine.grouping import grouping
 from sonic_bullet.machine.vector import LANES
 from sonic_bullet.path.images.image_gains import image_gains
 from sonic_bullet.path.path_kernel import WORK, hear
-from sonic_bullet.path.path_places import DONE, Arrivals, Course, Emission
+from sonic_bullet.path.path_places import OUTCOME, Arrivals, Course, Emission
 from sonic_bullet.runtime.groups import Groups
 
-TO_GROW, PAUSED, BROKEN, TO_UPDATE_POLES = -1, -2, -3, -4
-"""Why the driver returned early: a table is too small; asked to stop before `hear`; an error (a sum that is not finite
-or a strike without a place); poles are to be computed. Else it is DONE, or the result of `path_kernel.hear`."""
-ANEW, RINGS, EXCITED = 0, 1, 2
-"""Progress of the first step: nothing is done; it rings, and `hear` is next; its pulses and drives are there."""
+
+class _Stops(NamedTuple):
+    """Why the driver returned early; else its status is `OUTCOME.done`, or another result of `path_kernel.hear`."""
+
+    to_grow: int = -1  # a table is too small
+    paused: int = -2  # asked to stop before `hear`
+    broken: int = -3  # a sum is not finite, or a strike has no place
+    to_update_poles: int = -4
+
+
+STOP = _Stops()
+
+
+class _Resumes(NamedTuple):
+    """Progress of the first step."""
+
+    anew: int = 0  # nothing is done
+    rings: int = 1  # and `hear` is next
+    excited: int = 2  # its pulses and drives are there
+
+
+RESUME = _Resumes()
+
 STEP = np.dtype(
     [
         ("dt_s", "f8"),  # of the step taken in
@@ -175,10 +194,10 @@ def advance_steps(values):  # pragma: no cover - compiled
     call, given, frames, window, table, pairs, supports, bank, scratch, path = grouped(values)
     done, sr = 0, call.sr
     for i in range(call.first, len(given.steps)):
-        step, number, far = given.steps[i], call.taken + i, call.resume if i == call.first else ANEW
-        if far == ANEW:
+        step, number, far = given.steps[i], call.taken + i, call.resume if i == call.first else RESUME.anew
+        if far == RESUME.anew:
             if not has_room(step.row[1] - step.row[0], window, pairs, bank, scratch):
-                return done, TO_GROW
+                return done, STOP.to_grow
             take(i, number, given, window, pairs)
         number -= LOOKAHEAD
         if number >= 0:
@@ -186,27 +205,27 @@ def advance_steps(values):  # pragma: no cover - compiled
             x = np.empty(n)
             for k in range(n):
                 x[k] = min(max((k + step.offset) / (dt_s * sr), 0.0), 1.0)
-            if far == ANEW:
+            if far == RESUME.anew:
                 excite(number, step.quench, x, sr, window, table, pairs, scratch)
                 if len(supports.credit_s) > 0 and track_supports(number, window, table, pairs, supports, bank, scratch):
-                    return done, TO_UPDATE_POLES
-            if far != RINGS:
+                    return done, STOP.to_update_poles
+            if far != RESUME.rings:
                 if not ring(step, x, sr, bank, scratch):
-                    return done, BROKEN
+                    return done, STOP.broken
                 if call.pause:
-                    return done, PAUSED
+                    return done, STOP.paused
             status = finish(i, number, x, given, frames, window, scratch, path)
-            if status != DONE:
+            if status != OUTCOME.done:
                 return done, status
         done += 1
-    return done, DONE
+    return done, OUTCOME.done
 
 
 @njit(nogil=True, error_model="numpy")
 def finish(i, number, x, given, frames, window, scratch, path):  # pragma: no cover - compiled
     """Write step ``number``, i of those given, which rings in the scratch, into frames.out.
 
-    Returns DONE, or what is in the way.
+    Returns `OUTCOME.done`, or what is in the way.
     """
     step, here, there = given.steps[i], number % SPAN, (number + 1) % SPAN
     at, aim_m, out, reads = step.sample - frames.start, given.aim_m, frames.out, frames.reads
@@ -216,14 +235,14 @@ def finish(i, number, x, given, frames, window, scratch, path):  # pragma: no co
     course = Course(window.position_m[here], window.position_m[there], window.teleported[there], x, aim_m, gain)
     arrivals = Arrivals(frames.pressure, at, frames.apart)
     status = hear(step.sample, number, step.count, emission, course, path, np.zeros(WORK), arrivals)
-    if status != DONE:
+    if status != OUTCOME.done:
         return status
     if not sum_at_sensors(scratch.source, step.count, at, frames):
-        return BROKEN
+        return STOP.broken
     m = 0
     for row in range(len(out)):
         if reads[row % len(reads)] == 0:
             for k in range(at, at + step.count):
                 out[row, k] = frames.pressure[m, k]
             m += 1
-    return DONE
+    return OUTCOME.done

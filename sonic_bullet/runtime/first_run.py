@@ -22,12 +22,6 @@ from sonic_bullet.runtime.groups import Groups
 
 STAGES = (driver.excite, driver.ring, driver.finish, driver.take, driver.track_supports)
 """Stages, the slowest to compile first. Whatever types they get here, the driver compiles those that it needs."""
-INNER = {
-    **dict.fromkeys(("i", "number", "quench"), types.int64),
-    "x": types.Array(types.float64, 1, "C"),
-    "sr": types.float64,
-}
-"""Arguments of stages that are not groups."""
 
 
 def make_driver(values: tuple[Any, ...]) -> None:
@@ -61,6 +55,12 @@ def _make_stages(kinds: Any) -> None:
 
 def stage_types(stage: Any, kinds: Any) -> tuple[Any, ...]:
     """Return the types of a stage's arguments where the driver's values have the types ``kinds``."""
-    known = INNER | dict(zip(Groups._fields, group_types(Groups, kinds.types), strict=True))
+    # arguments of stages that are not groups
+    inner = {
+        **dict.fromkeys(("i", "number", "quench"), types.int64),
+        "x": types.Array(types.float64, 1, "C"),
+        "sr": types.float64,
+    }
+    known = inner | dict(zip(Groups._fields, group_types(Groups, kinds.types), strict=True))
     known["step"] = known["given"].types[0].dtype
     return tuple(known[name] for name in inspect.signature(stage.py_func).parameters)

@@ -1,6 +1,6 @@
 """Replay of a contact log: the run time with all steps at hand.
 
-ContactLog -> radiation of its bodies -> steps of the same bodies, up to AT_ONCE -> Synthesizer -> blocks, all, or kept
+ContactLog -> radiation of its bodies -> steps of the same bodies, up to 64 -> Synthesizer -> blocks, all, or kept
 """
 
 from __future__ import annotations
@@ -42,9 +42,6 @@ __all__ = [
     "silence_notes",
     "why_silent",
 ]
-
-AT_ONCE = 64
-"""Steps that a replay takes in at once, between two reports of progress."""
 
 
 @says_so(text="say", fraction="progress")
@@ -201,9 +198,10 @@ def quenched_steps(log: ContactLog) -> set[int]:
 
 def together(steps: Iterable[Step], quenches: set[int]) -> Iterator[list[Step]]:
     """Group the steps that a replay takes in at once: of the same bodies, with no quench between."""
+    at_once = 64  # steps that a replay takes in at once, between two reports of progress
     group: list[Step] = []
     for number, step in enumerate(steps):
-        if group and (len(group) == AT_ONCE or number in quenches or not same_bodies(step, group[0])):
+        if group and (len(group) == at_once or number in quenches or not same_bodies(step, group[0])):
             yield group
             group = []
         group.append(step)

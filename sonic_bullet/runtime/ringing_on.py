@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 TAIL_DB = -60.0
 """Default end of a tail: the fall of level that reverberation times are stated for [ISO 3382-1:2009, sec. 3.2]."""
-MOST_S = 10.0
 CHECKED_S = 0.1
 """Length checked at once: longer than beats of neighbouring modes that a listener hears as one decay."""
 
@@ -64,8 +63,9 @@ def with_tail(
 ) -> KeptSound:
     """Extend the sound up to the end of ``last`` by its tail, until each channel is tail_db below its peak.
 
-    At most `MOST_S` longer; longer_s: by so much more, for what a room makes of it.
+    At most 10 s longer; longer_s: by so much more, for what a room makes of it.
     """
+    most_s = 10.0
     if last is None or not len(setup.sensors):
         return sound
     microphone_m = setup.microphone_m if state.space is None else state.space.place_m
@@ -78,7 +78,7 @@ def with_tail(
     loud = bool((_peak(sound.read(max(0, frames - math.ceil(CHECKED_S * setup.sr)), frames)) > weakest * peak).any())
     kept: list[Array] = []
     waiting: list[Array] = []
-    room, silent = round((MOST_S + longer_s) * setup.sr), 0
+    room, silent = round((most_s + longer_s) * setup.sr), 0
     for made in ring_on(setup, state, last):
         block = made[:, :room]
         now = _peak(block)

@@ -117,27 +117,28 @@ def _advanced(setup: Setup, state: State, steps: Sequence[Step]) -> Array:
     longest = int(table["count"].max()) if len(steps) > 1 else stop - begin
     if state.scratch.samples < longest:
         _make_room(state, table[0], longest)
-    given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.ANEW
+    given, done, resume = StepTables(table, contacts, poses[0], poses[1], poses[2], aim), 0, driver.RESUME.anew
     frames = Frames(begin, int(by_body), state.reads, state.sets, pressure, out)
     while done < len(steps):
         values = (*DriverCall(done, state.taken, pause, resume, float(sr)), *given, *frames, *state.tables())
         _load_code(setup, state, values)
         more, status = driver.advance_steps(values)
-        done, resume = done + more, driver.ANEW if status in (driver.TO_GROW, path_places.DONE) else driver.RINGS
-        if status == path_places.DONE:
+        again = status in (driver.STOP.to_grow, path_places.OUTCOME.done)
+        done, resume = done + more, driver.RESUME.anew if again else driver.RESUME.rings
+        if status == path_places.OUTCOME.done:
             continue
-        if status == driver.TO_GROW:
+        if status == driver.STOP.to_grow:
             _make_room(state, table[done], longest)
-        elif status == driver.TO_UPDATE_POLES:
+        elif status == driver.STOP.to_update_poles:
             update_poles(state, state.taken + done - LOOKAHEAD)
-            resume = driver.EXCITED
-        elif status == driver.PAUSED:
+            resume = driver.RESUME.excited
+        elif status == driver.STOP.paused:
             found, drives = state.scratch.count.tolist()
             if state.has_residual:
                 add_residuals(setup, state, table[done], found, drives)
             if state.observer is not None:
                 state.observer(state, state.taken + done - LOOKAHEAD, table[done], found, drives)
-        elif status == driver.BROKEN:
+        elif status == driver.STOP.broken:
             what = "the synthesizer made NaN or infinite samples, or lost a strike"
             raise AudioError(what, "report the contact log: this must not happen")
         else:

@@ -36,7 +36,7 @@ from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.roughness import with_roughness as with_roughness_of
 from sonic_bullet.session.material_choice import as_choice
 
-SURFACES, PLACE_VARIATION, MATERIAL_VARIATION = VARIED = ("surfaces", "places", "materials")
+VARIED = ("surfaces", "places", "materials")
 AS_SIMULATED = "motion, masses and contact forces of every take are those of the log"
 
 
@@ -69,12 +69,12 @@ def make_take(log: ContactLog, number: int, variation: Variation | None = None) 
         raise SceneError(f"takes do not vary in {unknown[0]}", nearest(unknown[0], list(VARIED)))
     made = log
     drawn: dict[str, dict[str, float]] = {}
-    if PLACE_VARIATION in variation.varied:
+    if "places" in variation.varied:
         made = _moved_contacts(made, number, variation.footprint_m)
-    if MATERIAL_VARIATION in variation.varied:
+    if "materials" in variation.varied:
         made, drawn = _other_materials(made, number)
-    if SURFACES in variation.varied:
-        made = replace(made, seed=int(_state(log.seed, number, SURFACES)[0]))
+    if "surfaces" in variation.varied:
+        made = replace(made, seed=int(_state(log.seed, number, "surfaces")[0]))
     return LogTake(number, made, drawn)
 
 
@@ -125,7 +125,7 @@ def _moved_contacts(log: ContactLog, number: int, footprint_m: float | None) -> 
             met[pair] = met.get(pair, 0) + 1
             who = (*_identity(log.bodies[pair[0]]), *_identity(log.bodies[pair[1]]), met[pair])
             radius = min(own[pair[0]], own[pair[1]])
-            now[pair] = _in_ball(_generator(log.seed, number, PLACE_VARIATION, *who)) * (
+            now[pair] = _in_ball(_generator(log.seed, number, "places", *who)) * (
                 radius if np.isfinite(radius) else 0.0
             )
         touching = now
@@ -164,7 +164,7 @@ def _other_materials(log: ContactLog, number: int) -> tuple[ContactLog, dict[str
     for body in log.bodies:
         factors = {}
         if body.material is not None:
-            factors = draw_factors(body.material, _generator(log.seed, number, MATERIAL_VARIATION, *_identity(body)))
+            factors = draw_factors(body.material, _generator(log.seed, number, "materials", *_identity(body)))
         if factors:
             drawn[body.name] = factors
             body = vary_body(body, factors)  # noqa: PLW2901 - the same body

@@ -15,7 +15,7 @@ from typing import Any
 
 from sonic_bullet.files import replacing
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.soundtrack.sound_events import SOUNDING, SoundEvent
+from sonic_bullet.soundtrack.sound_events import SoundEvent
 from sonic_bullet.storage.json_text import json_bytes
 
 EVENT_COLUMNS = (
@@ -42,7 +42,7 @@ def rows_of(events: Sequence[SoundEvent], log: ContactLog) -> list[dict[str, Any
     """Return the active events, by column."""
     rows = []
     for one in events:
-        if one.kind in SOUNDING and not one.reason:
+        if one.kind in ("impact", "roll", "slide") and not one.reason:
             a, b = log.bodies[one.low], log.bodies[one.high]
             names = [body.name.encode("utf-8", "replace").decode() for body in (a, b)]
             values = (

@@ -15,14 +15,14 @@ import numpy as np
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.pictures import Camera
 from sonic_bullet.records import Array
-from sonic_bullet.soundtrack.sound_events import IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED, SoundEvent, name_pair
+from sonic_bullet.soundtrack.sound_events import SoundEvent, name_pair
 
 COLOURS = {
-    IMPACT: (255, 120, 0),
-    ROLL: (0, 120, 255),
-    SLIDE: (220, 0, 160),
-    SUPPORT: (110, 110, 110),
-    UNCAUSED: (110, 110, 110),
+    "impact": (255, 120, 0),
+    "roll": (0, 120, 255),
+    "slide": (220, 0, 160),
+    "support": (110, 110, 110),
+    "uncaused strike": (110, 110, 110),
 }
 SHOWN_S = 0.25
 """How long an impact is shown: one of a millisecond would be in no picture."""
@@ -53,7 +53,7 @@ def with_contacts(
     draw = ImageDraw.Draw(image)
     unit = max(size[1] / 720, 0.5)
     for event in events:
-        touch = None if event.kind == IMPACT else touching.get((event.low, event.high))
+        touch = None if event.kind == "impact" else touching.get((event.low, event.high))
         at = pixel(np.array(touch.place_m) if touch is not None else event.place_m, camera, size)
         if at is not None and abs(at[0]) < 1e5 and abs(at[1]) < 1e5:
             _mark(draw, event, at, unit, time_s)
@@ -73,15 +73,15 @@ def shown_at(events: Sequence[SoundEvent], time_s: float) -> list[SoundEvent]:
         one
         for one in events
         if one.start_s <= time_s + 1e-9
-        and time_s < max(one.end_s, one.start_s + (SHOWN_S if one.kind == IMPACT else 0))
+        and time_s < max(one.end_s, one.start_s + (SHOWN_S if one.kind == "impact" else 0))
     ]
 
 
 def _worded(events: Sequence[SoundEvent]) -> list[SoundEvent]:
     """Choose the events that are described in words: what lasts, the latest impacts, and then what is silent."""
     lines, silent_lines = 7, 4
-    sounds = sorted((x for x in events if not x.reason), key=lambda x: (x.kind == IMPACT, -x.start_s))
-    silent = sorted((x for x in events if x.reason), key=lambda x: (x.kind == SUPPORT, -x.start_s))
+    sounds = sorted((x for x in events if not x.reason), key=lambda x: (x.kind == "impact", -x.start_s))
+    silent = sorted((x for x in events if x.reason), key=lambda x: (x.kind == "support", -x.start_s))
     return sounds[:lines] + silent[:silent_lines]
 
 
@@ -90,13 +90,13 @@ def _mark(draw: Any, event: SoundEvent, at: tuple[float, float], unit: float, ti
     quietest_db, pixels_a_db = 40.0, 0.5
     colour, (x, y) = COLOURS[event.kind], at
     loud = max((event.level_db or quietest_db) - quietest_db, 4.0)
-    if event.kind == IMPACT:
+    if event.kind == "impact":
         radius = unit * (3 + pixels_a_db * loud * (0.4 + 0.6 * min((time_s - event.start_s) / SHOWN_S, 1.0)))
         draw.ellipse((x - radius, y - radius, x + radius, y + radius), outline=colour, width=max(round(3 * unit), 1))
-    elif event.kind in (ROLL, SLIDE):
+    elif event.kind in ("roll", "slide"):
         radius = unit * (3 + 0.15 * loud)
         draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
-    elif event.kind == SUPPORT:
+    elif event.kind == "support":
         draw.rectangle((x - 3 * unit, y - 3 * unit, x + 3 * unit, y + 3 * unit), outline=colour)
     else:
         for turn in (-1, 1):
@@ -104,7 +104,11 @@ def _mark(draw: Any, event: SoundEvent, at: tuple[float, float], unit: float, ti
 
 
 def _words(event: SoundEvent, log: ContactLog) -> str:
-    size = f"{event.impulse_n_s * 1e3:.3g} mN·s" if event.kind in (IMPACT, UNCAUSED) else f"{event.speed_m_s:.2g} m/s"
+    size = (
+        f"{event.impulse_n_s * 1e3:.3g} mN·s"
+        if event.kind in ("impact", "uncaused strike")
+        else f"{event.speed_m_s:.2g} m/s"
+    )
     level = f"{event.level_db:.0f} dB" if event.level_db is not None else ""
     silent = f"silent: {event.reason}" if event.reason else level
-    return f"{event.kind}  {name_pair(event, log)}  {'' if event.kind == SUPPORT else size}  {silent}"
+    return f"{event.kind}  {name_pair(event, log)}  {'' if event.kind == 'support' else size}  {silent}"

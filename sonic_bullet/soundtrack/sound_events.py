@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,7 @@ from sonic_bullet.runtime.body_stems import render_per_body
 from sonic_bullet.runtime.synthesis_state import State
 from sonic_bullet.soundtrack.own_sound import OwnSound
 
-IMPACT, ROLL, SLIDE, SUPPORT, UNCAUSED = "impact", "roll", "slide", "support", "uncaused strike"
-SOUNDING = (IMPACT, ROLL, SLIDE)
+EventKind = Literal["impact", "roll", "slide", "support", "uncaused strike"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +53,7 @@ class SoundEvent:
     reason : why it is silent, empty where it sounds
     """
 
-    kind: str
+    kind: EventKind
     start_s: float
     end_s: float
     low: int
@@ -76,9 +75,6 @@ class _Touch(NamedTuple):
     approach_m_s: float
 
 
-_NO_TOUCH = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-
-
 class _Moment(NamedTuple):
     """A pair in a step, or a pulse of it."""
 
@@ -87,7 +83,7 @@ class _Moment(NamedTuple):
     step: int
     start_s: float
     end_s: float
-    kind: str
+    kind: EventKind
     touch: _Touch
     impulse_n_s: float
     speed_m_s: float
@@ -138,6 +134,7 @@ class EventObserver:
 
     def __call__(self, state: State, number: int, step: Array, found: int, drives: int) -> None:
         """Take in the pulses and drives of step ``number``, and which pairs carry load without them."""
+        no_touch = _Touch((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
         self._sr = state.bank.sr
         here, there = self._touching(number), self._touching(number + 1)
         begin_s, after_s = float(step["begin_s"]), float(step["after_s"])
@@ -146,12 +143,12 @@ class EventObserver:
             ahead = int(pulse["ahead"])
             of, start_s = (there, after_s) if ahead else (here, begin_s)
             start_s += float(pulse["start_s"])
-            touch = of.get((low, high)) or here.get((low, high)) or _NO_TOUCH
+            touch = of.get((low, high)) or here.get((low, high)) or no_touch
             self._struck[low, high] = number + ahead
             impulse = float(np.linalg.norm(pulse["impulse_n_s"]))
             speed, own = max(touch.approach_m_s, 0), self._peak_pa(state, number + ahead, start_s, at, (low, high))
             self._seen.append(
-                _Moment(low, high, number + ahead, start_s, start_s, IMPACT, touch, impulse, speed, "", own)
+                _Moment(low, high, number + ahead, start_s, start_s, "impact", touch, impulse, speed, "", own)
             )
         active = state.pairs.active[: state.pairs.count[0]]
         pair, driven = state.pairs.pair[active], np.isin(active, state.scratch.slot[:drives])
@@ -165,23 +162,24 @@ class EventObserver:
         carries_weight = "it carries weight: nothing strikes, and no surface sweeps past"
         no_cause = "nothing approached faster than gravity brings it while it rests"
         no_voice = "neither body has modes, nor moves freely"
+        kind: EventKind
         for i in np.flatnonzero(driven | leaps | carries).tolist():
             who = bodies[i][0], bodies[i][1]
-            touch = there.get(who) or here.get(who) or _NO_TOUCH
+            touch = there.get(who) or here.get(who) or no_touch
             load, speed = float(force[i]) * (after_s - begin_s), touch.sweep_m_s
             if driven[i]:
                 slides = touch.slip_m_s > max(SWEEP_FLOOR_M_S, 0.5 * speed)
-                kind, speed, reason = (SLIDE, touch.slip_m_s, "") if slides else (ROLL, speed, "")
+                kind, speed, reason = ("slide", touch.slip_m_s, "") if slides else ("roll", speed, "")
             elif leaps[i] and number - self._struck.get(who, -SPAN) >= SPAN:
-                kind, speed, reason = UNCAUSED, max(touch.approach_m_s, 0), no_cause
+                kind, speed, reason = "uncaused strike", max(touch.approach_m_s, 0), no_cause
             elif carries[i]:
-                kind, reason = SUPPORT, carries_weight
+                kind, reason = "support", carries_weight
             else:
                 continue
             reason = no_voice if mute[i] else reason
             own = rubs.get(int(active[i]), 0.0)
             moment = _Moment(*who, number, begin_s, after_s, kind, touch, load, speed, reason, own)
-            if kind == UNCAUSED:
+            if kind == "uncaused strike":
                 self._seen.append(moment)
                 continue
             runs = self._runs.setdefault(who, [])
@@ -221,7 +219,7 @@ class EventObserver:
         found: list[SoundEvent] = []
         for _, mine in groupby(order, key=lambda one: one[:2]):
             moments = list(mine)
-            for kind, apart in ((IMPACT, 1), (UNCAUSED, SPAN)):
+            for kind, apart in (("impact", 1), ("uncaused strike", SPAN)):
                 found += [self._impact(group) for group in _strikes([x for x in moments if x.kind == kind], apart)]
         found += [self._span(run) for runs in self._runs.values() for run in _spans(runs)]
         return tuple(sorted(found, key=lambda one: (one.start_s, one.low, one.high, one.kind)))
@@ -331,11 +329,11 @@ def cues_of(
     return tuple(
         Cue(
             at,
-            0 if one.kind == IMPACT else round((one.end_s - one.start_s) * sr),
+            0 if one.kind == "impact" else round((one.end_s - one.start_s) * sr),
             f"{one.kind} {name_pair(one, log)} {_size(one)}",
         )
         for one in events
-        if one.kind in SOUNDING and not one.reason and (body is None or body in (one.low, one.high))
+        if one.kind in ("impact", "roll", "slide") and not one.reason and (body is None or body in (one.low, one.high))
         if (at := round(one.arrival_s * sr)) < frames
     )
 
@@ -347,4 +345,4 @@ def name_pair(event: SoundEvent, log: ContactLog) -> str:
 
 def _size(event: SoundEvent) -> str:
     """Format an event's size in letters that every reader of RIFF knows."""
-    return f"{event.impulse_n_s * 1e3:.3g} mN s" if event.kind == IMPACT else f"{event.speed_m_s:.3g} m/s"
+    return f"{event.impulse_n_s * 1e3:.3g} mN s" if event.kind == "impact" else f"{event.speed_m_s:.3g} m/s"

@@ -35,7 +35,7 @@ HEADER = "header"
 REMEDY = "use the file as sonic-bullet wrote it, or make it again"
 Header = TypeVar("Header", bound=msgspec.Struct)
 
-LOADED_BYTES, HEAD_BYTES = 1 << 20, 1 << 16  # entries that may stay in the file are larger; an npy header is shorter
+LOADED_BYTES = 1 << 20  # entries that may stay in the file are larger; an npy header is shorter
 
 
 class _Format(msgspec.Struct):
@@ -193,10 +193,11 @@ def _entries(archive: zipfile.ZipFile) -> Iterator[tuple[str, zipfile.ZipInfo]]:
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: BinaryIO, lazy: bool) -> Any:
     """Read the array of an entry, or its rows in the file; zipfile compares checksums at an entry's end."""
+    head_bytes = 1 << 16  # an npy header is shorter
     local_bytes = 30  # of an entry's own header, without its name and extra field [PKWARE APPNOTE 6.3.10, 4.3.7]
     where = f"entry '{info.filename}'"
     with archive.open(info) as entry:
-        head = entry.read(HEAD_BYTES)
+        head = entry.read(head_bytes)
         dtype, shape, fortran, at = _npy_head(head, info.file_size, where)
         stays = lazy and info.file_size > LOADED_BYTES and info.compress_type == zipfile.ZIP_STORED
         if not stays or (fortran and len(shape) > 1):  # in Fortran's order rows are not contiguous

@@ -12,12 +12,21 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from sonic_bullet.records.errors import FileError, SonicBulletError, excerpt
 from sonic_bullet.storage.atomic import cannot
 
-# most characters from a file: in all; in the fault and in the remedy, where it would be more
-QUOTED, WHAT, REMEDY_LETTERS = 200, 120, 80
+
+class _Letters(NamedTuple):
+    """Most characters from a file."""
+
+    whole: int = 200
+    fault: int = 120  # of this and the remedy, where the whole would be more
+    remedy: int = 80
+
+
+LETTERS = _Letters()
 
 
 @contextmanager
@@ -38,7 +47,7 @@ def reading(path: str | os.PathLike[str], thing: str, kind: type[SonicBulletErro
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise kind(f"{path} is cut or no {thing} ({excerpt(reason, WHAT)})", remedy) from error
+        raise kind(f"{path} is cut or no {thing} ({excerpt(reason, LETTERS.fault)})", remedy) from error
 
 
 def refuse_lfs_pointer(path: str | os.PathLike[str], kind: type[SonicBulletError] = FileError) -> None:
@@ -59,19 +68,20 @@ def _with_path(error: SonicBulletError, path: str, kind: type[SonicBulletError])
     """Return the error as ``kind``, with the path and a limited part of the file's text; None where it already is."""
     # every text has the empty name in it
     before, named, after = error.what.partition(path) if path else (error.what, " ", "")
-    if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= QUOTED:
+    if named and type(error) is kind and len(before) + len(after) + len(error.remedy) <= LETTERS.whole:
         return None
     if not named:
         before, after = "", f": {error.what}"
-    short = len(before) + len(after) <= WHAT or len(before) + len(after) + len(error.remedy) <= QUOTED
+    short = len(before) + len(after) <= LETTERS.fault or len(before) + len(after) + len(error.remedy) <= LETTERS.whole
     what = (
         f"{before}{path}{after}"
         if short
-        else f"{excerpt(before, WHAT // 2)}{path}{excerpt(after, WHAT // 2 if before else WHAT)}"
+        else f"{excerpt(before, LETTERS.fault // 2)}{path}"
+        f"{excerpt(after, LETTERS.fault // 2 if before else LETTERS.fault)}"
     )
     return kind(
         what,
         error.remedy
-        if len(error.remedy) <= max(REMEDY_LETTERS, QUOTED - len(before) - len(after))
-        else excerpt(error.remedy, REMEDY_LETTERS),
+        if len(error.remedy) <= max(LETTERS.remedy, LETTERS.whole - len(before) - len(after))
+        else excerpt(error.remedy, LETTERS.remedy),
     )

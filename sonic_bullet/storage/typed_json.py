@@ -19,13 +19,13 @@ from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.storage.json_text import json_bytes
 from sonic_bullet.storage.unread import nearest_field, shown
 
-T = TypeVar("T")
+Form = TypeVar("Form")
 Key = str | int
 ANY = "..."
 """Step into an object of free names, which msgspec does not name."""
 
 
-def decode_json(content: bytes, form: type[T], where: str, error: type[SonicBulletError], remedy: str) -> T:
+def decode_json(content: bytes, form: type[Form], where: str, error: type[SonicBulletError], remedy: str) -> Form:
     """Decode JSON of a form that msgspec knows.
 
     Parameters

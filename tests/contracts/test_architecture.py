@@ -265,6 +265,35 @@ def test_docstrings_name_modules_that_exist() -> None:
     assert found == []
 
 
+def missing_files(text: str, folder: Path) -> list[str]:
+    """Files that a package's docstring names, `poles.py` or `bank/poles.py`, that are not there, from its own folder or
+    from the root on; and modules of elsewhere that it lists as its own, `poles` of bank in that of path.
+    """
+    paths = [
+        name for name in re.findall(r"(?<![\w/.])(?:\w+/)*\w+\.py\b", text) if Path(name).name not in EXAMPLE_FILES
+    ]
+    roots = folder, folder.parent / "common", PACKAGE, REPO  # common: what the packages beside it share
+    missing = [name for name in paths if not any((root / name).exists() for root in roots)]
+    shipped = {path.stem for path in MODULES} - {path.parent.name for path in MODULES}
+    for name in re.findall(r"(?<=`)[a-z_]+(?=`)", text):
+        here = name in exported_words(folder) or (folder / name).exists() or (folder / f"{name}.py").exists()
+        if name in shipped and not (here or (PACKAGE / f"{name}.py").exists()):
+            missing.append(name)
+    return missing
+
+
+def test_packages_name_their_own_files() -> None:
+    assert missing_files("path_kernel.py, path/path_kernel.py, studies/ren2013, `propagation`", PACKAGE / "path") == []
+    assert missing_files("poles.py, bank/tally.py, `poles`", PACKAGE / "path") == ["poles.py", "bank/tally.py", "poles"]
+    found, looked_at = [], 0
+    for path in PACKAGE.rglob("__init__.py"):
+        if text := ast.get_docstring(parse(path)):
+            looked_at += 1
+            found += [f"{path.relative_to(PACKAGE)}: {name}" for name in missing_files(text, path.parent)]
+    assert looked_at > 50
+    assert found == []
+
+
 def test_files_stay_short() -> None:
     long = {
         str(path.relative_to(REPO)): n for path in MODULES if (n := len(path.read_text().splitlines())) > LONGEST_LINES

@@ -91,6 +91,29 @@ def identifiers(tree: ast.AST) -> Iterator[str]:
                 yield from name.split(".")
 
 
+def bound_names(target: ast.expr) -> Iterator[str]:
+    """The names that an assignment's target binds, those of a tuple one by one."""
+    match target:
+        case ast.Name(id=name):
+            yield name
+        case ast.Tuple(elts=parts) | ast.List(elts=parts):
+            for part in parts:
+                yield from bound_names(part)
+
+
+def constants(tree: ast.Module) -> Iterator[str]:
+    """The constants of a module: names in capitals that its top level assigns, dtypes and private ones too."""
+    for node in tree.body:
+        match node:
+            case ast.Assign(targets=targets):
+                names = [name for target in targets for name in bound_names(target)]
+            case ast.AnnAssign(target=target):
+                names = list(bound_names(target))
+            case _:
+                continue
+        yield from (name for name in names if re.fullmatch(r"_*[A-Z][A-Z0-9_]*", name))
+
+
 def private_words(path: Path) -> set[str]:
     """The identifiers of a file that hold a private word, its own name among them."""
     return {name for name in (*identifiers(ast.parse(path.read_text())), path.stem) if parts(name) & PRIVATE_WORDS}
@@ -123,6 +146,17 @@ def test_identifiers_hold_no_private_word() -> None:
     print(f"{len(MODULES)} files looked at")
     assert len(MODULES) > 100
     assert found == {}
+
+
+def test_no_constants_name_stands_in_two_packages() -> None:
+    source = "A, (B, _C) = 1, (2, 3)\nD: int = 4\ne = Float = 5\ndef f():\n    G = 6\nclass H:\n    I = 7\n"
+    assert list(constants(ast.parse(source))) == ["A", "B", "_C", "D"]
+    places = defaultdict(set)
+    for path in MODULES:
+        for name in constants(ast.parse(path.read_text())):
+            places[name].add(path.relative_to(PACKAGE).parts[0])
+    assert len(places) > 100
+    assert {name: sorted(where) for name, where in places.items() if len(where) > 1} == {}
 
 
 def test_no_two_public_classes_have_one_name() -> None:

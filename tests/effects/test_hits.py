@@ -104,7 +104,7 @@ def test_lines_of_a_bouncing_strike_are_no_louder_than_the_strike(monkeypatch: p
     """Hits that come after the onset take lines that would have begun far above it; they are none, and the modes are
     told once all is over.
     """
-    monkeypatch.setattr(line_fit, "CROWD", np.inf)  # too few to be a crowd
+    monkeypatch.setattr(line_fit, "JOINT", line_fit.JOINT._replace(crowd=np.inf))  # too few to be a crowd
     rng = np.random.default_rng(3)
     freq, t = np.array([952.0, 1310.0, 2093.0, 2740.0, 4095.0, 5410.0]), np.arange(2 * SR) / SR
     decay = 5 + 1.17e-7 * (2 * np.pi * freq) ** 2
@@ -131,10 +131,9 @@ def test_what_began_late_is_not_taken_back_to_the_onset(monkeypatch: pytest.Monk
     """Lines told once a crowd is over: one that would have died long before is a late burst's, and at the onset it
     would have been louder than anything.
     """
-    monkeypatch.setattr(line_fit, "CROWD", 0.0)
-    monkeypatch.setattr(line_fit, "LATE_LINES", np.inf)
+    monkeypatch.setattr(line_fit, "JOINT", line_fit.JOINT._replace(crowd=0.0, late_lines=np.inf))
     t = np.arange(2 * SR) / SR
-    freq, late = np.array([952.0, 2093.0, 4095.0]), line_fit.LATE_S[0]
+    freq, late = np.array([952.0, 2093.0, 4095.0]), line_fit.JOINT.late_s[0]
     ring = np.exp(-np.array([[6.0], [11.0], [20.0]]) * t) * np.sin(2 * np.pi * freq[:, None] * t)
     burst = (t >= late) * np.exp(-900 * np.maximum(t - late, 0)) * np.sin(2 * np.pi * 3000 * t)
     rng = np.random.default_rng(4)

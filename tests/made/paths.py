@@ -6,7 +6,7 @@ import numpy as np
 
 from sonic_bullet.machine.grouping import gather
 from sonic_bullet.path.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
-from sonic_bullet.path.path_places import DONE, Arrivals, Course, Emission, PathTables
+from sonic_bullet.path.path_places import OUTCOME, Arrivals, Course, Emission, PathTables
 from sonic_bullet.path.propagation import Path, PathState, grow
 from sonic_bullet.records import Array
 
@@ -49,7 +49,7 @@ def propagate(
             work,
             arrivals,
         )
-        if status == DONE:
+        if status == OUTCOME.done:
             break
         grow(path, state, status)
     state.at += n

@@ -10,17 +10,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.grouping import gather
 from sonic_bullet.path.fractional_delay import AHEAD, TAPS
 from sonic_bullet.path.path_kernel import ALL_ALIKE, AT_REST, WORK, hear
-from sonic_bullet.path.path_places import (
-    DONE,
-    MEMORY_SHORT,
-    NOT_FINITE,
-    PLACES_SHORT,
-    TOO_FAR,
-    Arrivals,
-    Course,
-    Emission,
-    PathTables,
-)
+from sonic_bullet.path.path_places import OUTCOME, Arrivals, Course, Emission, PathTables
 from sonic_bullet.path.propagation import Path, PathState, append_bodies, empty_path, grow
 from sonic_bullet.records import Air, Array
 from sonic_bullet.records.errors import AudioError
@@ -119,31 +109,31 @@ def test_what_is_refused_has_changed_nothing_and_goes_on_in_longer_tables(moved:
     near, far = np.array([[1.0, 0.0, 0.0]]), np.array([[40.0, 0.0, 0.0]])
     path, state = path_of(1)
     status, _ = called(path, state, rng.normal(size=(1, 300)), near, near)
-    assert status == DONE
+    assert status == OUTCOME.done
     state.at += 300
     before = state.copy()
     source = rng.normal(size=(1, 300))
     refused = []
-    while (status := called(path, state, source, near, far, moved)[0]) != DONE:
+    while (status := called(path, state, source, near, far, moved)[0]) != OUTCOME.done:
         refused.append(status)
         assert np.array_equal(state.lines[:2], before.lines)
-        if status != MEMORY_SHORT or len(refused) == 1:
+        if status != OUTCOME.memory_short or len(refused) == 1:
             assert np.array_equal(state.memory[: len(before.memory)], before.memory)
         grow(path, state, status)
-    assert refused == ([PLACES_SHORT, MEMORY_SHORT] if moved else [MEMORY_SHORT])
+    assert refused == ([OUTCOME.places_short, OUTCOME.memory_short] if moved else [OUTCOME.memory_short])
     roomy, other = path_of(1)  # the same with enough room from the start
     other.places["need"] = 16_384
-    grow(roomy, other, PLACES_SHORT)
+    grow(roomy, other, OUTCOME.places_short)
     other.places["need"] = 16_384
-    grow(roomy, other, MEMORY_SHORT)
+    grow(roomy, other, OUTCOME.memory_short)
     rng = np.random.default_rng(2)
-    assert called(roomy, other, rng.normal(size=(1, 300)), near, near)[0] == DONE
+    assert called(roomy, other, rng.normal(size=(1, 300)), near, near)[0] == OUTCOME.done
     state.at, other.at = 600, 300
-    assert called(roomy, other, rng.normal(size=(1, 300)), near, far, moved)[0] == DONE
+    assert called(roomy, other, rng.normal(size=(1, 300)), near, far, moved)[0] == OUTCOME.done
     other.at = 600
     rest = np.zeros((1, 9000))
     later = [called(roomy, one, rest, far, far, step=1) for one in (state, other)]
-    assert [status for status, _ in later] == [DONE, DONE]
+    assert [status for status, _ in later] == [OUTCOME.done, OUTCOME.done]
     assert later[0][1].any()
     assert later[0][1].tobytes() == later[1][1].tobytes()
 
@@ -157,25 +147,25 @@ def test_each_number_is_looked_at(n: int) -> None:
             values[place] = wrong
             path, state = path_of(1)
             source, dipole = values[None, :n].copy(), values[n:].reshape(1, 3, n).copy()
-            assert called(path, state, source, here, here, dipole=dipole)[0] == NOT_FINITE
+            assert called(path, state, source, here, here, dipole=dipole)[0] == OUTCOME.not_finite
             assert not state.lines["awake"].any()
     for place in range(n):  # and a single one of them wakes
         source = np.zeros((1, n))
         source[0, place] = 1e-20
         path, state = path_of(1)
-        assert called(path, state, source, here, here)[0] == DONE
+        assert called(path, state, source, here, here)[0] == OUTCOME.done
         assert state.lines["awake"].all()
 
 
 def test_a_distance_is_refused_once_and_named() -> None:
     path, state = path_of(1)
     far = np.array([[0.0, 0.0, 2000.0]])
-    assert called(path, state, np.ones((1, 9)), far, far)[0] == TOO_FAR
+    assert called(path, state, np.ones((1, 9)), far, far)[0] == OUTCOME.too_far
     with pytest.raises(AudioError, match="body 0 sounds 2000 m"):
-        grow(path, state, TOO_FAR)
-    assert called(path, state, np.ones((1, 9)), far, np.full((1, 3), np.nan))[0] == NOT_FINITE
+        grow(path, state, OUTCOME.too_far)
+    assert called(path, state, np.ones((1, 9)), far, np.full((1, 3), np.nan))[0] == OUTCOME.not_finite
     with pytest.raises(AudioError, match="not finite"):
-        grow(path, state, NOT_FINITE)
+        grow(path, state, OUTCOME.not_finite)
 
 
 def test_parts_of_longer_rows_give_the_same_bits() -> None:
@@ -207,7 +197,7 @@ def test_parts_of_longer_rows_give_the_same_bits() -> None:
             work,
             arrivals,
         )
-        assert status == DONE
+        assert status == OUTCOME.done
     assert np.isnan(out[:, :3]).all()
     assert np.ascontiguousarray(out[:, 3:]).tobytes() == np.concatenate(parts, axis=1).tobytes()
 

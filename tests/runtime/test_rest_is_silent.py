@@ -10,7 +10,7 @@ import pytest
 import sonic_bullet as sb
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.soundtrack.sound_events import IMPACT, SoundEvent, find_sound_events
+from sonic_bullet.soundtrack.sound_events import SoundEvent, find_sound_events
 from tests.few_cases import parametrize_few
 from tests.made.models import STEEL, box_model
 from tests.made.soundtracks import MICROPHONES
@@ -69,7 +69,7 @@ def dropped(
 
 
 def hits(events: tuple[SoundEvent, ...], after_s: float = 0.0) -> list[SoundEvent]:
-    return [one for one in events if one.kind == IMPACT and one.start_s >= after_s]
+    return [one for one in events if one.kind == "impact" and one.start_s >= after_s]
 
 
 @parametrize_few(

@@ -19,7 +19,7 @@ from sonic_bullet.records.errors import AudioError, FileError, RecordError, Scen
 from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
 from sonic_bullet.soundtrack.overlay import COLOURS, pixel, shown_at, with_contacts
-from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events
+from sonic_bullet.soundtrack.sound_events import find_sound_events
 from sonic_bullet.soundtrack.staging import chosen_camera, duration_of, staged
 from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.made.films import decoded
@@ -169,7 +169,7 @@ def test_a_film_has_its_sound_and_follows(tmp_path: Path) -> None:
 def test_contacts_are_drawn_where_they_are() -> None:
     log = table_log()
     events = find_sound_events(log)
-    hit = max((one for one in events if one.kind == IMPACT), key=lambda one: one.impulse_n_s)
+    hit = max((one for one in events if one.kind == "impact"), key=lambda one: one.impulse_n_s)
     camera, size = Camera(hit.place_m + np.array([0.0, -1.0, 0.5]), hit.place_m), (200, 120)
     time_s = hit.start_s + 0.02
     now = shown_at([hit], time_s)
@@ -177,7 +177,7 @@ def test_contacts_are_drawn_where_they_are() -> None:
     assert shown_at([hit], hit.start_s - 0.01) == shown_at([hit], hit.end_s + 1) == []
     blank = np.full((120, 200, 3), 255, np.uint8)
     drawn = with_contacts(blank, now, {}, log, time_s, camera)
-    ring = (np.abs(drawn.astype(int) - COLOURS[IMPACT]).max(axis=2) < 30) & (np.arange(120)[:, None] > 40)
+    ring = (np.abs(drawn.astype(int) - COLOURS["impact"]).max(axis=2) < 30) & (np.arange(120)[:, None] > 40)
     y, x = np.nonzero(ring)
     assert (x.mean(), y.mean()) == pytest.approx(pixel(hit.place_m, camera, size), abs=1.5)
     assert blank.min() == 255

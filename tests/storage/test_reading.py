@@ -13,7 +13,7 @@ from sonic_bullet import files, presets
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.records.errors import FileError, LogError, MaterialError, MeshError, SonicBulletError, excerpt
-from sonic_bullet.storage.reading import QUOTED, reading
+from sonic_bullet.storage.reading import LETTERS, reading
 
 MESSAGE_BYTES = 990
 
@@ -68,7 +68,7 @@ def test_texts_quote_at_most_200_characters_of_a_file(
     with pytest.raises(SonicBulletError) as caught:
         read(tmp_path / name)
     text = str(caught.value)
-    assert text.count("Q") <= QUOTED == 200
+    assert text.count("Q") <= LETTERS.whole == 200
     assert len(text.encode()) <= MESSAGE_BYTES < 1000
     assert str(tmp_path) in text
     assert "\n" not in text
@@ -81,7 +81,7 @@ def test_zip_names_are_quoted_short(tmp_path: Path) -> None:
         archive.writestr("Q" * 60_000, b"x")
     with pytest.raises(LogError, match=r"a\.npz") as caught:
         files.read_log(tmp_path / "a.npz")
-    assert str(caught.value).count("Q") <= QUOTED
+    assert str(caught.value).count("Q") <= LETTERS.whole
 
 
 @pytest.mark.parametrize(

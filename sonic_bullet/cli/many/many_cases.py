@@ -24,6 +24,7 @@ from sonic_bullet.cli.line_table import finite, write_csv
 from sonic_bullet.cli.many.case_jobs import CASE_FILES, CaseFolder, CaseResult, digest, run_case
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, status, table, write_json
 from sonic_bullet.cli.parameters import ManyOptions, cores
+from sonic_bullet.files.cases import SPLITS
 from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
 from sonic_bullet.jobs.job_folder import open_job_folder, write_json_lines
 from sonic_bullet.records.counts import format_count
@@ -32,7 +33,6 @@ from sonic_bullet.storage.atomic import replacing, write_errors
 from sonic_bullet.storage.json_text import json_bytes
 
 DONE_FILE = "done.json"
-SPLITS = ("fit", "holdout", "transfer")
 
 
 def run_many(

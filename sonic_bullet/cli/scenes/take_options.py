@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from sonic_bullet.files import ContactLog
     from sonic_bullet.session.variation import LogTake, Variation
 
-VARIED = ("surfaces", "places", "materials")
 OPTIONS = ("takes", "take", "vary", "footprint_mm", "roughness", "gain", "page")
 
 
@@ -73,7 +72,7 @@ class TakesWish:
 
     takes: int | None = None
     take: int | None = None
-    varied: frozenset[str] = frozenset(VARIED)
+    varied: frozenset[str] | None = None  # None: all
     footprint_m: float | None = None
     roughness_m: Mapping[str, float] = field(default_factory=dict)
     gain_db: Mapping[str, float] = field(default_factory=dict)
@@ -101,9 +100,12 @@ class TakesWish:
             raise FileError("--page shows takes, and none is asked for", "give --takes N too")
         if page is not None and Path(page).suffix.lower() not in (".html", ".htm"):
             raise FileError(f"cannot write {page}: a page is HTML", "end the name with .html")
-        varied = frozenset(VARIED) if vary is None else frozenset(part.strip() for part in vary.split(","))
-        for one in sorted(varied - set(VARIED)):
-            raise FileError(f"--vary {one}: takes do not differ in that", f"give some of {','.join(VARIED)}")
+        varied = None if vary is None else frozenset(part.strip() for part in vary.split(","))
+        if varied is not None:
+            from sonic_bullet.session.variation import VARIED
+
+            for one in sorted(varied - set(VARIED)):
+                raise FileError(f"--vary {one}: takes do not differ in that", f"give some of {','.join(VARIED)}")
         rough = read_numbers(roughness, "--roughness", least=0, most=1e4, all_bodies=True)
         return cls(
             takes,
@@ -122,9 +124,9 @@ class TakesWish:
     @property
     def variation(self) -> Variation:
         """Variation for `make_take`."""
-        from sonic_bullet.session.variation import Variation
+        from sonic_bullet.session.variation import VARIED, Variation
 
-        return Variation(self.varied, self.footprint_m)
+        return Variation(frozenset(VARIED) if self.varied is None else self.varied, self.footprint_m)
 
     def applied(self, log: ContactLog, where: str) -> ContactLog:
         """Return the log with roughness and gains set; raises SceneError."""

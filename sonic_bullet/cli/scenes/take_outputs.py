@@ -83,4 +83,4 @@ def write_takes(
         one["scale"] = level.say(*scale) if one["channels"] else {}
     for note in said:
         print(f"sonic-bullet: note: {note}", file=sys.stderr)
-    return {"takes": described, "notes": said, "varied": sorted(takes.varied)}
+    return {"takes": described, "notes": said, "varied": sorted(takes.variation.varied)}

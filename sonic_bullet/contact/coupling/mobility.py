@@ -14,10 +14,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-PAIR_SPLIT = 0.01
-"""Relative difference of two frequencies below which modes are a pair that turns: meshes and made things split those of
-a round body by less."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyMobility:
@@ -97,10 +93,13 @@ def wide_plate_m_n_s(youngs_pa: float, poisson: float, density_kg_m3: float, thi
 
 
 def alike_pairs(omega_rad_s: Array) -> Array:
-    """Find pairs (p,) of neighbouring modes (m,) within PAIR_SPLIT, by the first of each; the nearest pair up first."""
+    """Find pairs (p,) of neighbouring modes (m,) almost alike, by the first of each; the nearest pair up first."""
+    # relative difference of two frequencies below which modes are a pair that turns: meshes and made things split those
+    # of a round body by less
+    pair_split = 0.01
     apart = np.abs(np.diff(omega_rad_s)) / omega_rad_s[1:]
     found: set[int] = set()
     for k in np.argsort(apart, kind="stable").tolist():
-        if apart[k] < PAIR_SPLIT and not found & {k - 1, k + 1}:
+        if apart[k] < pair_split and not found & {k - 1, k + 1}:
             found.add(k)
     return np.array(sorted(found), np.int64)

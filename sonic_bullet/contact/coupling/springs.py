@@ -27,8 +27,6 @@ from sonic_bullet.records.errors import RecordError
 
 PERSSON = 0.5
 """u₀ over rms roughness: 0.4 to 0.5 of self-affine surfaces [Persson 2007; Akarapu, Sharp & Robbins 2011, PRL 106]."""
-SQUARE = 2 / math.sqrt(math.pi)
-"""Half-axes of an ellipse over those of the rectangle that has its area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,13 +81,14 @@ class Region:
 
     def half_axes_m(self, modulus_pa: float, load_n: float) -> tuple[float, float]:
         """Compute a >= b in m of the ellipse that touches under a load. modulus_pa: E*."""
+        square = 2 / math.sqrt(math.pi)  # half-axes of an ellipse over those of the rectangle that has its area
         if not any(self.half_m):
             return point_half_axes_m(self.curvature_per_m, modulus_pa, load_n)
         a, b = self.half_m
         if not all(self.half_m):
             curved = self.curvature_per_m[0 if a == 0 else 1]
             a, b = max(a, b), line_half_width_m(max(a, b), curved, modulus_pa, load_n)
-        return SQUARE * max(a, b), SQUARE * min(a, b)
+        return square * max(a, b), square * min(a, b)
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,16 +36,13 @@ class _JointLimits(NamedTuple):
     silent_rms: float = 1e-9  # rms, of full scale 1
     ringing_lines: int = 3  # lines that say what rings
     # times a recording's peak; share of the lines that begin there: what no single hit leaves
-    no_sound_beyond: tuple[float, float] = (
-        10.0,
-        0.1,
-    )
+    no_sound_beyond: tuple[float, float] = (10.0, 0.1)
+    crowd: float = 2.5  # starting lines over a body's modes: several hits, that is, of which only the last rings on
+    late_s: tuple[float, float] = (0.03, 0.1)  # where lines are sought instead
+    late_lines: float = 0.3  # of the lines at the onset: fewer left then are of a single hit
 
 
 JOINT = _JointLimits()
-
-CROWD, LATE_LINES = 2.5, 0.3  # starting lines over a body's modes; of the lines at the onset
-LATE_S = (0.03, 0.1)
 
 
 @one_thread()
@@ -63,8 +60,8 @@ def joint_lines(
 
     modes: about how many the body has, where more than one hit may be in a signal: several in a row make a crowd of
     lines, none of them a mode, or lines that would have to begin far above all that was recorded. Where far fewer are
-    left after LATE_S, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit there
-    would have had to leave.
+    left after `late_s`, or none such, lines are those, taken back to the onset: A e^{(d − iω)t}, what a single hit
+    there would have had to leave.
     """
     seconds_max = 8.0
     signals = np.asarray(signals, float)[:, : int(seconds_max * sr)]
@@ -94,10 +91,12 @@ def _identified(
     plainly = 0.75  # of what other lines leave, in squares
     start = start_poles(signals / noise[:, None], sr, *band_hz)
     few: Lines | None = None
-    for late in (round(t * sr) for t in LATE_S) if modes is not None and len(start) >= CROWD * modes else ():
+    for late in (
+        (round(t * sr) for t in JOINT.late_s) if modes is not None and len(start) >= JOINT.crowd * modes else ()
+    ):
         if signals.shape[1] >= 8 * late and JOINT.ringing_lines <= len(
             start_poles(signals[:, late:] / noise[:, None], sr, *band_hz)
-        ) < LATE_LINES * len(start):
+        ) < JOINT.late_lines * len(start):
             after = _from(late, signals, sr, band_hz, signed)
             few = few or after
             if after is not None and _beyond(after, signals) < JOINT.no_sound_beyond[1]:  # else it still hits
@@ -121,7 +120,7 @@ def _identified(
         if ((other.noise / noise) ** 2).sum() < plainly * ((found.noise / noise) ** 2).sum():
             return other  # a room's: of hits one after another the loudest poles leave least
     for late in (
-        (round(t * sr) for t in LATE_S)
+        (round(t * sr) for t in JOINT.late_s)
         if modes is not None and _beyond(found, signals) > JOINT.no_sound_beyond[1]
         else ()
     ):

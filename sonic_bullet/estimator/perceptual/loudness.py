@@ -18,46 +18,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-# ISO 226:2003, table 1: f in Hz, α, L_U in dB, T in dB; the last two rows are ISO 389-7's. The standard is not free:
-# all rows agree, digit by digit,
-# with public implementations that hold a copy (Tackett 2005, iso226.m; Callegari 2013, PyDSM; openMHA's
-# MHAUtils::spl2hl for 14 and 16 kHz).
-_TABLE = np.array(
-    [
-        (20, 0.532, -31.6, 78.5),
-        (25, 0.506, -27.2, 68.7),
-        (31.5, 0.480, -23.0, 59.5),
-        (40, 0.455, -19.1, 51.1),
-        (50, 0.432, -15.9, 44.0),
-        (63, 0.409, -13.0, 37.5),
-        (80, 0.387, -10.3, 31.5),
-        (100, 0.367, -8.1, 26.5),
-        (125, 0.349, -6.2, 22.1),
-        (160, 0.330, -4.5, 17.9),
-        (200, 0.315, -3.1, 14.4),
-        (250, 0.301, -2.0, 11.4),
-        (315, 0.288, -1.1, 8.6),
-        (400, 0.276, -0.4, 6.2),
-        (500, 0.267, 0.0, 4.4),
-        (630, 0.259, 0.3, 3.0),
-        (800, 0.253, 0.5, 2.2),
-        (1000, 0.250, 0.0, 2.4),
-        (1250, 0.246, -2.7, 3.5),
-        (1600, 0.244, -4.1, 1.7),
-        (2000, 0.243, -1.0, -1.3),
-        (2500, 0.243, 1.7, -4.2),
-        (3150, 0.243, 2.5, -6.0),
-        (4000, 0.242, 1.2, -5.4),
-        (5000, 0.242, -2.1, -1.5),
-        (6300, 0.245, -7.1, 6.0),
-        (8000, 0.254, -11.2, 12.6),
-        (10000, 0.271, -10.7, 13.9),
-        (12500, 0.301, -3.1, 12.3),
-        (14000, 0.301, -3.1, 18.4),
-        (16000, 0.301, -3.1, 40.2),
-    ]
-)
-
 
 def bark(freq_hz: Array | float) -> Array:
     """Critical-band rate in Bark."""
@@ -70,9 +30,47 @@ def bark_to_hz(rate_bark: Array | float) -> Array:
 
 
 def _row(freq_hz: Array | float) -> tuple[Array, Array, Array]:
+    # ISO 226:2003, table 1: f in Hz, α, L_U in dB, T in dB; the last two rows are ISO 389-7's. The standard is not
+    # free: all rows agree, digit by digit, with public implementations that hold a copy (Tackett 2005, iso226.m;
+    # Callegari 2013, PyDSM; openMHA's MHAUtils::spl2hl for 14 and 16 kHz).
+    table = np.array(
+        [
+            (20, 0.532, -31.6, 78.5),
+            (25, 0.506, -27.2, 68.7),
+            (31.5, 0.480, -23.0, 59.5),
+            (40, 0.455, -19.1, 51.1),
+            (50, 0.432, -15.9, 44.0),
+            (63, 0.409, -13.0, 37.5),
+            (80, 0.387, -10.3, 31.5),
+            (100, 0.367, -8.1, 26.5),
+            (125, 0.349, -6.2, 22.1),
+            (160, 0.330, -4.5, 17.9),
+            (200, 0.315, -3.1, 14.4),
+            (250, 0.301, -2.0, 11.4),
+            (315, 0.288, -1.1, 8.6),
+            (400, 0.276, -0.4, 6.2),
+            (500, 0.267, 0.0, 4.4),
+            (630, 0.259, 0.3, 3.0),
+            (800, 0.253, 0.5, 2.2),
+            (1000, 0.250, 0.0, 2.4),
+            (1250, 0.246, -2.7, 3.5),
+            (1600, 0.244, -4.1, 1.7),
+            (2000, 0.243, -1.0, -1.3),
+            (2500, 0.243, 1.7, -4.2),
+            (3150, 0.243, 2.5, -6.0),
+            (4000, 0.242, 1.2, -5.4),
+            (5000, 0.242, -2.1, -1.5),
+            (6300, 0.245, -7.1, 6.0),
+            (8000, 0.254, -11.2, 12.6),
+            (10000, 0.271, -10.7, 13.9),
+            (12500, 0.301, -3.1, 12.3),
+            (14000, 0.301, -3.1, 18.4),
+            (16000, 0.301, -3.1, 40.2),
+        ]
+    )
     where = np.log(np.maximum(np.asarray(freq_hz, float), 1e-3))
-    nodes = np.log(_TABLE[:, 0])
-    exponent, gain, threshold = (np.interp(where, nodes, _TABLE[:, column]) for column in (1, 2, 3))
+    nodes = np.log(table[:, 0])
+    exponent, gain, threshold = (np.interp(where, nodes, table[:, column]) for column in (1, 2, 3))
     return exponent, gain, threshold
 
 

@@ -17,8 +17,6 @@ import re
 import struct
 from collections.abc import Iterator
 
-MOST_CHUNKS, MOST_BYTES = 1000, 1 << 16
-
 
 def scale_text(full_scale_pa: float) -> str:
     """Return the text that states a scale."""
@@ -46,20 +44,22 @@ def ixml_chunk(full_scale_pa: float) -> bytes:
 
 def read_chunk_scale(fd: int) -> float | None:
     """Read the full scale in Pa from an open WAV or RF64, iXML before bext; None without one; raises OSError."""
+    most_bytes = 1 << 16  # of one chunk
     found: dict[bytes, float | None] = {}
     for name, at, size in _chunks(fd):
         if name in (b"iXML", b"bext"):
-            found.setdefault(name, scale_in(os.pread(fd, min(size, MOST_BYTES), at)))
+            found.setdefault(name, scale_in(os.pread(fd, min(size, most_bytes), at)))
     return found.get(b"iXML") or found.get(b"bext")
 
 
 def _chunks(fd: int) -> Iterator[tuple[bytes, int, int]]:
     """Yield name, offset and bytes of each chunk of a RIFF or RF64."""
+    most_chunks = 1000  # of a file
     head, end = os.pread(fd, 12, 0), os.fstat(fd).st_size
     if head[:4] not in (b"RIFF", b"RF64") or head[8:] != b"WAVE":
         return
     at, long = 12, 0
-    for _ in range(MOST_CHUNKS):
+    for _ in range(most_chunks):
         one = os.pread(fd, 8, at)
         if len(one) < 8 or at >= end:
             return

@@ -16,13 +16,12 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.bodies import ShapeKind
 from sonic_bullet.records.errors import MeshError
 
-GEOM = mujoco.mjtGeom
 SIZED: dict[Any, tuple[ShapeKind, Callable[[float, float, float], tuple[float, float, float]]]] = {
-    GEOM.mjGEOM_PLANE: ("plane", lambda x, y, z: (0, 0, 0)),
-    GEOM.mjGEOM_SPHERE: ("sphere", lambda x, y, z: (x, 0, 0)),
-    GEOM.mjGEOM_CAPSULE: ("capsule", lambda x, y, z: (x, 2 * y, 0)),
-    GEOM.mjGEOM_CYLINDER: ("cylinder", lambda x, y, z: (x, 2 * y, 0)),
-    GEOM.mjGEOM_BOX: ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
+    mujoco.mjtGeom.mjGEOM_PLANE: ("plane", lambda x, y, z: (0, 0, 0)),
+    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", lambda x, y, z: (x, 0, 0)),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", lambda x, y, z: (x, 2 * y, 0)),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", lambda x, y, z: (x, 2 * y, 0)),
+    mujoco.mjtGeom.mjGEOM_BOX: ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
 }
 """Kind of shape, and its size_m of a geom's size: MuJoCo's are half lengths."""
 
@@ -50,14 +49,14 @@ def shape_of_geom(model: Any, geom: int, place_m: Array, turn_wxyz: Array, *, pl
         mujoco.mju_mulQuat(turn, back, model.geom_quat[geom])
         where = {"position_m": position, "quaternion_xyzw": turn[[1, 2, 3, 0]]}
     x, y, z = (float(one) for one in model.geom_size[geom])
-    kind = GEOM(model.geom_type[geom])
+    kind = mujoco.mjtGeom(model.geom_type[geom])
     if kind in SIZED:
         word, size = SIZED[kind]
         return Shape(word, np.array(size(x, y, z)), **where)
-    if kind == GEOM.mjGEOM_ELLIPSOID:
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
         vertex, face = _ellipsoid(np.array([x, y, z]))
         return Shape("mesh", vertex_m=vertex, face=face, **where)
-    if kind == GEOM.mjGEOM_MESH:
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
         number = int(model.geom_dataid[geom])
         first, many = int(model.mesh_vertadr[number]), int(model.mesh_vertnum[number])
         face_at, faces = int(model.mesh_faceadr[number]), int(model.mesh_facenum[number])

@@ -23,8 +23,6 @@ from sonic_bullet.records import Array, Body, Shape
 from sonic_bullet.records.coerce import as_whole, nearest, shown
 from sonic_bullet.records.errors import MeshError, SceneError
 
-GEOM_OBJECT, BODY_OBJECT = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_BODY
-
 
 class ModelLinks:
     """The links of one model.
@@ -138,10 +136,10 @@ class ModelLinks:
 
     def _named(self, name: str) -> tuple[int, int | None]:
         """Find a body, or a geom of the world, of that name."""
-        body = mujoco.mj_name2id(self.model, BODY_OBJECT, name)
+        body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, name)
         if body > 0:
             return body, None
-        geom = mujoco.mj_name2id(self.model, GEOM_OBJECT, name)
+        geom = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, name)
         if geom >= 0 and self.model.geom_bodyid[geom] == 0:
             return 0, geom
         known = [self.name(*one) for one in zip(self.body.tolist(), self.geom.tolist(), strict=True)]
@@ -176,7 +174,9 @@ class ModelLinks:
 
     def name(self, body: int, link: int) -> str:
         """Return a link's own name; "body 2" or "geom 3" without any."""
-        kind, number, word = (BODY_OBJECT, body, "body") if body else (GEOM_OBJECT, link, "geom")
+        kind, number, word = (
+            (mujoco.mjtObj.mjOBJ_BODY, body, "body") if body else (mujoco.mjtObj.mjOBJ_GEOM, link, "geom")
+        )
         return mujoco.mj_id2name(self.model, kind, number) or f"{word} {number}"
 
     def described(self, body: int, link: int) -> Body:

@@ -23,8 +23,6 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import joined
 
-RK4 = mujoco.mjtIntegrator.mjINT_RK4
-
 
 class StageForces:
     """Reads one MjData by its links."""
@@ -44,7 +42,7 @@ class StageForces:
     @property
     def is_staged(self) -> bool:
         """Whether the integrator takes several forces a step."""
-        return int(self._model.opt.integrator) == int(RK4)
+        return int(self._model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4)
 
     def before(self) -> None:
         """Prepare for a step that is about to be made."""

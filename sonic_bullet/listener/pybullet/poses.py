@@ -32,7 +32,6 @@ from sonic_bullet.records.coerce import shown
 from sonic_bullet.records.errors import SceneError
 
 POSE_BYTES, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
-MOTION_BYTES = LINK_STATE.itemsize
 SOFT = 3
 """Last entry but one of getDynamicsInfo for a soft body (Bullet's BT_SOFT_BODY)."""
 
@@ -95,6 +94,7 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
     pybullet.error
         A body of the roster is gone or has other links.
     """
+    motion_bytes = LINK_STATE.itemsize
     if not len(roster.code):
         return Motion(roster, np.zeros(0, LINK_STATE))
     buffer, at = bytearray(len(roster.code) * LINK_STATE.itemsize), 0
@@ -111,13 +111,13 @@ def read_motion(client_id: int, roster: Roster) -> Motion:
             else:
                 (u, v, w), (a, b, c) = twist(body, client_id)
                 POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
-            at += MOTION_BYTES
+            at += motion_bytes
             if joints:
                 # with link velocities and forward kinematics
                 states = links(body, link_numbers(joints), 1, 1, client_id)
                 for (x, y, z), (i, j, k, r), _, _, _, _, (u, v, w), (a, b, c) in states:
                     POSE_AND_TWIST.pack_into(buffer, at, x, y, z, i, j, k, r, u, v, w, a, b, c)
-                    at += MOTION_BYTES
+                    at += motion_bytes
     number = np.frombuffer(buffer)
     if number.dot(number) < INVALID_BEYOND**2:  # so no number is beyond, and none is NaN
         return Motion(roster, np.frombuffer(buffer, LINK_STATE))

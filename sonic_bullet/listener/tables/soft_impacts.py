@@ -9,7 +9,7 @@ A soft constraint spreads an impact over its time constant, 10 ms and more, wher
 step by step it would be a support (contact.load_splitting). No impulse is lost or made: what is held is given out
 later, so that the sums balance momentum over each impact. The strike comes as the impact ends.
 
-The load has settled: what exceeds the support is below `TAIL` of its peak. The speed has: it is below `REST_SPEED` of
+The load has settled: what exceeds the support is below 3 % of its peak. The speed has: it is below 5 % of
 the first and, at its present rate, would not have changed by more than twice that since the impact began; at the
 turning point of an elastic impact, where the speed is 0 as well, that is π/2 of it.
 """
@@ -25,7 +25,6 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.contacts import CONTACT
 
-REST_SPEED, TAIL = 0.05, 0.03
 LONGEST_IMPACT_S = 0.1
 """Longest impact: what brakes a body for longer is a cushion, which is silent."""
 
@@ -60,8 +59,16 @@ LOAD = np.dtype(
 """A pair in one step. impact: its place among the impacts, or -1."""
 
 
-IMPACTS, HELD_COUNT, IMPACT_PAIRS, IMPACT_ROWS = 0, 1, 2, 3
-"""Places in the counts of an `ImpactTables`."""
+class _Counts(NamedTuple):
+    """Places in the counts of an `ImpactTables`."""
+
+    impacts: int = 0
+    held: int = 1
+    pairs: int = 2
+    rows: int = 3
+
+
+COUNT = _Counts()
 
 
 class ImpactTables(NamedTuple):
@@ -105,9 +112,9 @@ class SoftImpacts:
         counts = np.array([len(self._impact), len(self._held), 0, 0])
         g = float(np.linalg.norm(gravity_m_s2))
         collect_rows(row, g * mass_kg, dt_s, 1.1 * g * dt_s, ImpactTables(impact, held, self._before, now, out, counts))
-        self._impact, self._held = impact[: counts[IMPACTS]].copy(), held[: counts[HELD_COUNT]].copy()
-        self._before = now[: counts[IMPACT_PAIRS]]
-        return out[: counts[IMPACT_ROWS]]
+        self._impact, self._held = impact[: counts[COUNT.impacts]].copy(), held[: counts[COUNT.held]].copy()
+        self._before = now[: counts[COUNT.pairs]]
+        return out[: counts[COUNT.rows]]
 
 
 @njit(nogil=True, error_model="numpy")
@@ -147,7 +154,7 @@ def copy_row(source, to, fraction):
 def hold(row, key, fraction, held, counts):
     """Add a fraction of a row to the nearest point held of its pair that no other row of this step was added to."""
     best, nearest = -1, np.inf
-    for i in range(counts[HELD_COUNT]):
+    for i in range(counts[COUNT.held]):
         one = held[i]
         if one.key != key or one.taken != 0 or one.row.a != row.a:
             continue
@@ -157,8 +164,8 @@ def hold(row, key, fraction, held, counts):
             best, nearest = i, off
     load = fraction * load_of(row)
     if best < 0:
-        best = counts[HELD_COUNT]
-        counts[HELD_COUNT] += 1
+        best = counts[COUNT.held]
+        counts[COUNT.held] += 1
         held[best].key, held[best].weight_n_s = key, 0.0
         copy_row(row, held[best].row, 0.0)
         for x in range(3):
@@ -194,17 +201,17 @@ def collect_rows(row, weight, dt, fall, tables):
     weight (k,): of the lighter body of each row (k,), in N. fall: closing speed in m/s that begins no impact.
     """
     impact, held, now, counts = tables.impact, tables.held, tables.now, tables.counts
-    for i in range(counts[HELD_COUNT]):
+    for i in range(counts[COUNT.held]):
         held[i].taken = 0
-    for i in range(counts[IMPACTS]):
+    for i in range(counts[COUNT.impacts]):
         impact[i].over = 1  # unless the pair is loaded
     sum_loads(row, weight, dt, now, counts)
-    for i in range(counts[IMPACT_PAIRS]):
+    for i in range(counts[COUNT.pairs]):
         if now[i].force_n > 0:
             now[i].impact = follow(now[i], dt, fall, tables)
     for i in range(len(row)):
-        pass_row(row[i], now[place_of(now, counts[IMPACT_PAIRS], pair_key(row[i]))], tables)
-    for i in range(counts[IMPACT_PAIRS]):  # what passed is the support of the next step
+        pass_row(row[i], now[place_of(now, counts[COUNT.pairs], pair_key(row[i]))], tables)
+    for i in range(counts[COUNT.pairs]):  # what passed is the support of the next step
         if now[i].impact >= 0 and impact[now[i].impact].over == 0:
             now[i].force_n = min(now[i].force_n, impact[now[i].impact].support_n)
     finish(impact, held, tables.out, counts)
@@ -215,10 +222,10 @@ def sum_loads(row, weight, dt, now, counts):
     """Fill now: load and fastest loaded approach of each pair."""
     for i in range(len(row)):
         key, load = pair_key(row[i]), load_of(row[i])
-        at = place_of(now, counts[IMPACT_PAIRS], key)
+        at = place_of(now, counts[COUNT.pairs], key)
         if at < 0:
-            at = counts[IMPACT_PAIRS]
-            counts[IMPACT_PAIRS] += 1
+            at = counts[COUNT.pairs]
+            counts[COUNT.pairs] += 1
             now[at].key, now[at].force_n, now[at].approach_m_s, now[at].impact = key, 0.0, -np.inf, -1
             now[at].weight_n, now[at].gap_m = weight[i], 0.0
         now[at].force_n += load / dt
@@ -235,22 +242,23 @@ def pass_row(one, pair, tables):
         if fraction < 1.0:
             hold(one, pair.key, 1.0 - fraction, tables.held, tables.counts)
     if fraction > 0:
-        copy_row(one, tables.out[tables.counts[IMPACT_ROWS]], fraction)
-        tables.counts[IMPACT_ROWS] += 1
+        copy_row(one, tables.out[tables.counts[COUNT.rows]], fraction)
+        tables.counts[COUNT.rows] += 1
 
 
 @njit(nogil=True, error_model="numpy")
 def follow(one, dt, fall, tables):
     """Begin or continue the impact of a loaded pair; return its place, or -1 without one."""
+    rest_speed_fraction, tail_fraction = 0.05, 0.03  # of the approach; of the peak load
     impact, before, counts = tables.impact, tables.before, tables.counts
-    at = place_of(impact, counts[IMPACTS], one.key)
+    at = place_of(impact, counts[COUNT.impacts], one.key)
     if at < 0:
         was = place_of(before, len(before), one.key)
         support = before[was].force_n if was >= 0 else 0.0
         if not (one.approach_m_s > fall and one.force_n > support):
             return -1
-        at = counts[IMPACTS]
-        counts[IMPACTS] += 1
+        at = counts[COUNT.impacts]
+        counts[COUNT.impacts] += 1
         new = impact[at]
         new.key, new.support_n, new.steps, new.elapsed_s = one.key, max(support, one.weight_n), 0, 0.0
         new.peak_n = 0.0
@@ -259,10 +267,10 @@ def follow(one, dt, fall, tables):
     it = impact[at]
     change = abs(it.latest_m_s - one.approach_m_s)
     it.approach_m_s, it.latest_m_s = max(it.approach_m_s, one.approach_m_s), one.approach_m_s
-    rest = REST_SPEED * it.approach_m_s
+    rest = rest_speed_fraction * it.approach_m_s
     settled = it.steps > 0 and abs(one.approach_m_s) <= rest and change * it.steps <= 2 * rest
     it.peak_n = max(it.peak_n, one.force_n)
-    settled = settled or one.force_n - it.support_n <= TAIL * (it.peak_n - it.support_n)
+    settled = settled or one.force_n - it.support_n <= tail_fraction * (it.peak_n - it.support_n)
     it.over = 1 if settled or it.elapsed_s >= LONGEST_IMPACT_S else 0
     it.steps, it.elapsed_s = it.steps + 1, it.elapsed_s + dt
     return at
@@ -272,18 +280,18 @@ def follow(one, dt, fall, tables):
 def finish(impact, held, out, counts):
     """Give out what impacts held that are over, and drop them."""
     kept = 0
-    for i in range(counts[HELD_COUNT]):
-        one = impact[place_of(impact, counts[IMPACTS], held[i].key)]
+    for i in range(counts[COUNT.held]):
+        one = impact[place_of(impact, counts[COUNT.impacts], held[i].key)]
         if one.over != 0:
-            give_out(held[i], one, out[counts[IMPACT_ROWS]])
-            counts[IMPACT_ROWS] += 1
+            give_out(held[i], one, out[counts[COUNT.rows]])
+            counts[COUNT.rows] += 1
         else:
             held[kept] = held[i]
             kept += 1
-    counts[HELD_COUNT] = kept
+    counts[COUNT.held] = kept
     kept = 0
-    for i in range(counts[IMPACTS]):
+    for i in range(counts[COUNT.impacts]):
         if impact[i].over == 0:
             impact[kept] = impact[i]
             kept += 1
-    counts[IMPACTS] = kept
+    counts[COUNT.impacts] = kept

@@ -19,8 +19,6 @@ import numpy as np
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.path.path_places import FARTHEST_M
 
-EDGE_WAVE_M = 0.343
-"""Of 1 kHz, the middle of what is heard."""
 IMAGE = np.dtype(
     [
         ("own", "i8"),  # the microphone that it is of; -1: it is an own one
@@ -53,6 +51,7 @@ def _from_edge(face, k, side, point):  # pragma: no cover - compiled
 @njit(nogil=True, error_model="numpy")
 def _within(face, one, other, at, length):  # pragma: no cover - compiled
     """Compute F of a face for the line between two points (3,), length apart, that meets its plane at ``at`` (3,)."""
+    edge_wave_m = 0.343  # of 1 kHz, the middle of what is heard
     found = 1.0
     for k in range(2):
         across, along = 0.0, 0.0  # the crossing's place between the edges; the points' distance along them
@@ -63,7 +62,7 @@ def _within(face, one, other, at, length):  # pragma: no cover - compiled
             inwards = face.half_m[k] - side * across
             over = _from_edge(face, k, side, one) + _from_edge(face, k, side, other)
             longer = np.sqrt(over * over + along * along) - length
-            v = 2.0 * np.sqrt((longer if longer > 0.0 else 0.0) / EDGE_WAVE_M)
+            v = 2.0 * np.sqrt((longer if longer > 0.0 else 0.0) / edge_wave_m)
             t = 0.5 + 0.5 * (v if inwards > 0.0 else -v)
             t = 0.0 if t < 0.0 else (1.0 if t > 1.0 else t)
             found *= t * t * (3.0 - 2.0 * t)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.path.space.receiver_places import ROUNDS, ReceiverPlaces, turn_back
+from sonic_bullet.path.space.receiver_places import FIXED_POINT_ROUNDS, ReceiverPlaces, turn_back
 from sonic_bullet.records import Array
 
 
@@ -24,7 +24,7 @@ def hearing_directions(
     bodies, here = np.arange(known_m.shape[1])[None, :, None], places.position_m[:, None]
     sent_s = np.broadcast_to(time_s[:, None, None], (len(time_s), known_m.shape[1], here.shape[2]))
     away = np.zeros((*sent_s.shape, 3))
-    for _ in range(ROUNDS):
+    for _ in range(FIXED_POINT_ROUNDS):
         at = np.clip(np.searchsorted(known_s, sent_s, side="right") - 1, 0, len(known_s) - 1)
         after = np.minimum(at + 1, len(known_s) - 1)
         length = np.where(after > at, known_s[after] - known_s[at], 1.0)

@@ -19,7 +19,7 @@ from sonic_bullet.path.room.image_microphones import turned_image
 from sonic_bullet.records import Array, Microphone
 from sonic_bullet.records.errors import AudioError
 
-ROUNDS = 8
+FIXED_POINT_ROUNDS = 8
 """Of the fixed point: 1e-8 of the first guess's error at a tenth of the speed of sound."""
 
 
@@ -89,7 +89,7 @@ def aim_at(
     for c, one in enumerate(microphones):
         if not one.moves:
             continue
-        for _ in range(ROUNDS):
+        for _ in range(FIXED_POINT_ROUNDS):
             late_s = np.linalg.norm(aim[:, :, c] - position_m, axis=-1) / speed_m_s
             if one.path is not None:
                 for axis in range(3):

@@ -19,16 +19,13 @@ from sonic_bullet.path.minimum_phase import minimum_phase
 from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorResponse
 
 DIFFERENTIATOR_TAPS = 16
-EXACT_REACH = 0.85
-"""Fraction of half the rate up to which the derivative is exact to 0.1 %."""
-RESPONSE_TAPS = 2048
-"""Of a response: 12 Hz between two points of it, at 48 kHz, where it is that narrow."""
 
 
 @lru_cache(maxsize=8)
 def differentiator(sr: int) -> Array:
     """Return taps (DIFFERENTIATOR_TAPS,) of d/dt at a rate in Hz, 7.5 samples late."""
-    omega = np.linspace(0.001, EXACT_REACH, 400) * np.pi
+    exact_reach = 0.85  # fraction of half the rate up to which the derivative is exact to 0.1 %
+    omega = np.linspace(0.001, exact_reach, 400) * np.pi
     lag = np.arange(DIFFERENTIATOR_TAPS // 2) + 0.5
     half = np.linalg.lstsq(2 * np.sin(omega[:, None] * lag) / omega[:, None], np.ones(len(omega)), rcond=None)[0]
     return np.asarray(sr * np.concatenate([half[::-1], -half]))
@@ -36,11 +33,12 @@ def differentiator(sr: int) -> Array:
 
 @WhileAlive
 def response_taps(response: SensorResponse, sr: int) -> Array:
-    """Return taps (≤ RESPONSE_TAPS,) of a response at a rate in Hz, of minimum phase."""
+    """Return taps (≤ 2048,) of a response at a rate in Hz, of minimum phase."""
+    most_taps = 2048  # of a response: 12 Hz between two points of it, at 48 kHz, where it is that narrow
     left_out = 1e-5  # of the taps' norm: what a response's tail is cut at, -100 dB
-    size = 4 * RESPONSE_TAPS
+    size = 4 * most_taps
     magnitude = response.at(np.fft.rfftfreq(size, 1 / sr))
-    taps = minimum_phase(np.log(magnitude))[:RESPONSE_TAPS]
+    taps = minimum_phase(np.log(magnitude))[:most_taps]
     rest = np.sqrt(np.cumsum(taps[::-1] ** 2)[::-1])
     return np.asarray(taps[: max(1, int(np.count_nonzero(rest > left_out * rest[0])))])
 

@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from sonic_bullet.runtime.synthesis_state import Setup, State
 
 
-ON_WALL_M = 0.05
-"""What lies flat on a wall of a room is mirrored by it: a board on the floor."""
-
-
 @dataclass(slots=True, eq=False)
 class BodyImages:
     """Images (c,) IMAGE, (0,) without any; has_image (b,): 1 where a body may have images."""
@@ -138,11 +134,12 @@ def _place_image(setup: Setup, state: State, microphone: Microphone, number: int
 
 def _is_wall(setup: Setup, normal: Array, offset_m: float, area_m2: float) -> bool:
     """Return whether a face is one of the room's own walls, or lies on one."""
+    on_wall_m = 0.05  # what lies flat on a wall of a room is mirrored by it: a board on the floor
     room = setup.room
     if room is None:
         return False
     sign = room.walls[:, :3] @ normal
-    on = (abs(sign) > 1 - 1e-3) & (abs(sign * offset_m - room.walls[:, 3]) < ON_WALL_M)
+    on = (abs(sign) > 1 - 1e-3) & (abs(sign * offset_m - room.walls[:, 3]) < on_wall_m)
     return bool(area_m2 > room.largest_m2 or on.any())
 
 

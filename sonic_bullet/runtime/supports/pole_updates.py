@@ -43,16 +43,6 @@ from sonic_bullet.runtime.synthesis_state import State
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-ON = 0.02
-"""Of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches."""
-NARROW = 0.1
-"""Least width of a face that touches over its length: where two corners alone are known."""
-LEAST_TRANSMITTED = 0.3
-"""Of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out."""
-FAINTEST = 1e-3
-"""Of a body's loudest mode: 60 dB below, it is what is left when all else has decayed."""
-SLIPPERY = 1e-9
-"""Of its normal spring: what holds two bodies sideways that have no friction."""
 FASTEST_TURN, STOPPED = 3.0, 0.05
 """Radians a sample beyond which the contacts have made a mode too fast to play, and its decay a sample then."""
 
@@ -137,11 +127,13 @@ def _transmitted_weights(
 ) -> Iterator[tuple[int, Array]]:
     """Yield weights (W, columns) of the transmission to each audible partner.
 
-    Audible: more than LEAST_TRANSMITTED of the body's own sound in some mode, of those within FAINTEST of its loudest,
+    Audible: more than 0.3 of the body's own sound in some mode, of those within 60 dB of its loudest,
     both without gains.
     """
+    least_transmitted = 0.3  # of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out
+    faintest = 1e-3  # of a body's loudest mode: 60 dB below, it is what is left when all else has decayed
     own = np.abs(state.resonators[b].weight[0] @ placed.turn) / state.resonators[b].body.gain
-    least = np.maximum(LEAST_TRANSMITTED * own, FAINTEST * own.max(initial=0.0))
+    least = np.maximum(least_transmitted * own, faintest * own.max(initial=0.0))
     for p, rate in zip(partners, placed.transmissions, strict=True):
         weight = np.zeros((len(state.bank.observed), columns), complex)
         weight[:, : rate.shape[1]] = transmitted_weight(state.resonators[p], rate, placed.omega_rad_s)
@@ -214,16 +206,20 @@ def _springs(
 
 def _gripped(spring: ContactSpring, *, slips: bool) -> ContactSpring:
     """Return a spring as friction holds it: without any, nothing is held sideways [Mindlin 1949: what sticks is]."""
-    return replace(spring, tangential_n_m=SLIPPERY * spring.normal_n_m) if slips else spring
+    slippery = 1e-9  # of its normal spring: what holds two bodies sideways that have no friction
+    return replace(spring, tangential_n_m=slippery * spring.normal_n_m) if slips else spring
 
 
 def _one_region(point_m: Array, curvature_per_m: float, off_m: float, size_m: float) -> Region | None:
     """Return the line or face that touches between a pair's points (c, 3); None where there is none."""
+    # of the spread of a pair's points: where their middle is nearer than this to a surface, all between them touches
+    on_point = 0.02
+    narrow = 0.1  # least width of a face that touches over its length: where two corners alone are known
     middle = point_m - point_m.sum(axis=0) / len(point_m)
     spread = np.sqrt(((middle.max(axis=0) - middle.min(axis=0)) ** 2).sum())
-    if spread < STRUCK_FLAT * size_m or off_m > ON * spread:
+    if spread < STRUCK_FLAT * size_m or off_m > on_point * spread:
         return None
     half = np.abs(middle @ np.linalg.svd(middle)[2].T).max(axis=0)
     if curvature_per_m * size_m > FLAT_CURVATURE:  # mean of both principal curvatures, of which a line has one
         return Region((float(half[0]), 0.0), (0.0, 2 * curvature_per_m))
-    return Region((float(half[0]), float(max(half[1], NARROW * half[0]))), (0.0, 0.0))
+    return Region((float(half[0]), float(max(half[1], narrow * half[0]))), (0.0, 0.0))

@@ -19,9 +19,6 @@ from sonic_bullet.records import Array
 if TYPE_CHECKING:
     from sonic_bullet.runtime.synthesis_state import State
 
-SAME_TURN = 0.05
-"""Largest element, in radians about, of a turn that is left out: cos² of it is 1 within 0.3 %."""
-
 
 def turn_lanes(values: Array, pairs: Array, step: Array) -> None:
     """Turn the last axis of values, in place: those at pairs (p,) and their neighbours by step (p, 2, 2)ᵀ."""
@@ -35,6 +32,7 @@ def turn_modes(state: State, b: int, turn: Array | None) -> None:
 
     A turn that is almost the present one changes nothing.
     """
+    same_turn = 0.05  # largest element, in radians about, of a turn that is left out: cos² of it is 1 within 0.3 %
     m = state.resonators[b].mode_count
     old = state.table.turn_of(b)
     if turn is None and old is None:
@@ -45,7 +43,7 @@ def turn_modes(state: State, b: int, turn: Array | None) -> None:
     block = both[:, :, None], both[:, None]
     step = before[block].transpose(0, 2, 1) @ after[block]
     mixes = step[:, 0, 1] != 0
-    if not mixes.any() or (turn is not None and np.abs(step - np.eye(2)).max() < SAME_TURN):
+    if not mixes.any() or (turn is not None and np.abs(step - np.eye(2)).max() < same_turn):
         return
     _turn_state(state, b, pairs[mixes], step[mixes])
     state.table.turn(b, turn)

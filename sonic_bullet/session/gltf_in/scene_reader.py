@@ -38,13 +38,6 @@ from sonic_bullet.session.gltf_in.physics import (
 from sonic_bullet.storage.reading import reading
 
 GLTF_REMEDY = "export it again as glTF 2.0 with KHR_physics_rigid_bodies"
-READ_EXTENSIONS = {
-    EXTENSION_NAMES.physics,
-    EXTENSION_NAMES.shapes,
-    EXTENSION_NAMES.audio,
-    "KHR_texture_transform",
-    "KHR_mesh_quantization",
-}
 
 
 def is_gltf(path: str | os.PathLike[str]) -> bool:
@@ -62,6 +55,13 @@ def read_rigid_scene(path: str | os.PathLike[str]) -> RigidScene:
 
 
 def _scene_of(tree: GltfTree, name: str) -> RigidScene:
+    read_extensions = {
+        EXTENSION_NAMES.physics,
+        EXTENSION_NAMES.shapes,
+        EXTENSION_NAMES.audio,
+        "KHR_texture_transform",
+        "KHR_mesh_quantization",
+    }
     nodes, notes = Nodes(tree), list[str]()
     used = [str(x) for x in tree.tree.get("extensionsUsed", ())]
     # beginnings of extensions that only change what is seen
@@ -69,7 +69,7 @@ def _scene_of(tree: GltfTree, name: str) -> RigidScene:
     notes += [
         f"{name} uses {x}, which is not read"
         for x in used
-        if x not in READ_EXTENSIONS and not x.startswith(looks_extensions)
+        if x not in read_extensions and not x.startswith(looks_extensions)
     ]
     found = body_nodes(nodes)
     if not found:

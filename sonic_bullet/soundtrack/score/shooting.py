@@ -23,8 +23,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import whitening
 
-NUDGE = 0.01  # m/s, and of restitution
-
 
 @dataclass(slots=True)
 class _Try:
@@ -262,20 +260,21 @@ class Shooting:
 
     def _stepped(self, k: int, best: _Try, islands: list[Array], touching: Array) -> _Try:
         """Take one Gauss-Newton step of every island, whole, halved or quartered."""
+        nudge_m_s = 0.01  # and of restitution
         most = max(map(len, islands))
         columns: dict[int, list[Array]] = {i: [] for i in range(len(islands))}
         for member in range(most):
             for axis in range(6):
                 speed = best.speed.copy()
                 nudged = [x[member] for x in islands if len(x) > member]
-                nudge = NUDGE / (self._gyration_m[nudged] if axis > 2 else 1)
+                nudge = nudge_m_s / (self._gyration_m[nudged] if axis > 2 else 1)
                 speed[nudged, axis] += nudge
                 tried = self._shot(k, speed, best.restitution)
                 for i, island in enumerate(islands):
                     if len(island) > member:
-                        columns[i].append((tried.residual - best.residual)[island].ravel() / NUDGE)
+                        columns[i].append((tried.residual - best.residual)[island].ravel() / nudge_m_s)
         e = best.restitution.copy()
-        e[self._free] += np.where(e[self._free] > 0.5, -NUDGE, NUDGE)
+        e[self._free] += np.where(e[self._free] > 0.5, -nudge_m_s, nudge_m_s)
         tried = self._shot(k, best.speed, e)
         moves = []
         for i, island in enumerate(islands):

@@ -11,7 +11,7 @@ import pybullet as p
 import pytest
 
 import sonic_bullet as sb
-from sonic_bullet.bank.transmission import STEADY
+from sonic_bullet.bank.transmission import PHASE
 from sonic_bullet.files import ContactLog, read_log
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.contacts import Contacts
@@ -213,4 +213,4 @@ def test_a_partner_is_heard_for_one_mode_alone() -> None:
 def test_a_plate_on_a_board_makes_it_sound(client: Any) -> None:
     """In the run time too: late, when the board's own ringing is over, what the plate passes on is heard from it."""
     listener = landed(client, seconds=0.6)
-    assert (listener._synth._state.ringing.transmissions["phase"][1] == STEADY).any()
+    assert (listener._synth._state.ringing.transmissions["phase"][1] == PHASE.steady).any()

@@ -11,7 +11,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import assembled
 from sonic_bullet.soundtrack.score.scoring import score_animation
-from sonic_bullet.soundtrack.sound_events import IMPACT, find_sound_events
+from sonic_bullet.soundtrack.sound_events import find_sound_events
 from tests.few_cases import parametrize_few
 from tests.made.animations import MASS_KG, RADIUS_M, ball_animation, bounce_m, dropped, export_of
 
@@ -62,7 +62,7 @@ def test_what_noise_hides_is_said() -> None:
 
 def impacts(log: ContactLog) -> list[tuple[float, float]]:
     """Time and impulse of each that is played."""
-    return [(x.start_s, x.impulse_n_s) for x in find_sound_events(log) if x.kind == IMPACT and not x.reason]
+    return [(x.start_s, x.impulse_n_s) for x in find_sound_events(log) if x.kind == "impact" and not x.reason]
 
 
 @parametrize_few("fps", [24.0, 60.0, 120.0], (0, 2))

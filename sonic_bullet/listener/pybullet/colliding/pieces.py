@@ -18,15 +18,6 @@ from sonic_bullet.listener.pybullet.colliding.mjcf_capsules import must_not_be_a
 from sonic_bullet.listener.quiet import quiet_stdout
 from sonic_bullet.records import Array
 
-PIECE_KINDS = {
-    pybullet.GEOM_SPHERE,
-    pybullet.GEOM_BOX,
-    pybullet.GEOM_CYLINDER,
-    pybullet.GEOM_MESH,
-    pybullet.GEOM_PLANE,
-    pybullet.GEOM_CAPSULE,
-}
-
 
 class Piece(NamedTuple):
     """A piece of a link.
@@ -85,10 +76,18 @@ def described_pieces(client_id: int, body: int, link: int) -> tuple[tuple[Piece,
 
 def _maximal_pieces(client_id: int, body: int) -> tuple[tuple[Piece, ...], bool]:
     """Return the pieces of a body in maximal coordinates: from reduced ones, else visual ones of its box."""
+    piece_kinds = {
+        pybullet.GEOM_SPHERE,
+        pybullet.GEOM_BOX,
+        pybullet.GEOM_CYLINDER,
+        pybullet.GEOM_MESH,
+        pybullet.GEOM_PLANE,
+        pybullet.GEOM_CAPSULE,
+    }
     with reduced_body(client_id, body) as other:
         if other is not None:
             return collision_pieces(*other, -1), False
-    drawn = tuple(piece for piece in visual_pieces(client_id, body, -1) if piece.kind in PIECE_KINDS)
+    drawn = tuple(piece for piece in visual_pieces(client_id, body, -1) if piece.kind in piece_kinds)
     if fills(client_id, body, -1, drawn):
         return drawn, True
     if len(drawn) == 1 and drawn[0].kind == pybullet.GEOM_MESH and len(hull_vertices(client_id, body, -1, 0)):
