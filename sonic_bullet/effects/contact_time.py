@@ -12,10 +12,11 @@ be observed and are not count, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from sonic_bullet.effects.common.fitting import bracket
 from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.protocol import Effect, Evidence, Impact, Number, ObjectEvidence, Owner, Stage
 from sonic_bullet.records import Array
@@ -79,37 +80,33 @@ class ContactTime(Effect):
         if len(freq) < 4:
             return None
         reference = float(np.exp(np.log(level).mean()))
-        grid = np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
-        pulses: tuple[str, ...] = FORMS
+        known = evidence.known if isinstance(evidence.known, cls) else None
         # part of the evidence may have another pulse nearly as good far away; it is this one that is fitted again
-        if isinstance(evidence.known, cls):
-            grid, pulses = (
-                evidence.known.duration_s(reference) * np.geomspace(1 / ROLL_OFF.again, ROLL_OFF.again, 24),
-                (evidence.known.pulse,),
-            )
-        plain = _cost(expected, observed, sd, ROLL_OFF.rough * most, mode)
-        directions: list[tuple[float, float, Self]] = []
+        grid = (
+            np.geomspace(0.15 / freq.max(), min(1.2 / freq.min(), 0.05), 90)
+            if known is None
+            else known.duration_s(reference) * np.geomspace(1 / ROLL_OFF.again, ROLL_OFF.again, 24)
+        )
+
+        def best(exponent: float, pulse: str) -> tuple[float, Self]:
+            share = (level / reference) ** exponent
+
+            def at(tau: float) -> float:
+                h = np.abs(magnitude(pulse, freq * tau * share))
+                # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
+                h = h / max(float(h.max()), 1e-300)
+                return _cost(expected * h, observed, sd, ROLL_OFF.rough * most * np.maximum(h, 0.02), mode)
+
+            cost, tau = bracket(at, grid)
+            return cost, cls(tau, reference, exponent, pulse)
+
+        forms: tuple[str, ...] = FORMS if known is None else (known.pulse,)
+        ends: list[tuple[float, Self]] = []
         for exponent in (HERTZ, 0.0):
-            best: tuple[float, Self] | None = None
-            for pulse in pulses:
-                share = (level / reference) ** exponent
-
-                def at(tau: float, share: Array = share, pulse: str = pulse) -> float:
-                    h = np.abs(magnitude(pulse, freq * tau * share))
-                    # the gain is free: a pulse so long that it leaves nothing must not pass for a small one
-                    h = h / max(float(h.max()), 1e-300)
-                    return _cost(expected * h, observed, sd, ROLL_OFF.rough * most * np.maximum(h, 0.02), mode)
-
-                costs = np.array([at(t) for t in grid])
-                i = int(costs.argmin())
-                tau = _golden(at, grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)])
-                cost = at(tau) + (0.0 if exponent else 1e-9)
-                if best is None or cost < best[0]:
-                    best = (cost, cls(tau, reference, exponent, pulse))
-            assert best is not None
-            directions.append((best[0] + sum(_late(h, best[1]) for h in evidence.observed), *best))
-        _, cost, found = min(directions, key=lambda direction: direction[0])
-        return found if evidence.known is not None or cost < plain - 4 * np.log(len(freq)) else None
+            ends.append(min([best(exponent, form) for form in forms], key=lambda end: end[0]))
+        cost, found = min(ends, key=lambda end: end[0] + sum(_late(h, end[1]) for h in evidence.observed))
+        plain = _cost(expected, observed, sd, ROLL_OFF.rough * most, mode)
+        return found if known is not None or cost < plain - 4 * np.log(len(freq)) else None
 
 
 def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]:
@@ -193,10 +190,3 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     onset_delays_s, onset_finer_s = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
     middle = min(onset_delays_s, key=at)
     return min(at(t) for t in middle + onset_finer_s)
-
-
-def _golden(f: Any, low: float, high: float) -> float:
-    """Find the minimum of a function between two bounds."""
-    from scipy.optimize import minimize_scalar
-
-    return float(minimize_scalar(f, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * low}).x)

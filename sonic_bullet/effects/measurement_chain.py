@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from sonic_bullet.effects.common.fitting import bracket
 from sonic_bullet.effects.common.hum import hum_of
 from sonic_bullet.effects.protocol import Effect, Evidence, Number, Numbers, ObjectEvidence, Owner, Sound, Stage
 from sonic_bullet.records import Array
@@ -24,8 +25,7 @@ from sonic_bullet.records import Array
 class _Chain(NamedTuple):
     """Numbers of the search for a filter and a limit."""
 
-    corners: int = 160  # tried, and again about the best; of the rate
-    finer: int = 21
+    corners: int = 160  # tried; of the rate
     highest: float = 0.49
     stuck: int = 4  # samples in a row at the limit, or in all
     often: int = 12
@@ -163,23 +163,18 @@ def _filter(observed: list[ObjectEvidence], better: float, fewest: int) -> dict[
     if len(freq) < fewest:
         return {}
     sr = min(h.sr for h in observed)
-    best: tuple[float, dict[str, Any]] = (_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})
+    trials: list[tuple[float, dict[str, Any]]] = [(_misfit(ratio, sd) - better - 2 * np.log(len(freq)), {})]
     bottom, top = float(freq.min()), min(float(freq.max()), CHAIN.highest * sr)
     # beyond all lines it is a slope, which much else is
     for name, ends in (("high", (0.3 * bottom, top)), ("low", (bottom, min(3 * top, CHAIN.highest * sr)))):
-        grid = np.geomspace(*ends, CHAIN.corners)
-        for order in (1, 2, 3, 4):
+        for order in ORDERS:
 
             def cost(corner: float, order: int = order, high: bool = name == "high") -> float:
                 return _misfit(ratio - np.log(butterworth(freq, corner, order, high, sr)), sd)
 
-            costs = [cost(corner) for corner in grid]
-            i = int(np.argmin(costs))
-            fine = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, CHAIN.corners - 1)], CHAIN.finer)
-            finer = [cost(corner) for corner in fine]
-            if min(finer) < best[0]:
-                best = (min(finer), {f"{name}_pass_hz": float(fine[int(np.argmin(finer))]), f"{name}_order": order})
-    return best[1]
+            left, corner = bracket(cost, np.geomspace(*ends, CHAIN.corners))
+            trials.append((left, {f"{name}_pass_hz": corner, f"{name}_order": order}))
+    return min(trials, key=lambda trial: trial[0])[1]
 
 
 def _ratio(h: ObjectEvidence) -> tuple[Array, Array, Array]:

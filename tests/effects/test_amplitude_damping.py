@@ -16,7 +16,7 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
 from sonic_bullet.effects.amplitude_damping.damped_lines import fitted_decay, lines_under
 from sonic_bullet.effects.amplitude_pitch import AmplitudePitch
-from sonic_bullet.effects.common.axes import ANGLES, turned
+from sonic_bullet.effects.common.axes import ANGLES
 from sonic_bullet.effects.common.envelope import envelopes
 from sonic_bullet.effects.foreign_mode import ForeignMode
 from sonic_bullet.effects.protocol import Evidence
@@ -134,13 +134,13 @@ def test_what_is_known_to_ring_beside_the_body_is_taken_out_of_its_lines() -> No
 
 def test_turned_twins_sound_as_before_where_nothing_is_choked() -> None:
     model = with_twins()
-    other = turned(model, (float(model.freq_hz[PAIR[0]]),), (0.6,))
+    other = AmplitudeDamping(1.0, freq_hz=(float(model.freq_hz[PAIR[0]]),), turn_rad=(0.6,)).turned(model)
     one, two = (
         np.einsum("vxj,wyj->vwxy", m.shape[-6:, :, list(PAIR)], m.shape[-6:, :, list(PAIR)]) for m in (model, other)
     )
     assert np.abs(model.shape - other.shape).max() > 0.1
     assert np.allclose(one, two, atol=1e-5)
-    assert turned(model, (123.0,), (0.6,)).shape == pytest.approx(model.shape)
+    assert AmplitudeDamping(1.0, freq_hz=(123.0,), turn_rad=(0.6,)).turned(model).shape == pytest.approx(model.shape)
 
 
 @pytest.mark.slow

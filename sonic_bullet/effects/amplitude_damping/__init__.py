@@ -26,8 +26,9 @@ from sonic_bullet.effects.amplitude_damping.damped_lines import (
     would,
 )
 from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
-from sonic_bullet.effects.common.axes import ANGLES, AXES_PAIR, turned
+from sonic_bullet.effects.common.axes import ANGLES, AXES_PAIR, TurnsPairs
 from sonic_bullet.effects.common.envelope import envelopes, levels
+from sonic_bullet.effects.common.points import solved
 from sonic_bullet.effects.protocol import (
     BaselineChange,
     ChangesBaseline,
@@ -37,11 +38,10 @@ from sonic_bullet.effects.protocol import (
     ObjectEvidence,
     Owner,
     Ring,
-    RotatesPairs,
     Stage,
     Traits,
 )
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array
 
 POWERS = (1.0, 2.0)
 GROWTHS = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
@@ -49,7 +49,7 @@ AGAIN = np.geomspace(0.4, 2.5, 9)  # of what all evidence said
 
 
 @dataclass(frozen=True)
-class AmplitudeDamping(RotatesPairs, ChangesBaseline):
+class AmplitudeDamping(TurnsPairs, ChangesBaseline):
     """Decay that grows with the level, and what was fitted with it."""
 
     id: ClassVar[str] = "amplitude-damping"
@@ -74,14 +74,6 @@ class AmplitudeDamping(RotatesPairs, ChangesBaseline):
             damping_growth=x.damping_growth + self.damping_growth * _per_velocity(x, self.measure),
             damping_growth_power=self.power,
         )
-
-    def turned(self, x: ModalModel) -> ModalModel:
-        """Turn degenerate modes to their own axes."""
-        return turned(x, self.freq_hz, self.turn_rad)
-
-    def angles(self) -> int:
-        """Count its numbers that are axes of degenerate pairs."""
-        return len(self.turn_rad)
 
     def baseline_change(self) -> BaselineChange:
         """Return the material's α and β by the decays at low level, and the gain at the onset."""
@@ -233,15 +225,8 @@ def _axes(lines: list[DecayFrames], found: _Fit) -> tuple[tuple[float, ...], tup
 
 def _rayleigh(h: ObjectEvidence, lines: list[DecayFrames], row: tuple[DecayFit, ...]) -> tuple[float, float]:
     """Fit α, β >= 0 to the lines' decays at low level, by relative least squares with Huber's weights."""
-    from scipy.optimize import nnls
-
+    rough = 0.1  # of a decay: more off counts less
     omega2 = np.array([h.omega[line.number] ** 2 for line in lines])
     decay = np.array([one.decay_per_s[one.best] for one in row])
-    columns = np.stack([0.5 * np.ones(len(omega2)), 0.5 * omega2], axis=1) / decay[:, None]
-    scale = np.abs(columns).max(axis=0)
-    trust, x = np.ones(len(decay)), np.zeros(2)
-    for _ in range(10):
-        x = nnls(columns / scale * trust[:, None], trust)[0]
-        off = np.abs(columns / scale @ x - 1)
-        trust = np.sqrt(np.minimum(1, 0.1 / np.maximum(off, 1e-9)))
-    return float(x[0] / scale[0]), float(x[1] / scale[1])
+    alpha, beta = solved(decay, rough / 3 * decay, np.stack([np.full(len(omega2), 0.5), 0.5 * omega2], axis=1))[0]
+    return float(alpha), float(beta)

@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 
 from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import axes_of, bend_with_axes
-from sonic_bullet.effects.common.axes import degenerate, turned
+from sonic_bullet.effects.common.axes import TurnsPairs, degenerate
 from sonic_bullet.effects.common.envelope import Envelopes, envelopes, falls, levels
 from sonic_bullet.effects.protocol import (
     Evidence,
@@ -25,11 +25,10 @@ from sonic_bullet.effects.protocol import (
     ObjectEvidence,
     Owner,
     Ring,
-    RotatesPairs,
     Stage,
     Traits,
 )
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array
 
 MEASURES = ("impulse", "velocity", "displacement")
 # times the bend that degenerate modes were identified with as if each pair were one mode
@@ -63,7 +62,7 @@ class Slope:
 
 
 @dataclass(frozen=True)
-class AmplitudePitch(RotatesPairs):
+class AmplitudePitch(TurnsPairs):
     """Rise of the frequency with the level."""
 
     id: ClassVar[str] = "amplitude-pitch"
@@ -80,14 +79,6 @@ class AmplitudePitch(RotatesPairs):
     def apply(self, x: Ring) -> Ring:
         """Add the bend to the modes in the bank."""
         return replace(x, bend=x.bend + self.bend * _per_velocity(x, self.measure) ** 2)
-
-    def turned(self, x: ModalModel) -> ModalModel:
-        """Turn degenerate modes to their own axes."""
-        return turned(x, self.freq_hz, self.turn_rad)
-
-    def angles(self) -> int:
-        """Count its numbers that are axes of degenerate pairs."""
-        return len(self.turn_rad)
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:

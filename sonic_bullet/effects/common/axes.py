@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.effects.protocol import Numbers, ObjectEvidence, RotatesPairs
 from sonic_bullet.records import Array, ModalModel
 
 AXES_PAIR = 6e-3  # relative: modes of a mesh nearer than this may be a pair
@@ -92,13 +92,21 @@ def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array,
     return impulse * h.pressed[:, h.mode[k]] * push * observed[:, None, :], level
 
 
-def turned(x: ModalModel, freq_hz: tuple[float, ...], turn_rad: tuple[float, ...]) -> ModalModel:
-    """Turn the degenerate modes of a model about each frequency to other axes."""
-    if not freq_hz:
-        return x
-    shape = x.shape.copy()
-    for f, turn in zip(freq_hz, turn_rad, strict=True):
-        a, b = pair_at(x.freq_hz, f)
-        if a >= 0:
-            shape[:, :, [a, b]] = about_axes(x.shape[:, :, [a, b]], turn)
-    return replace(x, shape=shape)
+class TurnsPairs(RotatesPairs):
+    """An effect with fields freq_hz and turn_rad (p,): degenerate modes, and the angles of their axes to the mesh's."""
+
+    freq_hz: Numbers
+    turn_rad: Numbers
+
+    def turned(self, x: ModalModel) -> ModalModel:
+        """Turn degenerate modes to their own axes."""
+        shape = x.shape.copy() if self.freq_hz else x.shape
+        for f, turn in zip(self.freq_hz, self.turn_rad, strict=True):
+            a, b = pair_at(x.freq_hz, f)
+            if a >= 0:
+                shape[:, :, [a, b]] = about_axes(x.shape[:, :, [a, b]], turn)
+        return replace(x, shape=shape)
+
+    def angles(self) -> int:
+        """Count its numbers that are axes of degenerate pairs."""
+        return len(self.turn_rad)

@@ -95,6 +95,11 @@ def free_numbers(effect: Any) -> int:
     return sum(n.free * (len(value) if isinstance(value, tuple) else 1) for _, n, value in _stated(effect))
 
 
+def signed_fields(kind: type) -> frozenset[str]:
+    """Return the declared fields of a kind of effect that may be negative."""
+    return frozenset(name for name, number, _ in _declared(kind) if number.least < 0)
+
+
 @cache
 def _declared(kind: type) -> tuple[tuple[str, Number, Any], ...]:
     """Return the declared fields of a kind of effect: name, declaration, default."""

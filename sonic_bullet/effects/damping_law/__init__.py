@@ -19,6 +19,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from sonic_bullet.effects.common.fitting import fitted
 from sonic_bullet.effects.protocol import Effect, Evidence, Number, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, Material, ModalModel
 
@@ -91,22 +92,29 @@ class DampingLaw(Effect):
             return None
         omega, decay = omega[good], decay[good]
         sd = np.hypot(np.nan_to_num(spread[good] / decay, nan=0.05), scatter)
-        y = np.log(decay)
+        per = np.log(len(omega))
 
-        def cost(model: Array) -> Array:
-            return np.asarray((np.log(np.maximum(model, 1e-9)) - y) / sd)
+        def residual(law: Any) -> Array:
+            return np.asarray((np.log(np.maximum(law.decay_per_s(omega), 1e-9)) - np.log(decay)) / sd)
 
-        trials = [(bic, cls(*values)) for bic, values in _fits(omega, cost)]
+        def bic(start: Any, *free: str) -> tuple[float, Any]:
+            cost, law = fitted(start, free, residual)
+            return cost + len(free) * per, law
+
+        flat = bic(cls("constant-loss", float(np.exp(-7.0))), "eta")
+        eta, tau = flat[1].eta, 1 / float(np.median(omega))
+        trials = [flat, *(bic(cls("power", eta, p), "eta", "exponent") for p in (0.5, 1.0, 1.6))]
+        trials += [
+            bic(cls("relaxation", eta * np.exp(-1.5), 1.0, eta * np.e, tau * np.exp(s)), "eta", "strength", "tau_s")
+            for s in (-2.5, -1.0, 0.0, 1.0, 2.5)
+        ]
         # a part of the lines may like another law as well; it is this one that is fitted again
         if isinstance(evidence.known, cls):
             trials = [t for t in trials if t[1].law == evidence.known.law]
-        bic, best = min(trials, key=lambda t: t[0])
-        return (
-            best
-            if evidence.known is not None
-            or bic < _least(omega, cost, _rayleigh, [_start(omega, decay)], 2)[0] - LAW_SEARCH.better
-            else None
-        )
+        least, best = min(trials, key=lambda t: t[0])
+        pair = _Rayleigh(2 * float(decay.min()), 2 * float(np.median(decay / omega**2)))
+        plain = bic(pair, "alpha_per_s", "beta_s")[0]
+        return best if evidence.known is not None or least < plain - LAW_SEARCH.better else None
 
 
 def own_decay_per_s(material: Material, lambda_per_s2: Array) -> Array:
@@ -122,46 +130,13 @@ def own_decay_per_s(material: Material, lambda_per_s2: Array) -> Array:
     return found
 
 
-def _rayleigh(p: Array, w: Array) -> Array:
-    """Compute Rayleigh's decays at ω (k,) for p = (ln α, ln β)."""
-    return np.asarray(0.5 * (np.exp(p[0]) + np.exp(p[1]) * w**2))
+@dataclass(frozen=True)
+class _Rayleigh:
+    """Rayleigh's law."""
 
+    alpha_per_s: float
+    beta_s: float
 
-def _start(omega: Array, decay: Array) -> Array:
-    """Estimate (ln α, ln β) to start the fit of Rayleigh's law from."""
-    return np.array([np.log(2 * decay.min()), np.log(2 * np.median(decay / omega**2))])
-
-
-def _fits(omega: Array, cost: Any) -> list[tuple[float, tuple[str, float, float, float, float]]]:
-    """Fit each law: (BIC, fields)."""
-    middle = np.log(np.median(omega))
-
-    def power(p: Array, w: Array) -> Array:
-        return np.asarray(0.5 * np.exp(p[0]) * OMEGA_1 * (w / OMEGA_1) ** p[1])
-
-    def relax(p: Array, w: Array) -> Array:
-        x = w * np.exp(p[2])
-        return np.asarray(0.5 * w * (np.exp(p[0]) + np.exp(p[1]) * x / (1 + x * x)))
-
-    loss, eta = _least(omega, cost, lambda p, w: 0.5 * np.exp(p[0]) * w, [np.array([-7.0])], 1)
-    bent, pair = _least(omega, cost, power, [np.array([eta[0], s]) for s in (0.5, 1.0, 1.6)], 2)
-    peak, three = _least(
-        omega, cost, relax, [np.array([eta[0] - 1.5, eta[0] + 1, -middle + s]) for s in (-2.5, -1.0, 0.0, 1.0, 2.5)], 3
-    )
-    return [
-        (loss, ("constant-loss", float(np.exp(eta[0])), 1.0, 0.0, 0.0)),
-        (bent, ("power", float(np.exp(pair[0])), float(pair[1]), 0.0, 0.0)),
-        (peak, ("relaxation", float(np.exp(three[0])), 1.0, float(np.exp(three[1])), float(np.exp(three[2])))),
-    ]
-
-
-def _least(omega: Array, cost: Any, law: Any, starts: list[Array], count: int) -> tuple[float, Array]:
-    """Fit a law under Cauchy's loss from several starts: (BIC, parameters)."""
-    from scipy.optimize import least_squares
-
-    found = [
-        least_squares(lambda p: cost(law(p, omega)), start, loss="cauchy", f_scale=2.0, bounds=(-40, 40))
-        for start in starts
-    ]
-    best = min(found, key=lambda f: f.cost)
-    return float(2 * best.cost + count * np.log(len(omega))), best.x
+    def decay_per_s(self, omega_per_s: Array) -> Array:
+        """Compute the decays (k,) at ω (k,)."""
+        return 0.5 * (self.alpha_per_s + self.beta_s * omega_per_s**2)

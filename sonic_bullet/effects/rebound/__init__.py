@@ -10,12 +10,12 @@ Identified by the recordings: their residual is the model again, later and weake
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from sonic_bullet.effects.common.fitting import nearby
 from sonic_bullet.effects.common.ringing import direct_as_expected
 from sonic_bullet.effects.protocol import Effect, Evidence, Impact, Number, ObjectEvidence, Owner, Stage
 from sonic_bullet.effects.rebound.later_hits import LATER_HITS, MOST_HITS, hits_by_strike, second_hit, third_hit
@@ -199,29 +199,16 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
         for r in (first[2:] if start.shrink is None else (first[2], e, *ratios))
     ]
     best = min(tries, key=left)
-    found = _nearby(left, best)
+    step = np.array([0.1, 2e-4, 2e-3])
+    found = nearby(left, best, step)
     if start.hits > 2 and not known:
         gap = start.gap_s * (level / start.impulse_n_s) ** start.exponent
         whole = np.zeros((2, len(both), size // 2 + 1), complex)
         whole[:, :, loud] = both, own
         e = third_hit(gap, whole[0], whole[1], total, h.sr, fade)
-        other = _nearby(left, np.array([e, 0.0, e]))
+        other = nearby(left, np.array([e, 0.0, e]), step)
         found = other if found[0] - other[0] > sought * (len(level) + found[0]) else found
     return found[0], of(found[1])
-
-
-def _nearby(left: Callable[[Array], float], start: Array) -> tuple[float, Array]:
-    """Find the minimum near a start."""
-    from scipy.optimize import minimize
-
-    simplex = start + np.array([[0, 0, 0], [0.1, 0, 0], [0, 2e-4, 0], [0, 0, 2e-3]])
-    found = minimize(
-        left,
-        start,
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-6, "maxfev": 120},
-    )
-    return float(found.fun), found.x
 
 
 def _turned(impact: Impact, freq_hz: Array, fade: float) -> Array:
