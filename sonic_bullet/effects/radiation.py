@@ -96,7 +96,8 @@ class Radiation(Effect):
         decay, w2 = observed.decay_per_s, observed.omega**2
         sd = np.hypot(observed.decay_sd_per_s, RADIATION.scatter * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(observed.model.vertex_m[np.unique(observed.model.face)], axis=0)))
-        plain = _left(decay, sd, np.stack([np.full(len(w2), 0.5), 0.5 * w2], axis=1))[1]
+        rayleigh = [np.full(len(w2), 0.5), 0.5 * w2]
+        plain = float(solved(decay, sd, np.stack(rayleigh, axis=1))[1].sum())
         radii = np.geomspace(0.02 * across, across, 40)
         # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
         if isinstance(evidence.known, cls):
@@ -104,20 +105,10 @@ class Radiation(Effect):
             radii = evidence.known.radius_m * np.geomspace(1 / again, again, 21)
         found = []
         for one in (cls(float(radius), 1.0, order=order) for order in RADIATION.orders for radius in radii):
-            x, left = _left(
-                decay,
-                sd,
-                np.stack(
-                    [
-                        np.full(len(w2), 0.5),
-                        0.5 * w2,
-                        0.5 * RADIATION.impedance * one.efficiency(observed.freq_hz) * mine,
-                    ],
-                    axis=1,
-                ),
-            )
+            lost = 0.5 * RADIATION.impedance * one.efficiency(observed.freq_hz) * mine
+            x, rest = solved(decay, sd, np.stack([*rayleigh, lost], axis=1))
             if x[2] > 0:
-                found.append((left, replace(one, strength=float(x[2]))))
+                found.append((float(rest.sum()), replace(one, strength=float(x[2]))))
         if not found:
             return None
         left, best = min(found, key=lambda one: one[0])
@@ -146,19 +137,11 @@ def areas(x: ModalModel) -> Array:
     return np.asarray((along**2 * size[:, None]).sum(axis=0))
 
 
-def _left(decay: Array, sd: Array, columns: Array) -> tuple[Array, float]:
-    """Fit decays by columns, and return the coefficients and what is left."""
-    value, left = solved(decay, sd, columns)
-    return value, float(left.sum())
-
-
-def _off(observed: ObjectEvidence, made: Radiation, tilt: float) -> Array:
-    """Compute ln of every line's level (k,) over the expected one, median of the strikes, less tilt and common gain."""
-    ratio = np.log(np.maximum(np.abs(observed.amplitude), 1e-300) / np.maximum(np.abs(observed.expected), 1e-300))
-    left = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(observed.freq_hz))
-    return np.asarray(left - np.median(left))
-
-
 def _level_cost(observed: ObjectEvidence, made: Radiation, tilt: float) -> float:
-    """Compute twice the negative log likelihood (Cauchy) of the levels' misfit: lines of other modes lie far off."""
-    return float(2 * np.log1p((_off(observed, made, tilt) / RADIATION.scatter) ** 2).sum())
+    """Compute twice the negative log likelihood (Cauchy) of the levels' misfit: lines of other modes lie far off.
+
+    Misfit: ln of a line's level over the expected one, median of the strikes, less tilt and common gain.
+    """
+    ratio = np.log(np.maximum(np.abs(observed.amplitude), 1e-300) / np.maximum(np.abs(observed.expected), 1e-300))
+    off = np.median(ratio, axis=0) - tilt * np.log(made.efficiency(observed.freq_hz))
+    return float(2 * np.log1p(((off - np.median(off)) / RADIATION.scatter) ** 2).sum())
