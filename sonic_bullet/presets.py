@@ -36,7 +36,7 @@ from sonic_bullet.effects.presets_of_effects import effect_of
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Material
-from sonic_bullet.records.coerce import as_path, nearest, shown
+from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import MaterialError, RecordError
 from sonic_bullet.records.touching.surface_form import waves_of
 from sonic_bullet.residual.code import ResidualForm, residual_of
@@ -170,7 +170,7 @@ def named_preset(name: str | os.PathLike[str]) -> Preset:
     if text.lower() in known:
         return read_preset(_folder_of(text.lower()) / f"{text.lower()}.json")
     remedy = nearest(text, known, ", or the path of a preset file")
-    raise MaterialError(f"there is no material {shown(text)}", f"{remedy}; 'sonic-bullet materials' lists all")
+    raise MaterialError(f"there is no material {quote(text)}", f"{remedy}; 'sonic-bullet materials' lists all")
 
 
 def list_materials() -> tuple[Material, ...]:

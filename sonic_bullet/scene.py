@@ -31,7 +31,7 @@ from sonic_bullet.listener import (
 from sonic_bullet.machine.progress import Say, says_so
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
-from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, shown
+from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, quote
 from sonic_bullet.records.errors import SceneError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.runtime.replay import as_tail_db, render_kept, render_notes
 from sonic_bullet.session import Listener, attach
@@ -273,7 +273,7 @@ def _stage(path: str | Path, **options: Any) -> _Stage:
     try:
         place = Path(name).resolve(strict=True)
     except (OSError, ValueError):  # missing, or not a valid name
-        raise SceneError(f"no scene file {shown(name)}", remedy) from None
+        raise SceneError(f"no scene file {quote(name)}", remedy) from None
     if not place.is_file():
-        raise SceneError(f"{shown(name)} is no scene file", remedy)
+        raise SceneError(f"{quote(name)} is no scene file", remedy)
     return _Stage(place, **options)

@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.records import Array, Residual, frozen_array
 from sonic_bullet.records.arrays import require, store
-from sonic_bullet.records.coerce import as_number, as_text, shown
+from sonic_bullet.records.coerce import as_number, as_text, quote
 from sonic_bullet.records.roughness import OCTAVES
 
 Row = tuple[float, float, float, float, float, float]
@@ -61,7 +61,7 @@ class BakedMaterial:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        where = f"material {shown(as_text(self.name, 'the name of a material', 'give a text'))}"
+        where = f"material {quote(as_text(self.name, 'the name of a material', 'give a text'))}"
         bounds: dict[str, dict[str, Any]] = {
             "density_kg_m3": {"above": 0},
             "youngs_pa": {"above": 0},
@@ -150,7 +150,7 @@ class BakedModel:
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""
-        where = f"baked model {shown(as_text(self.name, 'the name of a baked model', 'give a text'))}"
+        where = f"baked model {quote(as_text(self.name, 'the name of a baked model', 'give a text'))}"
         again = "bake it again"
         freq = frozen_array(self.freq_hz, float, (None,), f"{where}: freq_hz")
         m = len(freq)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sonic_bullet.bake.baked_model import BakedModel
-from sonic_bullet.records.coerce import as_path, nearest, shown
+from sonic_bullet.records.coerce import as_path, nearest, quote
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage.reading import reading
 
@@ -24,7 +24,7 @@ def check_baked_name(path: str | os.PathLike[str]) -> str:
     end = Path(as_path(path, "path", "name a file, such as bowl.glb")).suffix.lower()
     if end not in SEVERAL_MODELS + ONE_MODEL:
         raise FileError(
-            f"cannot bake to {path}: {shown(end)} is no format known here", nearest(end, SEVERAL_MODELS + ONE_MODEL)
+            f"cannot bake to {path}: {quote(end)} is no format known here", nearest(end, SEVERAL_MODELS + ONE_MODEL)
         )
     return end
 
@@ -47,7 +47,7 @@ def write_baked(path: str | os.PathLike[str], models: Sequence[BakedModel]) -> N
     """
     end = check_baked_name(path)
     if not models or (len(models) > 1 and end in ONE_MODEL):
-        names = ", ".join(shown(model.name) for model in models[:8]) or "none"
+        names = ", ".join(quote(model.name) for model in models[:8]) or "none"
         raise FileError(f"cannot bake {len(models)} bodies to {path}: {end} holds one", f"name one of {names}")
     if end == ".json":
         from sonic_bullet.bake.json_models import write_json_models

@@ -25,7 +25,7 @@ from sonic_bullet.files.gltf.checked_accessors import named_triangles, named_val
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.files.gltf.gltf_writer import GltfBuffer, write_gltf
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.session.gltf_in.own_words import EXTRAS
 
@@ -114,7 +114,7 @@ def _material(audio: Mapping[str, Any], entry: Mapping[str, Any], name: str) -> 
     if index is None:
         return BakedMaterial()
     if not isinstance(index, int) or not 0 <= index < len(known):
-        raise FileError(f"{name}: material is {shown(index)} of {len(known)}", NOT_SO_BAKED)
+        raise FileError(f"{name}: material is {quote(index)} of {len(known)}", NOT_SO_BAKED)
     it = known[index]
     numbers = {ours: it.get(theirs) for theirs, ours in BULK.items()}
     young, poisson = numbers["youngs_pa"], numbers["poisson"]

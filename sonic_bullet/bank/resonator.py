@@ -22,7 +22,7 @@ from sonic_bullet.bank.rigid_motion import rigid_columns, rigid_rows
 from sonic_bullet.contact.coupling import BodyMobility, ContactSide
 from sonic_bullet.contact.coupling.mobility import alike_pairs
 from sonic_bullet.geometry.nearest_point import SurfaceIndex, nearest, surface_index
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.radiation.far_field import UNEVEN_AXIS, jerk_coefficient
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Array, Body, Microphone, ModalModel, ModalSum, Sensor, Vibrometer

@@ -16,7 +16,7 @@ from sonic_bullet.comparing.inputs.causes import Causes, find_causes, same_sound
 from sonic_bullet.comparing.inputs.input_differences import Asked, asked_differences
 from sonic_bullet.comparing.inputs.log_differences import Logged, logged_differences
 from sonic_bullet.comparing.inputs.matched_logs import FirstDifference, first_difference, matched, require_kin
-from sonic_bullet.comparing.inputs.put_back import PutBack
+from sonic_bullet.comparing.inputs.substitution import Substitution
 from sonic_bullet.comparing.outcome.modal_effects import modal_effects
 from sonic_bullet.comparing.outcome.recording_effects import recording_effects
 from sonic_bullet.comparing.outcome.sound_effects import at_common_rate, sound_effects
@@ -93,30 +93,30 @@ def compared(a: Side, b: Side) -> Comparison:
 def _of_scenes(a: Side, b: Side, same: bool, first: FirstDifference) -> tuple[list[Difference], Causes]:
     pairs, asked = asked_differences(a, b)
 
-    def put_back(chosen: Sequence[int], like: Sequence[bytes] | None = None) -> KeptSound:
+    def substitute(chosen: Sequence[int], like: Sequence[bytes] | None = None) -> KeptSound:
         report_progress(f"with {', '.join(asked[i].what for i in chosen[:3])} put back")
-        return _put_back(b, pairs, [asked[i] for i in chosen], like).sound
+        return _substitute(b, pairs, [asked[i] for i in chosen], like).sound
 
     def is_a(chosen: Sequence[int]) -> bool:
         try:
-            return same_sound(put_back(chosen, a.frames), a.sound)
+            return same_sound(substitute(chosen, a.frames), a.sound)
         except OtherSound:
             return False
 
     causes = Causes() if same else find_causes(len(asked), is_a)
     if first.step is None and not same:
-        causes = replace(causes, shares=shapley_shares(causes.found, a.sound, b.sound, put_back))
+        causes = replace(causes, shares=shapley_shares(causes.found, a.sound, b.sound, substitute))
     made = [_difference(*difference_words(a, b, one), one, i, causes, same) for i, one in enumerate(asked)]
     return _in_order(made), causes
 
 
-def _put_back(b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], like: Sequence[bytes] | None) -> Side:
+def _substitute(b: Side, pairs: Sequence[CallPair], asked: Sequence[Asked], like: Sequence[bytes] | None) -> Side:
     """Run B with those inputs of A; like: frames that it must have, else raise OtherSound."""
     assert b.scene is not None
     options = {one.option: one.a for one in asked if one.option}
     if "seconds" in options and not defines_build(Path(b.scene.path)):
         raise CompareError("a plain script says itself how long it runs", "change it there")
-    plan = PutBack(pairs, frozenset(place for one in asked for place in one.places))
+    plan = Substitution(pairs, frozenset(place for one in asked for place in one.places))
     return run(replace(b.scene, **options), "b", plan=plan, like=like)
 
 
@@ -127,7 +127,7 @@ def _of_logs(
     logged = logged_differences(one, other, match)
     can = [i for i, x in enumerate(logged) if x.exchange is not None]
 
-    def put_back(chosen: Sequence[int]) -> KeptSound:
+    def substitute(chosen: Sequence[int]) -> KeptSound:
         made = other
         for i in chosen:
             exchange = logged[can[i]].exchange
@@ -137,8 +137,8 @@ def _of_logs(
 
     causes = Causes()
     if not same and first.step is None:
-        causes = find_causes(len(can), lambda chosen: same_sound(put_back(chosen), a.sound))
-        shares = shapley_shares(causes.found, a.sound, b.sound, put_back)
+        causes = find_causes(len(can), lambda chosen: same_sound(substitute(chosen), a.sound))
+        shares = shapley_shares(causes.found, a.sound, b.sound, substitute)
         causes = replace(
             causes, found=tuple(can[i] for i in causes.found), shares={can[i]: x for i, x in shares.items()}
         )

@@ -21,7 +21,7 @@ import numpy as np
 from sonic_bullet.comparing.inputs.tree_difference import with_leaves
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.calls import Call, Who
+from sonic_bullet.listener.calls import Call, ObjectId
 from sonic_bullet.machine.progress import progress_listener, progress_to, report_progress
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
@@ -85,7 +85,7 @@ class Shifted:
     seed: int
     _count: int = 0
 
-    def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
+    def ahead_of(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
         """Shift the start in calls that place a body, see `Plan`."""
         given = call.arguments
         place = {"createMultiBody": "basePosition", "loadURDF": "basePosition"}.get(call.name)
@@ -95,15 +95,15 @@ class Shifted:
         if place is None or call.step or fixed:
             self._count += place is not None
             return [], given
-        who = Who("", self._count)
+        who = ObjectId("", self._count)
         self._count += 1
         return [], with_leaves(given, {(place,): self._moved(given.get(place, (0.0, 0.0, 0.0)), who)})
 
-    def behind(self, step: int, name: str | None = None) -> list[Call]:
+    def remaining(self, step: int, name: str | None = None) -> list[Call]:
         """Return no calls, see `Plan`."""
         return []
 
-    def _moved(self, place: Any, who: Who) -> tuple[float, ...]:
+    def _moved(self, place: Any, who: ObjectId) -> tuple[float, ...]:
         angle = np.random.default_rng([self.seed, who.serial]).uniform(0, 2 * np.pi)
         x, y, z = place
         shift_m = 1e-4

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sonic_bullet.comparing.revision_tree import RevisionTree
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.storage.leftovers import temporary_folder
 
@@ -31,11 +31,11 @@ def at_revision(path: str, revision: str) -> Iterator[tuple[str, RevisionTree]]:
     place = Path(path).resolve()
     folder = place if place.is_dir() else place.parent
     if not folder.is_dir():
-        raise CompareError(f"no file {shown(path)}", "give a scene that is there")
-    top = Path(_git(folder, "rev-parse", "--show-toplevel", error=f"{shown(path)} lies in no git repository")).resolve()
+        raise CompareError(f"no file {quote(path)}", "give a scene that is there")
+    top = Path(_git(folder, "rev-parse", "--show-toplevel", error=f"{quote(path)} lies in no git repository")).resolve()
     commit = _git(
         folder, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}",
-        error=f"there is no revision {shown(revision)} in {top}",
+        error=f"there is no revision {quote(revision)} in {top}",
     )  # fmt: skip
     with temporary_folder() as made:
         tree = made.resolve() / "tree"
@@ -46,7 +46,7 @@ def at_revision(path: str, revision: str) -> Iterator[tuple[str, RevisionTree]]:
         _git(top, "checkout-index", "--all", "--quiet", f"--prefix={tree}{os.sep}", error=no_tree, settings=index)
         there = tree / place.relative_to(top)
         if not there.exists():
-            raise CompareError(f"{shown(path)} is not in revision {shown(revision)}", "give one that has it")
+            raise CompareError(f"{quote(path)} is not in revision {quote(revision)}", "give one that has it")
         yield str(there), RevisionTree(top, tree, _link_untracked(top, tree, commit))
 
 

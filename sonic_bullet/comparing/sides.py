@@ -18,20 +18,20 @@ import numpy as np
 from sonic_bullet.comparing.revision_tree import RevisionTree, noted_files, own_modules
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.calls import FIRST_ABSENT, Call, Plan, Who
+from sonic_bullet.listener.calls import FIRST_ABSENT, Call, ObjectId, Plan
 from sonic_bullet.machine.progress import progress_listener
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_path, shown
+from sonic_bullet.records.coerce import as_path, quote
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
 from sonic_bullet.runtime.replay import render_kept
+from sonic_bullet.session.body_requests import BodyRequest
 from sonic_bullet.session.directed import directed
 from sonic_bullet.session.listening import Listener
-from sonic_bullet.session.wanted_bodies import WantedBody
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 OF_WHOM = ("body", "links", "parts", "own_shapes")
-"""Fields of a `WantedBody` that identify it and its shape; all others are inputs."""
+"""Fields of a `BodyRequest` that identify it and its shape; all others are inputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class Side:
     log: ContactLog | None = None
     calls: tuple[Call, ...] = ()
     scene: SceneSide | None = None
-    names: Mapping[tuple[Who, int], str] = field(default_factory=dict)
+    names: Mapping[tuple[ObjectId, int], str] = field(default_factory=dict)
     frames: tuple[bytes, ...] = ()
     notes: tuple[str, ...] = ()
     read: frozenset[str] = frozenset()
@@ -103,7 +103,7 @@ class _Run:
         if self.plan is None:
             self.calls.calls.append(call)
             return options
-        first, arguments = self.plan.instead(call)
+        first, arguments = self.plan.ahead_of(call)
         self.calls.make(first)
         return dict(arguments) if arguments is not None else options
 
@@ -113,30 +113,30 @@ class _Run:
     def absent(self, body: Any) -> bool:
         return isinstance(body, int) and body >= FIRST_ABSENT
 
-    def added(self, world: Any, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
-        made: list[WantedBody] = []
+    def added(self, world: Any, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
+        made: list[BodyRequest] = []
         for one in wanted:
             call = self._adding(one)
             if self.plan is None:
                 self.calls.calls.append(call)
                 made.append(one)
                 continue
-            first, arguments = self.plan.instead(call)
+            first, arguments = self.plan.ahead_of(call)
             made += self._of_the_other(first)
             if arguments is not None:
                 made.append(_changed(one, call.arguments, arguments))
         if self.plan is not None:
-            made += self._of_the_other(self.plan.behind(self.calls.steps, "add"))
+            made += self._of_the_other(self.plan.remaining(self.calls.steps, "add"))
         return made
 
-    def _adding(self, one: WantedBody) -> Call:
+    def _adding(self, one: BodyRequest) -> Call:
         who = self.calls.who(one.body)
         shapes = (tuple(shapes for _, shapes in one.parts),) if one.own_shapes else ()
         rest = {x.name: getattr(one, x.name) for x in fields(one) if x.name not in OF_WHOM}
         arguments = {"body": who, "links": one.links, **rest, "model": (one.model,), "shapes": shapes}
         return Call("add", self.calls.steps, arguments, who, own=one)
 
-    def _of_the_other(self, calls: Sequence[Call]) -> Iterator[WantedBody]:
+    def _of_the_other(self, calls: Sequence[Call]) -> Iterator[BodyRequest]:
         """Yield bodies of the other scene that are added here, after making its other calls before them."""
         for call in calls:
             if call.name == "add":
@@ -159,7 +159,7 @@ def frame_digest(frame: Array) -> bytes:
     return hashlib.blake2b(frame.tobytes(), digest_size=8).digest()
 
 
-def _changed(one: WantedBody, before: Any, after: Any) -> WantedBody:
+def _changed(one: BodyRequest, before: Any, after: Any) -> BodyRequest:
     """Return the body with the substituted arguments."""
     given = {
         x.name: after[x.name] for x in fields(one) if x.name in after and x.name not in (*OF_WHOM, "model", "links")
@@ -219,14 +219,14 @@ def as_side(given: Any, side: str) -> Side:
     name = as_path(given, side, remedy, error=CompareError)
     place = Path(name)
     if not place.is_file():
-        raise CompareError(f"no file {shown(name)}", remedy)
+        raise CompareError(f"no file {quote(name)}", remedy)
     if place.suffix.lower() in SCENE_ENDINGS:
         return run(SceneSide(name), side)
     if place.suffix.lower() == ".npz":
         return of_log(read_log(name), name)
     samples, sr = read_audio(name)
     if not np.size(samples):
-        raise CompareError(f"{shown(name)} holds no sample", "give a recording that has some")
+        raise CompareError(f"{quote(name)} holds no sample", "give a recording that has some")
     unknown = f"{name} says no scale: its level is unknown, and its samples are taken as pascals"
     notes = () if read_audio_scale(name) is not None else (unknown,)
     return Side(name, KeptSound.of(np.atleast_2d(np.asarray(samples, float))), sr, notes=notes)

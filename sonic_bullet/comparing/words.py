@@ -13,7 +13,7 @@ from sonic_bullet.comparing.inputs.matched_logs import NO_NAME
 from sonic_bullet.comparing.inputs.tree_difference import same
 from sonic_bullet.comparing.sides import Side
 from sonic_bullet.comparing.tolerance import sameness_words
-from sonic_bullet.listener.calls import Call, InputFile, Who
+from sonic_bullet.listener.calls import Call, InputFile, ObjectId
 
 if TYPE_CHECKING:
     from sonic_bullet.comparing.comparison_record import Comparison
@@ -88,16 +88,16 @@ def change_words(what: str, a: Any, b: Any) -> str:
     name, unit = plain_words.get(key, what), quantity_units.get(key, "")
     unit = f" {unit}" if unit else ""
     if a is None or b is None:
-        return f"{name} {shown(a)} → {shown(b)}{unit}"
+        return f"{name} {format_entry(a)} → {format_entry(b)}{unit}"
     one, other = _array(a), _array(b)
     if key == "microphones" or one is None or other is None or one.shape != other.shape:
-        return f"{name} {shown(a)} → {shown(b)}{unit}" if key != "microphones" else _places(name, a, b)
+        return f"{name} {format_entry(a)} → {format_entry(b)}{unit}" if key != "microphones" else _places(name, a, b)
     if key in ("stiffness_pa", "damping") or one.size > 4:
         ratio = other[one != 0] / one[one != 0]
         if len(ratio) and np.allclose(ratio, ratio[0], rtol=1e-9):
             return f"{name} × {ratio[0]:.4g} ({_percent(ratio[0])})"
         if key == "damping":
-            return f"damping (α in 1/s, β in s) {shown(a)} → {shown(b)}"
+            return f"damping (α in 1/s, β in s) {format_entry(a)} → {format_entry(b)}"
         return f"{name} changed in {int((one != other).sum())} of {one.size} numbers"
     count_fields = ("seed", "since_step", "until_step")  # numbers without a relative change
     share = (
@@ -105,7 +105,7 @@ def change_words(what: str, a: Any, b: Any) -> str:
     )
     if key in ("start position",):
         share = f" (moved by {_distance(other - one)})"
-    return f"{name} {shown(a)} → {shown(b)}{unit}{share}"
+    return f"{name} {format_entry(a)} → {format_entry(b)}{unit}{share}"
 
 
 def _places(name: str, a: Any, b: Any) -> str:
@@ -133,12 +133,12 @@ def _point(place_m: Any) -> str:
     return f"({', '.join(f'{x:.6g}' for x in place_m)})"
 
 
-def name_of(a: Side, b: Side, who: Who, link: int) -> str:
+def name_of(a: Side, b: Side, who: ObjectId, link: int) -> str:
     """Name a body: its name, or its material and shape; a joint by the body it holds."""
     if who.kind == "constraint":
         made = next((call for side in (b, a) for call in side.calls if who in call.made), None)
         held = made.arguments.get("parentBodyUniqueId") if made is not None else None
-        return f"joint of {name_of(a, b, held, -1)}" if isinstance(held, Who) else f"joint {who.serial}"
+        return f"joint of {name_of(a, b, held, -1)}" if isinstance(held, ObjectId) else f"joint {who.serial}"
     for side in (b, a):
         names = {one: name for (x, one), name in side.names.items() if x == who}
         if names:
@@ -151,7 +151,7 @@ def name_of(a: Side, b: Side, who: Who, link: int) -> str:
     return next((x for x in (_made_of(side, who) for side in (b, a)) if x), f"{who.kind} {who.serial}")
 
 
-def _made_of(side: Side, who: Who) -> str:
+def _made_of(side: Side, who: ObjectId) -> str:
     shapes = {2: "ball", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule", 9: "heightfield"}
     shape = material = ""
     for call in side.calls:
@@ -163,7 +163,7 @@ def _made_of(side: Side, who: Who) -> str:
     return f"{material} {shape}".strip()
 
 
-def shown(value: Any) -> str:
+def format_entry(value: Any) -> str:
     """Format a value for a line."""
     if value is None:
         return "not set"
@@ -172,7 +172,7 @@ def shown(value: Any) -> str:
     if isinstance(value, float):
         return "0" if value == 0 else f"{value:.6g}"
     if isinstance(value, (list, tuple)) and len(value) <= 4:
-        return f"({', '.join(shown(one) for one in value)})"
+        return f"({', '.join(format_entry(one) for one in value)})"
     if isinstance(value, InputFile):
         return f"{value.path.rsplit('/', 1)[-1]} ({value.digest[:7]})"
     text = str(value)

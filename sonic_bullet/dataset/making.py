@@ -18,7 +18,7 @@ from sonic_bullet.files.levels import check_sr
 from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.records.counts import format_count
-from sonic_bullet.session.keeping import package_versions
+from sonic_bullet.session.run_recorder import package_versions
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.dataset.recipes import Recipe
 from sonic_bullet.dataset.sample_folder import SampleFolder
 from sonic_bullet.jobs.job_processes import Failed, attempt, run_jobs
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import SceneError
 
 SHARES = {"train": 0.8, "validation": 0.1, "test": 0.1}
@@ -33,7 +33,7 @@ def as_shares(given: str | None) -> Mapping[str, float]:
     except ValueError:
         numbers = []
     if len(numbers) != len(SHARES) or min(numbers) < 0 or not 0 < sum(numbers) < np.inf:
-        raise SceneError(f"shares are {shown(given)}", "give three numbers for train, validation, test: 8,1,1")
+        raise SceneError(f"shares are {quote(given)}", "give three numbers for train, validation, test: 8,1,1")
     return {split: number / sum(numbers) for split, number in zip(SHARES, numbers, strict=True)}
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sonic_bullet.records.arrays import store
-from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, shown
+from sonic_bullet.records.coerce import as_call, as_number, as_text, nearest, quote
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.session.arguments import MicrophoneLike, as_sensors
 from sonic_bullet.session.scene_file import user_code
@@ -67,7 +67,7 @@ class DatasetScene:
         if as_call(self.build, "build") is None:
             raise SceneError("build is None", "give a function of a client that returns a cast")
         if not isinstance(self.parameters, Mapping):
-            raise SceneError(f"parameters is {shown(self.parameters)}", "give a dictionary of values of JSON")
+            raise SceneError(f"parameters is {quote(self.parameters)}", "give a dictionary of values of JSON")
         try:
             json_bytes(dict(self.parameters))
         except (TypeError, ValueError) as error:

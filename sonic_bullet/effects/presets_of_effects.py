@@ -20,7 +20,7 @@ from sonic_bullet.effects.mode_splitting import ModeSplitting
 from sonic_bullet.effects.protocol import Effect, Ring, RotatesPairs, Stage
 from sonic_bullet.effects.recorded_lines import RecordedLines
 from sonic_bullet.records import Material, ModalModel
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import MaterialError, RecordError
 
 KEPT_EFFECTS: tuple[type[Effect], ...] = (
@@ -81,14 +81,14 @@ def check_effects(material: Material) -> None:
         where = f"material '{material.name}': effects[{number}]"
         remedy = "give effects of sonic_bullet.effects"
         if isinstance(effect, type):  # the kind in place of one of them, which has a stage as well
-            raise MaterialError(f"{where} is {shown(effect)}", remedy)
+            raise MaterialError(f"{where} is {quote(effect)}", remedy)
         try:
             stage = effect.stage
         except AttributeError:
-            raise MaterialError(f"{where} is {shown(effect)}", remedy) from None
+            raise MaterialError(f"{where} is {quote(effect)}", remedy) from None
         if stage not in played_stages:
             raise MaterialError(
-                f"{where}, {shown(effect)}, belongs to a strike or a recording, not to a body", "leave it out"
+                f"{where}, {quote(effect)}, belongs to a strike or a recording, not to a body", "leave it out"
             )
 
 

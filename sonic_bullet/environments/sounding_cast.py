@@ -11,7 +11,7 @@ from typing import Any
 from sonic_bullet.environments.episode_steps import EpisodeWorld
 from sonic_bullet.listener.opening import is_mujoco
 from sonic_bullet.records import Material
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SceneWarning
 from sonic_bullet.session import Listener
 from sonic_bullet.session.arguments import as_material
@@ -44,7 +44,7 @@ def cast_of(materials: MaterialsLike, client: Any) -> Cast:
         return dict.fromkeys(every(), materials)
     given = materials(client) if callable(materials) else materials
     if not isinstance(given, Mapping):
-        raise SceneError(f"materials(client) returned {shown(given)}", "return a dict from bodies to materials")
+        raise SceneError(f"materials(client) returned {quote(given)}", "return a dict from bodies to materials")
     cast: Cast = {}
     for who, how in given.items():
         body, link = who if isinstance(who, tuple) and len(who) == 2 else (who, -1)

@@ -31,7 +31,7 @@ from sonic_bullet.files.riff.scale import ixml_chunk, scale_text
 from sonic_bullet.files.riff.wave_chunks import Cue, append_chunks, forget_time, wave_chunks
 from sonic_bullet.machine.worker import note_closing, stop_word
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, shown
+from sonic_bullet.records.coerce import as_number, as_path, as_text, as_whole, brief, nearest, quote
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS
 from sonic_bullet.storage.atomic import PartialFile, cannot, check_output, kept_name
@@ -50,7 +50,7 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
     extension = Path(path).suffix.lower()
     if extension not in AUDIO_FORMATS:
         raise FileError(
-            f"cannot write {brief(path)}: {shown(extension)} is no audio format known here",
+            f"cannot write {brief(path)}: {quote(extension)} is no audio format known here",
             f"end the name with one of {' '.join(AUDIO_FORMATS)}",
         )
     target = check_output(path)
@@ -66,7 +66,7 @@ def check_audio_output(path: str | os.PathLike[str], subtype: str | None = None)
         if not soundfile.check_format(container, wanted):
             known = list(soundfile.available_subtypes(container))
             raise FileError(
-                f"cannot write {brief(path)}: {container} holds no subtype {shown(wanted)}", nearest(wanted, known)
+                f"cannot write {brief(path)}: {container} holds no subtype {quote(wanted)}", nearest(wanted, known)
             )
     return target, container, wanted
 

@@ -31,7 +31,7 @@ from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError, excerpt
 from sonic_bullet.storage.reading import reading
 from sonic_bullet.storage.typed_json import decode_json
-from sonic_bullet.storage.unread import shown, unread_fields
+from sonic_bullet.storage.unread import shorten, unread_fields
 
 __all__ = [
     "CASE_FORMAT",
@@ -186,10 +186,10 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
     if raw.medium is not None and raw.medium not in MEDIA:
         unread = (
             *unread,
-            f"case {path}: medium '{shown(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is "
+            f"case {path}: medium '{shorten(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is "
             "fitted as a whole",
         )
-    where = _onset(raw.onset), _said(raw.support), medium_of(raw.medium, observed)
+    where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed)
     return Case(
         raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread
     )
@@ -332,7 +332,7 @@ def _onset(value: Any) -> float | None:
     return None
 
 
-def _said(support: SupportFields | str | None) -> str:
+def _support_name(support: SupportFields | str | None) -> str:
     if isinstance(support, SupportFields):
         return f"clamped at {format_count(len(support.fixed), 'place')}" if support.fixed else "free"
     return support or "not declared"

@@ -15,7 +15,7 @@ import numpy as np
 from sonic_bullet.files.rows.log_steps import LogSteps, StepBlock
 from sonic_bullet.records import Air, Array, Body, Sensor
 from sonic_bullet.records.arrays import joined
-from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, shown
+from sonic_bullet.records.coerce import as_flag, as_items, as_kind, as_kinds, as_path, as_whole, quote
 from sonic_bullet.records.contacts import CONTACT, Contacts, Event, Step
 from sonic_bullet.records.errors import LogError
 from sonic_bullet.records.simulated import Change, Values, frozen_texts, frozen_values
@@ -207,8 +207,8 @@ class ContactLog:
         if not bearers:
             known = sorted({x.body_id for x in self.bodies})
             raise LogError(
-                f"the log holds no body {shown(body)}" + ("" if link is None else f" link {shown(link)}"),
-                f"known bodies: {shown(known)}",
+                f"the log holds no body {quote(body)}" + ("" if link is None else f" link {quote(link)}"),
+                f"known bodies: {quote(known)}",
             )
         epoch = max(self.bodies[i].epoch for i in bearers)
         bearers = [i for i in bearers if self.bodies[i].epoch == epoch]

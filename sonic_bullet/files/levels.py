@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import as_number, as_whole, shown
+from sonic_bullet.records.coerce import as_number, as_whole, quote
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.storage.spooled_sound import GainCurve, KeptSound
 
@@ -162,7 +162,7 @@ def as_sound(samples: object) -> KeptSound:
             return KeptSound.of(sound.astype(float, copy=False))
     except ValueError:  # rows of different lengths
         pass
-    raise AudioError(f"samples is {shown(samples)}", "pass real numbers, (channels, n)")
+    raise AudioError(f"samples is {quote(samples)}", "pass real numbers, (channels, n)")
 
 
 def check_sr(sr: object) -> int:
@@ -178,7 +178,7 @@ def check_sr(sr: object) -> int:
     try:
         return as_whole(sr, "sr", remedy, least=sr_min_hz, most=sr_max_hz, error=AudioError)
     except AudioError:
-        said = f"{sr:g} Hz" if isinstance(sr, float) else f"{shown(sr)} Hz"
+        said = f"{sr:g} Hz" if isinstance(sr, float) else f"{quote(sr)} Hz"
         raise AudioError(f"sr: sample rate {said} cannot be", remedy) from None
 
 

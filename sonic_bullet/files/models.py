@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.records import Array, ModalModel
-from sonic_bullet.records.coerce import nearest, shown
+from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import FileError, LogError, excerpt
 from sonic_bullet.records.mode_shapes import differences, from_multiples, summed, whole_multiples
 from sonic_bullet.storage import cache
@@ -111,7 +111,7 @@ def pack_models(
     """
     places = ("included", "reference")  # place of a log's models: in it, or in the cache
     if not isinstance(where, str) or where not in places:
-        raise FileError(f"models is {shown(where)}", nearest(str(where), places))
+        raise FileError(f"models is {quote(where)}", nearest(str(where), places))
     different, number = distinct(list(models), model_key)
     if where == "reference":
         return [*_keep_models(different)], number, {}

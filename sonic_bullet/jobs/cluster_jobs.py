@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from sonic_bullet.jobs.job_processes import ATTEMPTS, Failed, attempt
 from sonic_bullet.machine.progress import Say
 from sonic_bullet.records.errors import FileError, exception_words
-from sonic_bullet.session.keeping import package_versions
+from sonic_bullet.session.run_recorder import package_versions
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")

@@ -17,7 +17,7 @@ import numpy as np
 
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.arrays import frozen_array, require, store
-from sonic_bullet.records.coerce import as_flag, as_number, as_text, shown
+from sonic_bullet.records.coerce import as_flag, as_number, as_text, quote
 from sonic_bullet.records.errors import RecordError
 
 
@@ -50,7 +50,7 @@ class AnimatedBody:
     def __post_init__(self) -> None:
         """Check and normalise the fields."""
         heaviest_kg = 1e6
-        who = f"body {shown(self.name)}"
+        who = f"body {quote(self.name)}"
         as_text(self.name, "the name of a body", "give a text")
         store(
             self,
@@ -68,7 +68,7 @@ class AnimatedBody:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class Rollout:
     """Motion that follows from a start (a single shooting).
 
     Parameters
@@ -122,7 +122,7 @@ class PoseStage(Protocol):
 
     def shoot(
         self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
-    ) -> Shot:
+    ) -> Rollout:
         """Simulate so many steps from a start.
 
         Parameters

@@ -2,8 +2,8 @@
 
     createMultiBody(0.004, shape) -> Call("createMultiBody", {"baseMass": 0.004, "shape": {"radius": 0.005, …}}, who)
 
-Values hold no handles: a body is the n-th that its run made (`Who`), a shape is the arguments that made it, a file is
-its content.
+Values hold no handles: a body is the n-th that its run made (`ObjectId`), a shape is the arguments that made it, a file
+is its content.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FIRST_ABSENT = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Who:
+class ObjectId:
     """The body, or constraint, that a run made as its ``serial``-th; side: which run."""
 
     side: str
@@ -56,25 +56,25 @@ class Call:
     made
         The bodies it made.
     own
-        Its origin, where the arguments do not say all (a `WantedBody`).
+        Its origin, where the arguments do not say all (a `BodyRequest`).
     """
 
     name: str
     step: int
     arguments: Mapping[str, Any]
-    who: Who | None = None
-    made: tuple[Who, ...] = ()
+    who: ObjectId | None = None
+    made: tuple[ObjectId, ...] = ()
     own: Any = None
 
 
 class Plan(Protocol):
     """Calls that substitute those of a scene."""
 
-    def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
+    def ahead_of(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
         """Return the other scene's calls to be made first, and arguments for this one; None: do not make it."""
         ...
 
-    def behind(self, step: int, name: str | None = None) -> list[Call]:
+    def remaining(self, step: int, name: str | None = None) -> list[Call]:
         """Return the other scene's calls that remain of a step; with a name, those of that name that come next."""
         ...
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from sonic_bullet.live.playback import Fill
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AudioError
 
 CARD_CLOSE_S = 1.0
@@ -106,10 +106,10 @@ def found_card(library: Any, device: str | int | None) -> Any:
     if not cards:
         raise AudioError("this machine has no sound card", "connect one, or play to 'null'")
     if device is not None and not (isinstance(device, (str, int)) and not isinstance(device, bool)):
-        raise AudioError(f"device is {shown(device)}", "give a card's name or number, or leave it out")
+        raise AudioError(f"device is {quote(device)}", "give a card's name or number, or leave it out")
     try:
         known = library.query_devices(device, "output")
     except Exception as error:
         names = ", ".join(f"{one['index']} {one['name']}" for one in cards)
-        raise AudioError(f"no sound card {shown(device)}: {error}", f"name one of: {names}") from error
+        raise AudioError(f"no sound card {quote(device)}: {error}", f"name one of: {names}") from error
     return known

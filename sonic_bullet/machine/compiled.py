@@ -23,8 +23,8 @@ import numba
 from sonic_bullet.storage.user_folder import START_FOLDER, cache_folder, private_folder
 
 KNOWN_NUMBA = ["0", "68"]
-"""The release of numba whose inner parts `linked_once` uses. With any other, numba's own compilation is used: the same
-results, a first run that takes three times as long.
+"""The release of numba whose inner parts `whole_program_jit` uses. With any other, numba's own compilation is used: the
+same results, a first run that takes three times as long.
 """
 
 
@@ -48,9 +48,9 @@ def _kernel(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     known = numba.__version__.split(".")[:2] == KNOWN_NUMBA
     if known and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
         with suppress(Exception):
-            from sonic_bullet.machine.linked_once import linked_once
+            from sonic_bullet.machine.whole_program_jit import whole_program_jit
 
-            return linked_once(function, options)
+            return whole_program_jit(function, options)
     return numba.njit(**options)(function)
 
 

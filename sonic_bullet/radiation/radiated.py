@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.modal.keys import code_digest, key
 from sonic_bullet.radiation import compact, near_mesh, pattern, surface_waves
 from sonic_bullet.radiation import entrained_mass as added_mass

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import RecordError
 
 Array = NDArray[Any]
@@ -44,7 +44,7 @@ def frozen_array(value: object, dtype: Any, shape: tuple[int | None, ...], name:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise RecordError(
-            f"{name} is {shown(value)}", f"pass {np.dtype(dtype).name} numbers of shape {shape}"
+            f"{name} is {quote(value)}", f"pass {np.dtype(dtype).name} numbers of shape {shape}"
         ) from None
     if array.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(array.shape, shape, strict=True)

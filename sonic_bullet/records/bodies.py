@@ -24,7 +24,7 @@ from sonic_bullet.records.coerce import (
     as_whole,
     check_options,
     nearest,
-    shown,
+    quote,
 )
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.records.residual import Residual
@@ -108,7 +108,7 @@ class Material:
     def __post_init__(self) -> None:
         """Check the fields."""
         as_text(self.name, "the name of a material", "give a text")
-        where = f"material {shown(self.name)}"
+        where = f"material {quote(self.name)}"
         stiffness = frozen_array(self.stiffness_pa, float, (6, 6), f"{where}: stiffness_pa")
         store(
             self,
@@ -166,7 +166,7 @@ class Material:
         RecordError
             The constants are unphysical.
         """
-        where = f"material {shown(name)}"
+        where = f"material {quote(name)}"
         modulus = as_number(youngs_pa, f"{where}: youngs_pa", "give a Young's modulus above zero", above=0)
         ratio = as_number(poisson, f"{where}: poisson", "Poisson's ratio lies between -1 and 0.5", above=-1, below=0.5)
         check_options(
@@ -232,7 +232,7 @@ class Shape:
         """Check the fields."""
         kinds = get_args(ShapeKind)
         if as_text(self.kind, "kind of a shape", f"one of {', '.join(kinds)}") not in kinds:
-            raise RecordError(f"kind of a shape is {shown(self.kind)}", nearest(self.kind, kinds))
+            raise RecordError(f"kind of a shape is {quote(self.kind)}", nearest(self.kind, kinds))
         store(
             self,
             size_m=frozen_array(self.size_m, float, (3,), "shape: size_m"),

@@ -33,7 +33,7 @@ LISTED = 8
 """Most names that a message lists."""
 
 
-def shown(value: object) -> str:
+def quote(value: object) -> str:
     """Quote a value for a message, in at most 80 characters."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of shape {value.shape}"
@@ -70,7 +70,7 @@ def as_number(
             number = math.nan
         if math.isfinite(number) and above < number < below and least <= number <= most:
             return number
-    raise error(f"{name} is {shown(value)}", remedy)
+    raise error(f"{name} is {quote(value)}", remedy)
 
 
 def as_whole(
@@ -84,9 +84,9 @@ def as_whole(
         number = as_number(value, name, remedy, error=error)
         whole = int(number)
         if whole != number:
-            raise error(f"{name} is {shown(value)}", remedy)
+            raise error(f"{name} is {quote(value)}", remedy)
     if not least <= whole <= most:
-        raise error(f"{name} is {shown(value)}", remedy)
+        raise error(f"{name} is {quote(value)}", remedy)
     return whole
 
 
@@ -98,21 +98,21 @@ def as_flag(value: object, name: str) -> bool:
     """Return True or False; RecordError for any other value, also one that is merely true."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
-    raise RecordError(f"{name} is {shown(value)}", "give True or False")
+    raise RecordError(f"{name} is {quote(value)}", "give True or False")
 
 
 def as_text(value: object, name: str, remedy: str, *, error: Error = RecordError) -> str:
     """Return a text, or raise ``error``."""
     if isinstance(value, str):
         return value
-    raise error(f"{name} is {shown(value)}", remedy)
+    raise error(f"{name} is {quote(value)}", remedy)
 
 
 def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) -> str:
     """Return the name of a file, given as a text or os.PathLike, or raise ``error``, also for invalid names."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     if not isinstance(text, str):
-        raise error(f"{name} is {shown(value)}", remedy)
+        raise error(f"{name} is {quote(value)}", remedy)
     reason = "no name that a file can have"
     longest_name = 255  # most bytes of a file's name in file systems
     with suppress(UnicodeEncodeError):
@@ -120,21 +120,21 @@ def as_path(value: object, name: str, remedy: str, *, error: Error = FileError) 
             if all(len(os.fsencode(part)) <= longest_name for part in text.split(os.sep)):
                 return text
             reason = f"too long: a file's name has at most {longest_name} bytes"
-    raise error(f"cannot read or write {shown(text)}: {name} is {reason}", remedy)
+    raise error(f"cannot read or write {quote(text)}: {name} is {reason}", remedy)
 
 
 def as_call(value: Call | None, name: str) -> Call | None:
     """Return a function, or None; raise RecordError for anything else."""
     if value is None or callable(value):
         return value
-    raise RecordError(f"{name} is {shown(value)}", "give a function, or leave it out")
+    raise RecordError(f"{name} is {quote(value)}", "give a function, or leave it out")
 
 
 def as_kind(value: object, kind: type[Kind], name: str, remedy: str, *, error: Error = RecordError) -> Kind:
     """Return the value if it is of that type, or raise ``error``."""
     if isinstance(value, kind):
         return value
-    raise error(f"{name} is {shown(value)}", remedy)
+    raise error(f"{name} is {quote(value)}", remedy)
 
 
 def as_kinds(value: object, kind: Any, name: str, remedy: str, *, error: Error = RecordError) -> tuple[Any, ...]:
@@ -142,7 +142,7 @@ def as_kinds(value: object, kind: Any, name: str, remedy: str, *, error: Error =
     items = as_items(value, name, remedy, error=error)
     for number, item in enumerate(items):
         if not isinstance(item, kind):
-            raise error(f"{name}[{number}] is {shown(item)}", remedy)
+            raise error(f"{name}[{number}] is {quote(item)}", remedy)
     return items
 
 
@@ -154,7 +154,7 @@ def as_items(value: Any, name: str, remedy: str, *, error: Error = RecordError) 
         and not (isinstance(value, np.ndarray) and value.ndim == 0)
     ):
         return tuple(value)
-    raise error(f"{name} is {shown(value)}", remedy)
+    raise error(f"{name} is {quote(value)}", remedy)
 
 
 def as_rows(
@@ -166,7 +166,7 @@ def as_rows(
     for number, row in enumerate(rows):
         numbers_ = as_items(row, f"{name}[{number}]", remedy, error=error)
         if len(numbers_) != columns:
-            raise error(f"{name}[{number}] is {shown(row)}", remedy)
+            raise error(f"{name}[{number}] is {quote(row)}", remedy)
         made.append(tuple(as_number(x, f"{name}[{number}]", remedy, error=error) for x in numbers_))
     return tuple(made)
 
@@ -185,4 +185,4 @@ def check_options(given: Iterable[str], known: Collection[str], name: str, *, er
     """Raise ``error`` where a keyword is not in ``known``, with the nearest that is."""
     for word in given:
         if word not in known:
-            raise error(f"{name} has no option {shown(word)}", nearest(word, known))
+            raise error(f"{name} has no option {quote(word)}", nearest(word, known))

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import LARGEST_SI, joined
-from sonic_bullet.records.coerce import as_items, as_kind, as_number, shown
+from sonic_bullet.records.coerce import as_items, as_kind, as_number, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.touching.link_motions import NO_MOTIONS, as_motions
 
@@ -169,7 +169,7 @@ class Contacts:
             They are not such rows, or a number is NaN or beyond `LARGEST`.
         """
         if not isinstance(row, np.ndarray) or row.dtype != CONTACT or row.ndim != 1:
-            raise RecordError(f"contacts: row is {shown(row)}", "pass an array (k,) of dtype CONTACT")
+            raise RecordError(f"contacts: row is {quote(row)}", "pass an array (k,) of dtype CONTACT")
         kept = not row.flags.writeable and row.base is None and row.flags.c_contiguous
         row = row if kept else np.array(row, CONTACT)
         number = row.view(np.float64).reshape(len(row), CONTACT.itemsize // 8)[:, 1:]

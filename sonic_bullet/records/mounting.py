@@ -13,7 +13,7 @@ of it here. The edge term of EN 12354-1 gives a light board 1e-3, so it does not
 
 from __future__ import annotations
 
-from sonic_bullet.records.coerce import as_number, shown
+from sonic_bullet.records.coerce import as_number, quote
 from sonic_bullet.records.errors import RecordError, SonicBulletError
 
 MOST_LOSS = 1.0
@@ -27,7 +27,7 @@ def as_mounting(value: object, name: str = "mounting", error: type[SonicBulletEr
     mountings = ("free", "placed", "on floor")
     if isinstance(value, str):
         if value not in mountings:
-            raise error(f"{name} is {shown(value)}", mounting_remedy)
+            raise error(f"{name} is {quote(value)}", mounting_remedy)
         return value
     return as_number(value, name, mounting_remedy, least=0, most=MOST_LOSS, error=error)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, require, store
 from sonic_bullet.records.bodies import Material, ModalModel, Shape
-from sonic_bullet.records.coerce import as_number, as_text, as_whole, shown
+from sonic_bullet.records.coerce import as_number, as_text, as_whole, quote
 from sonic_bullet.records.mounting import Mounting, as_mounting
 
 CombineRule = Literal["average", "minimum", "maximum", "multiply"]
@@ -40,7 +40,7 @@ class PhysicsMaterial:
         )
         for rule in (self.friction_rule, self.restitution_rule):
             known = get_args(CombineRule)
-            require(rule in known, f"the combine rule {shown(rule)} is none", f"one of {', '.join(known)}")
+            require(rule in known, f"the combine rule {quote(rule)} is none", f"one of {', '.join(known)}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +145,7 @@ class RigidJoint:
     def __post_init__(self) -> None:
         """Check the fields."""
         kinds = get_args(JointKind)
-        require(self.kind in kinds, f"a joint is {shown(self.kind)}", f"one of {', '.join(kinds)}")
+        require(self.kind in kinds, f"a joint is {quote(self.kind)}", f"one of {', '.join(kinds)}")
         store(
             self,
             body=as_whole(self.body, "body of a joint", "give its number", least=0),

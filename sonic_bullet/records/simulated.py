@@ -16,7 +16,7 @@ import numpy as np
 
 from sonic_bullet.records.arrays import Array, frozen_array, store
 from sonic_bullet.records.bodies import Material, ModalModel
-from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_text, as_whole, shown
+from sonic_bullet.records.coerce import as_flag, as_kind, as_number, as_text, as_whole, quote
 from sonic_bullet.records.errors import LogError, RecordError
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
@@ -50,7 +50,7 @@ def frozen_texts(values: object, name: str) -> Mapping[str, str]:
 
 def _frozen(values: object, name: str, remedy: str, checked: Callable[[object, str, str], Any]) -> Mapping[str, Any]:
     if not isinstance(values, Mapping):
-        raise RecordError(f"{name} is {shown(values)}", remedy)
+        raise RecordError(f"{name} is {quote(values)}", remedy)
     made = {
         as_text(key, f"a name in {name}", remedy): checked(x, f"{name}: {key}", remedy) for key, x in values.items()
     }
@@ -119,7 +119,7 @@ class Body:
 
     def __post_init__(self) -> None:
         """Check the fields."""
-        where = f"body {shown(self.body_id)} link {shown(self.link)}"
+        where = f"body {quote(self.body_id)} link {quote(self.link)}"
         store(
             self,
             inertia_kg_m2=frozen_array(self.inertia_kg_m2, float, (3, 3), f"{where}: inertia_kg_m2"),

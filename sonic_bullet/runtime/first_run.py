@@ -34,7 +34,7 @@ def make_driver(values: tuple[Any, ...]) -> None:
 
 
 def _make_stages(kinds: Any) -> None:
-    from sonic_bullet.machine.linked_once import is_kept, name_apart, take_in, write, written
+    from sonic_bullet.machine.whole_program_jit import is_kept, name_apart, take_in, write, written
 
     if is_kept(driver.advance_steps, (kinds,)):
         return

@@ -25,7 +25,7 @@ from sonic_bullet.bank import ModeSet, audible
 from sonic_bullet.bank.resonator import Resonator, build_resonator
 from sonic_bullet.bank.rigid_motion import with_rigid
 from sonic_bullet.contact.pulse_shape import pulse_spectrum
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Air, Array, Body, ModalModel, Residual
 from sonic_bullet.residual.grains import Voice, make_voice, mixed_number, placed, varied
 from sonic_bullet.residual.player import SECTION, Grain, Rubbed, add_grains, rubbed, section_grain

@@ -1,7 +1,7 @@
 """`attach`: a listener on a simulated world that turns each physics step into a frame of sound.
 
-listening: the `Listener` | wanted_bodies: bodies to add, and their modes | arguments: checks of arguments
-keeping: log and unread frames | scene_file: kinds of scene files, their code run | directed: runs with substitutions
+listening: the `Listener` | body_requests: bodies to add, and their modes | arguments: checks of arguments
+run_recorder: log and unread frames | scene_file: kinds of scene files, their code run | directed: substitutes
 """
 
 from __future__ import annotations

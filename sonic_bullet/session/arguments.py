@@ -11,7 +11,7 @@ import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import check_effects
 from sonic_bullet.records import Array, Material, Microphone, Sensor, Shape
-from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, shown
+from sonic_bullet.records.coerce import as_items, as_kinds, as_path, as_rows, as_text, quote
 from sonic_bullet.records.errors import MaterialError, MeshError, SceneError
 
 MicrophoneLike = Sequence[float] | Sequence[Sequence[float]] | Sensor | Sequence[Sensor] | Array
@@ -39,7 +39,7 @@ def as_name(name: object) -> str:
     """Return a body's name, a text of one line; raise SceneError for anything else."""
     remedy = "give a text of one line"
     if not as_text(name, "name", remedy, error=SceneError).isprintable() or not str(name).strip():
-        raise SceneError(f"name is {shown(name)}", remedy)
+        raise SceneError(f"name is {quote(name)}", remedy)
     return str(name)
 
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from sonic_bullet.listener.world import World
+    from sonic_bullet.session.body_requests import BodyRequest
     from sonic_bullet.session.listening import Listener
-    from sonic_bullet.session.wanted_bodies import WantedBody
 
 
-class Direction(Protocol):
+class AttachHook(Protocol):
     """A hook on `attach` and `Listener.add`."""
 
     def attached(self, options: dict[str, Any]) -> dict[str, Any]:
@@ -31,16 +31,16 @@ class Direction(Protocol):
         """Tell whether that id is of a body that was left out."""
         ...
 
-    def added(self, world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+    def added(self, world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
         """Return the bodies to add, and their materials."""
         ...
 
 
-_DIRECTION: ContextVar[Direction | None] = ContextVar("direction", default=None)
+_DIRECTION: ContextVar[AttachHook | None] = ContextVar("direction", default=None)
 
 
 @contextmanager
-def directed(direction: Direction) -> Iterator[None]:
+def directed(direction: AttachHook) -> Iterator[None]:
     """Use a hook for listeners that are made, and bodies that are added, within the block."""
     before = _DIRECTION.set(direction)
     try:
@@ -55,6 +55,6 @@ def absent(who: Any) -> bool:
     return director is not None and director.absent(who[0] if isinstance(who, tuple) else who)
 
 
-def direction() -> Direction | None:
+def direction() -> AttachHook | None:
     """Return the hook in use, or None."""
     return _DIRECTION.get()

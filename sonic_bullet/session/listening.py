@@ -28,18 +28,18 @@ from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
 from sonic_bullet.session.arguments import as_sensors, keywords
-from sonic_bullet.session.directed import absent
-from sonic_bullet.session.felt_bodies import felt_now
-from sonic_bullet.session.keeping import KeptRun, package_versions
-from sonic_bullet.session.material_choice import choose_materials, current_choice
-from sonic_bullet.session.wanted_bodies import (
-    WantedBody,
+from sonic_bullet.session.body_requests import (
+    BodyRequest,
     checked,
     enter_bodies,
     solved_bodies,
     wanted_body,
     wanted_cast,
 )
+from sonic_bullet.session.directed import absent
+from sonic_bullet.session.felt_bodies import felt_now
+from sonic_bullet.session.material_choice import choose_materials, current_choice
+from sonic_bullet.session.run_recorder import RunRecorder, package_versions
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 
@@ -82,7 +82,7 @@ class Listener:
 
     def _begin(self) -> None:
         """Start with an empty log."""
-        self._kept = KeptRun(channels_of(self.sensors), keep_log=self.world.logged)
+        self._kept = RunRecorder(channels_of(self.sensors), keep_log=self.world.logged)
         self._present: Array | None = None  # bodies of the step that sounded last
         self._emptied = self.world.emptied
 
@@ -166,7 +166,7 @@ class Listener:
         return self._added(wanted_cast(self.world, cast, keywords(Listener.add)), progress)
 
     def _added(
-        self, wanted: Sequence[WantedBody], progress: Callable[[str], None] | None
+        self, wanted: Sequence[BodyRequest], progress: Callable[[str], None] | None
     ) -> list[tuple[ModalModel, ...]]:
         """Add bodies and return their models."""
         as_call(progress, "progress")

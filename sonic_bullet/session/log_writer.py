@@ -115,7 +115,7 @@ class LogWriter:
 
     def mass_kg(self, body: int | str) -> float:
         """Return the mass of a body, by its number or name; raises SceneError."""
-        return self._world.described(*self._world.link_of(body)).mass_kg
+        return self._world.describe(*self._world.link_of(body)).mass_kg
 
     def step(self, dt_s: float, position_m: Any, quaternion_xyzw: Any, **contacts: Any) -> None:
         """Write a step that was made.

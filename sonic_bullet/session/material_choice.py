@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.listener.names import matched
 from sonic_bullet.records import Body, Material
-from sonic_bullet.records.coerce import as_flag, as_items, shown
+from sonic_bullet.records.coerce import as_flag, as_items, quote
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.runtime.silence import can_sound
 from sonic_bullet.session.arguments import as_material, as_name
 
 if TYPE_CHECKING:
     from sonic_bullet.listener.world import World
-    from sonic_bullet.session.wanted_bodies import WantedBody
+    from sonic_bullet.session.body_requests import BodyRequest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +74,7 @@ class MaterialChoice:
                 more = f" and {len(known) - listed_names} more" if len(known) > listed_names else ""
                 listed = ", ".join(known[:listed_names]) + more
                 remedy = f"its bodies are: {listed or 'none'}{self._quoted(one, known)}"
-                raise SceneError(f"no body of {where} is called {shown(one)}", remedy)
+                raise SceneError(f"no body of {where} is called {quote(one)}", remedy)
 
     def _quoted(self, one: str, known: Sequence[str]) -> str:
         """Show how a name with a space is given in a shell, if there is one: "body 1=glass"."""
@@ -88,7 +88,7 @@ class MaterialChoice:
         """Return a line for each silenced name that is of none of these bodies that sound without it."""
         sounding = [body.name for body in bodies if body.material is not None and can_sound(body)]
         return tuple(
-            f"{shown(one)} is silent anyway: silencing it changes nothing"
+            f"{quote(one)} is silent anyway: silencing it changes nothing"
             for one in sorted(self.silent)
             if not any(matched(name, (one,)) for name in sounding)
         )
@@ -97,7 +97,7 @@ class MaterialChoice:
         """Raise SceneError where a name with a material was never added by a scene's own listener."""
         for one in self.named:
             if not any(matched(name, (one,)) for name in added):
-                what = f"{shown(one)} is given a material, but scene '{scene}' never adds it to its listener"
+                what = f"{quote(one)} is given a material, but scene '{scene}' never adds it to its listener"
                 raise SceneError(what, f"add it there, or name who is added: {', '.join(added) or 'nobody'}")
 
 
@@ -119,7 +119,7 @@ def as_choice(
     remedy = "give a dict from bodies' names to materials"
     named = {} if materials is None else materials
     if not isinstance(named, Mapping):
-        raise SceneError(f"materials is {shown(materials)}", remedy)
+        raise SceneError(f"materials is {quote(materials)}", remedy)
     names = as_items(silent, "silent", "give a list of bodies' names", error=SceneError)
     return MaterialChoice(
         None if material is None else as_material(material),
@@ -147,7 +147,7 @@ def current_choice() -> MaterialChoice:
     return _CHOICE.get()
 
 
-def choose_materials(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+def choose_materials(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
     """Return the bodies to be added with the chosen materials, and with modes filled in where chosen.
 
     A body whose links get different materials becomes several entries, its links in the same order.
@@ -161,7 +161,7 @@ def choose_materials(world: World, wanted: Sequence[WantedBody]) -> Sequence[Wan
         (one.body, link, one.names[i] if one.names else None) for one in wanted for i, link in enumerate(one.links)
     ]
     names = iter(world.record_names(given))
-    made: list[WantedBody] = []
+    made: list[BodyRequest] = []
     for one in wanted:
         chosen = [choice.material_of(next(names)) for _ in one.links]
         for material, run in groupby(range(len(one.links)), key=lambda i: chosen[i]):
@@ -170,7 +170,7 @@ def choose_materials(world: World, wanted: Sequence[WantedBody]) -> Sequence[Wan
     return made
 
 
-def _some_links(one: WantedBody, which: Sequence[int]) -> WantedBody:
+def _some_links(one: BodyRequest, which: Sequence[int]) -> BodyRequest:
     if len(which) == len(one.links):
         return one
     parts: dict[str, Any] = {

@@ -32,7 +32,7 @@ from sonic_bullet.files import check_output, check_sr
 from sonic_bullet.files.riff.scale import scale_text
 from sonic_bullet.machine.worker import note_closing
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import nearest, shown
+from sonic_bullet.records.coerce import nearest, quote
 from sonic_bullet.records.errors import AudioError, FileError, SonicBulletError
 from sonic_bullet.soundtrack.film_codecs import CODECS, CONTAINERS
 from sonic_bullet.soundtrack.frame_rates import fraction_of
@@ -47,14 +47,14 @@ def as_fps(text: object) -> Fraction:
     try:
         fps = fraction_of(str(text))
     except (ValueError, ZeroDivisionError):
-        raise FileError(f"fps is {shown(text)}", remedy) from None
+        raise FileError(f"fps is {quote(text)}", remedy) from None
     # what is written as 29.97 or 23.976 is meant so [SMPTE ST 12-1, sec. 4]
     for whole in (24, 30, 48, 60, 120):
         exact = Fraction(whole * 1000, 1001)
         if fps != exact and any(float(fps) == round(float(exact), digits) for digits in (2, 3)):
             fps = exact
     if not 1 <= fps <= fps_most or fps.denominator > 100_000:
-        raise FileError(f"fps is {shown(text)}", remedy)
+        raise FileError(f"fps is {quote(text)}", remedy)
     return fps
 
 
@@ -84,12 +84,12 @@ def check_film_output(
     extension = Path(path).suffix.lower()
     if extension not in CONTAINERS:
         raise FileError(
-            f"cannot write {path}: {shown(extension)} is no film format known here",
+            f"cannot write {path}: {quote(extension)} is no film format known here",
             f"end the name with one of {' '.join(CONTAINERS)}",
         )
     chosen = CONTAINERS[extension][0] if codec is None else codec
     if chosen not in CONTAINERS[extension]:
-        raise FileError(f"{extension} films hold no {shown(chosen)} here", nearest(chosen, CONTAINERS[extension]))
+        raise FileError(f"{extension} films hold no {quote(chosen)} here", nearest(chosen, CONTAINERS[extension]))
     av = pyav()
     try:
         rates = av.codec.Codec(CODECS[chosen].name, "w").audio_rates

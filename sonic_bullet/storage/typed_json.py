@@ -17,7 +17,7 @@ import msgspec
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.storage.json_text import json_bytes
-from sonic_bullet.storage.unread import nearest_field, shown
+from sonic_bullet.storage.unread import nearest_field, shorten
 
 Form = TypeVar("Form")
 Key = str | int
@@ -79,13 +79,13 @@ def _misfit(tree: Any, form: Any, message: str) -> str:
     """Describe a validation error: key, value found, value wanted."""
     text, _, path = message.partition(" - at `$")
     keys = _with_names(tree, form, message, [int(i) if i else name or ANY for i, name in _steps(path)])
-    key = "".join(f": {shown(k)}" if isinstance(k, str) else f" {k + 1}" for k in keys)
+    key = "".join(f": {shorten(k)}" if isinstance(k, str) else f" {k + 1}" for k in keys)
     kinds = list(_forms_at(msgspec.inspect.type_info(form), keys))
     if found := re.fullmatch("Object missing required field `(.*)`", text):
         return f"{key}: field '{found[1]}' is missing"
     if found := re.fullmatch("Object contains unknown field `(.*)`", text):
         known = [f.encode_name for kind in kinds if isinstance(kind, msgspec.inspect.StructType) for f in kind.fields]
-        return f"{key}: field '{shown(found[1])}' is not known{nearest_field(found[1], tuple(known))}"
+        return f"{key}: field '{shorten(found[1])}' is not known{nearest_field(found[1], tuple(known))}"
     there = _there(tree, keys)
     if text.startswith("Invalid"):
         return f"{key} is {there}, wanted {' or '.join(_choices(msgspec.inspect.type_info(form), keys)) or 'another'}"

@@ -38,10 +38,11 @@ def _unread(value: Any, form: msgspec.inspect.Type, where: str) -> Iterator[str]
                 if name in known:
                     yield from _unread(inner, known[name], f"{where}: {name}")
                 elif name not in free:
-                    yield f"{where}: field '{shown(name)}' is not known and not read{nearest_field(name, tuple(known))}"
+                    meant = nearest_field(name, tuple(known))
+                    yield f"{where}: field '{shorten(name)}' is not known and not read{meant}"
         case msgspec.inspect.DictType(value_type=kind) if isinstance(value, dict):
             for name, inner in value.items():
-                yield from _unread(inner, kind, f"{where} '{shown(name)}'")
+                yield from _unread(inner, kind, f"{where} '{shorten(name)}'")
         case msgspec.inspect.VarTupleType(item_type=kind) if isinstance(value, list):
             for i, inner in enumerate(value):
                 yield from _unread(inner, kind, f"{where} {i + 1}")
@@ -53,7 +54,7 @@ def nearest_field(name: str, known: tuple[str, ...]) -> str:
     return f": did you mean '{near[0]}'?" if near else f" (known here: {', '.join(known)})"
 
 
-def shown(text: str) -> str:
+def shorten(text: str) -> str:
     """Shorten a text from a file to one line for a message."""
     line = " ".join(text.split())
     return line if len(line) <= QUOTED else line[:QUOTED] + "…"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.comparing.ensemble import RUNS, Ensemble, Shifted, judged
-from sonic_bullet.listener.calls import Call, Who
+from sonic_bullet.listener.calls import Call, ObjectId
 
 SIGNIFICANCE = 0.01
 SHIFT_M = 1e-4
@@ -34,7 +34,9 @@ def test_what_stands_out_alarms() -> None:
 def test_starts_are_shifted_along_the_support_by_a_tenth_of_a_millimetre() -> None:
     plan = Shifted(7)
     made = [
-        plan.instead(Call("createMultiBody", 0, {"baseMass": mass, "basePosition": (1.0, 2.0, 3.0)}))[1]["basePosition"]  # type: ignore[index]
+        plan.ahead_of(Call("createMultiBody", 0, {"baseMass": mass, "basePosition": (1.0, 2.0, 3.0)}))[1][
+            "basePosition"
+        ]  # type: ignore[index]
         for mass in (0.0, 1.0, 1.0)
     ]
     moved = np.array(made) - (1.0, 2.0, 3.0)
@@ -42,7 +44,7 @@ def test_starts_are_shifted_along_the_support_by_a_tenth_of_a_millimetre() -> No
     assert np.linalg.norm(moved[1:], axis=1) == pytest.approx([SHIFT_M, SHIFT_M])
     assert np.array_equal(moved[:, 2], np.zeros(3))
     assert not np.allclose(moved[1], moved[2])
-    place = {"bodyUniqueId": Who("a", 1), "posObj": (0.0, 0.0, 1.0), "ornObj": (0.0, 0.0, 0.0, 1.0)}
-    _, later = plan.instead(Call("resetBasePositionAndOrientation", 0, place, Who("a", 1)))
+    place = {"bodyUniqueId": ObjectId("a", 1), "posObj": (0.0, 0.0, 1.0), "ornObj": (0.0, 0.0, 0.0, 1.0)}
+    _, later = plan.ahead_of(Call("resetBasePositionAndOrientation", 0, place, ObjectId("a", 1)))
     assert later is not None
     assert np.linalg.norm(np.subtract(later["posObj"], (0.0, 0.0, 1.0))) == pytest.approx(SHIFT_M)

@@ -10,20 +10,24 @@ import pytest
 from sonic_bullet.comparing.inputs.call_pairs import aligned, side_by_side
 from sonic_bullet.comparing.inputs.causes import find_causes, log_distance, same_sound, shapley_shares
 from sonic_bullet.comparing.inputs.tree_difference import ABSENT, leaves, same, with_leaves
-from sonic_bullet.listener.calls import Call, Who
+from sonic_bullet.listener.calls import Call, ObjectId
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 
 def made(side: str, *places: float) -> list[Call]:
     return [
-        Call("createMultiBody", 0, {"baseMass": 1.0, "basePosition": (x, 0.0, 0.0)}, None, (Who(side, i),))
+        Call("createMultiBody", 0, {"baseMass": 1.0, "basePosition": (x, 0.0, 0.0)}, None, (ObjectId(side, i),))
         for i, x in enumerate(places)
     ]
 
 
 def test_the_body_that_is_missing_is_found_among_equal_ones() -> None:
     _, match = side_by_side(made("a", 0.0, 1.0, 2.0, 3.0), made("b", 0.0, 2.0, 3.0))
-    assert match == {Who("a", 0): Who("b", 0), Who("a", 2): Who("b", 1), Who("a", 3): Who("b", 2)}
+    assert match == {
+        ObjectId("a", 0): ObjectId("b", 0),
+        ObjectId("a", 2): ObjectId("b", 1),
+        ObjectId("a", 3): ObjectId("b", 2),
+    }
 
 
 def test_both_orders_are_kept() -> None:

@@ -77,7 +77,7 @@ def test_shapes_weigh_what_mujocos_bodies_weigh() -> None:
     world = sb.attach((model, data), microphone=()).world
     shapes = world.shapes_of(*_called(world, "all"))
     volume, centre, moment = solid_of(shapes)
-    record = world.described(1, -1)
+    record = world.describe(1, -1)
     assert [shape.kind for shape in shapes] == ["sphere", "box", "capsule", "cylinder", "mesh", "mesh"]
     assert 1000 * volume == pytest.approx(record.mass_kg, rel=2e-3)
     assert np.abs(centre).max() < 1e-4

@@ -36,7 +36,7 @@ print(sum(twice.stats.cache_hits.values()))
 """
 
 
-PLACES = ("compiled.py", "linked_once.py")
+PLACES = ("compiled.py", "whole_program_jit.py")
 
 
 @pytest.fixture(autouse=True)

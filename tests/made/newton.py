@@ -22,7 +22,7 @@ import numpy as np
 
 from sonic_bullet.contact.coupling import BodyMobility, ContactPoint, CoupledModes, first_order
 from sonic_bullet.contact.coupling.coupled_modes import STIFFEST_RATIO, STOPPED_RATIO, CoupledSystem, collect_springs
-from sonic_bullet.contact.coupling.first_order import likest
+from sonic_bullet.contact.coupling.first_order import assign_columns
 from sonic_bullet.records import Array
 
 STEPS = 12
@@ -103,7 +103,7 @@ def start(x: CoupledSystem, m: int) -> tuple[Array, Array]:
     stiff = both.T @ (x.spring.real[:, None] * both)
     stiff[np.diag_indices(len(x.lam))] += x.lam
     value, vector = np.linalg.eigh(stiff)
-    chosen = likest(vector[:m] ** 2)
+    chosen = assign_columns(vector[:m] ** 2)
     return (1j - OFF) * np.sqrt(np.maximum(value[chosen], 0)), vector[: len(x.lam), chosen].T.astype(complex)
 
 
@@ -181,7 +181,7 @@ def poles(x: CoupledSystem, s_start: Array, q_start: Array) -> tuple[Array, Arra
         value, vector = _coupled(x)
         free = np.min(np.abs(value[:, None] - s[~again]), axis=1, initial=np.inf) > SPLIT * np.abs(value)
         value, vector = value[free], vector[free]
-        new = likest(np.abs(q_start[again].conj() @ vector.T) ** 2)
+        new = assign_columns(np.abs(q_start[again].conj() @ vector.T) ** 2)
         found = np.flatnonzero(again)[new >= 0]
         s[found], q[found], stands[found] = value[new[new >= 0]], vector[new[new >= 0]], True
         stands[again & ~np.isin(np.arange(len(s)), found)] = False

@@ -165,7 +165,7 @@ def test_what_the_cache_lacks_is_solved_beforehand_each_once(
     client: Any, tmp_path: Path, solver: Callable[..., Solver], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The most intricate first; equal links once. What fails there fails again, by name, in the pass that adds."""
-    from sonic_bullet.session import wanted_bodies
+    from sonic_bullet.session import body_requests
 
     body = boxes(client, tmp_path, tip=f'<mesh filename="{Path(__file__).parents[2] / "assets" / "bowl.obj"}"/>')
     (tmp_path / "twins").mkdir()
@@ -177,7 +177,7 @@ def test_what_the_cache_lacks_is_solved_beforehand_each_once(
             work(item)
         before.extend(made.solved_m)
 
-    monkeypatch.setattr(wanted_bodies, "parallel_map", one_by_one)
+    monkeypatch.setattr(body_requests, "parallel_map", one_by_one)
     listener = sb.attach(client, microphone=())
     with pytest.raises(ModalError, match="clamps"):
         listener.add_all({(twins, "all"): STEEL, (body, "all"): STEEL}, progress=seen.append)

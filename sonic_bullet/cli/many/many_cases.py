@@ -39,7 +39,7 @@ def run_many(
     command: str, sources: Sequence[str], many: ManyOptions, *, output: str | None, json_to: str | None, **options: Any
 ) -> None:
     """Run a command over cases; raises SonicBulletError."""
-    from sonic_bullet.session.keeping import package_versions
+    from sonic_bullet.session.run_recorder import package_versions
 
     _check_options(output, options)
     assert output is not None

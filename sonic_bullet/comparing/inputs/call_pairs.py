@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sonic_bullet.comparing.inputs.tree_difference import differing_leaves, unlike_fraction
-from sonic_bullet.listener.calls import Call, Who, mapped
+from sonic_bullet.listener.calls import Call, ObjectId, mapped
 
 One = TypeVar("One")
 GAP = 0.6
@@ -38,7 +38,7 @@ class CallPair:
         return one.step if one is not None else 0
 
 
-def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], dict[Who, Who]]:
+def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], dict[ObjectId, ObjectId]]:
     """Return all calls of both, paired in an order that keeps that of each, and the match of A's bodies to B's."""
     match = matched_bodies(a, b)
     renamed = [_renamed(call, match) for call in a]
@@ -49,7 +49,7 @@ def side_by_side(a: Sequence[Call], b: Sequence[Call]) -> tuple[list[CallPair], 
     return pairs, match
 
 
-def matched_bodies(a: Sequence[Call], b: Sequence[Call]) -> dict[Who, Who]:
+def matched_bodies(a: Sequence[Call], b: Sequence[Call]) -> dict[ObjectId, ObjectId]:
     """Match the bodies and constraints of A to those of B."""
     makers = [[call for call in calls if call.made] for calls in (a, b)]
     return {
@@ -141,11 +141,11 @@ def _by_step(calls: Iterable[Call]) -> dict[int, list[Call]]:
     return found
 
 
-def _renamed(call: Call, match: Mapping[Who, Who]) -> Call:
+def _renamed(call: Call, match: Mapping[ObjectId, ObjectId]) -> Call:
     """Replace A's bodies in a call by B's where they are matched."""
 
     def other(value: Any) -> Any:
-        return match.get(value, value) if isinstance(value, Who) else value
+        return match.get(value, value) if isinstance(value, ObjectId) else value
 
     who = other(call.who)
     made = tuple(other(one) for one in call.made)

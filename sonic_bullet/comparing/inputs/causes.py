@@ -92,7 +92,7 @@ def find_causes(count: int, sounds_as_a: Callable[[Sequence[int]], bool]) -> Cau
 
 
 def shapley_shares(
-    found: Sequence[int], a: KeptSound, b: KeptSound, put_back: Callable[[Sequence[int]], KeptSound]
+    found: Sequence[int], a: KeptSound, b: KeptSound, substitute: Callable[[Sequence[int]], KeptSound]
 ) -> dict[int, float]:
     """Compute the share of each cause; none for too many causes, or sounds of different lengths."""
     most_shared = 4  # most causes whose shares are determined: 2^4 runs
@@ -106,7 +106,7 @@ def shapley_shares(
     closed: dict[frozenset[int], float] = {frozenset(): 0.0}
     for size in range(1, n + 1):
         for chosen in itertools.combinations(found, size):
-            made = put_back(chosen)
+            made = substitute(chosen)
             if made.shape != a.shape:
                 return {}
             closed[frozenset(chosen)] = 1 - log_distance(reference, made.samples()) / whole

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sonic_bullet.comparing.inputs.call_pairs import CallPair, differing, side_by_side
-from sonic_bullet.comparing.inputs.put_back import HANDLES, Place
+from sonic_bullet.comparing.inputs.substitution import HANDLES, Place
 from sonic_bullet.comparing.inputs.tree_difference import ABSENT, Path, leaves
 from sonic_bullet.comparing.sides import Side
-from sonic_bullet.listener.calls import Call, Who
+from sonic_bullet.listener.calls import Call, ObjectId
 
 ONE_QUANTITY = {
     "baseMass": "mass",
@@ -75,7 +75,7 @@ class Asked:
         Step of the call, where only one run makes it in that step.
     """
 
-    who: Who | None
+    who: ObjectId | None
     link: int
     what: str
     a: Any = None
@@ -132,11 +132,11 @@ def _is_same_body(old: Asked, new: Asked) -> bool:
     return lone and one.name == other.name and not differing(one, other)
 
 
-def _whose(pair: CallPair, lone: set[Who]) -> Any:
+def _whose(pair: CallPair, lone: set[ObjectId]) -> Any:
     """Return the body of a pair's calls, first of all one that only one run has."""
     for call in (pair.b, pair.a):
         if call is not None:
-            known = [*call.made, *(value for _, value in leaves(call.arguments) if isinstance(value, Who))]
+            known = [*call.made, *(value for _, value in leaves(call.arguments) if isinstance(value, ObjectId))]
             for one in known:
                 if one in lone:
                     return one

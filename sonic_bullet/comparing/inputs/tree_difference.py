@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sonic_bullet.listener.calls import InputFile, Who
+from sonic_bullet.listener.calls import InputFile, ObjectId
 
 Path = tuple[str, ...]
 """Path of a leaf: names of arguments, of fields of records, of keys."""
@@ -34,7 +34,7 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     if isinstance(value, Mapping):
         for name, inner in value.items():
             yield from leaves(inner, (*path, str(name)))
-    elif is_dataclass(value) and not isinstance(value, (type, Who, InputFile)) and len(path) < 3:
+    elif is_dataclass(value) and not isinstance(value, (type, ObjectId, InputFile)) and len(path) < 3:
         for one in fields(value):
             yield from leaves(getattr(value, one.name), (*path, one.name))
     else:
@@ -72,7 +72,7 @@ def same(one: Any, other: Any) -> bool:
         return one.keys() == other.keys() and all(same(one[name], other[name]) for name in one)
     if isinstance(one, Sequence) and isinstance(other, Sequence) and not isinstance(one, (str, bytes)):
         return len(one) == len(other) and all(map(same, one, other))
-    if is_dataclass(one) and type(one) is type(other) and not isinstance(one, (Who, InputFile)):
+    if is_dataclass(one) and type(one) is type(other) and not isinstance(one, (ObjectId, InputFile)):
         return all(same(getattr(one, x.name), getattr(other, x.name)) for x in fields(one))
     if isinstance(one, (int, float)) and isinstance(other, (int, float)):
         return one == other or (math.isnan(one) and math.isnan(other))

@@ -110,7 +110,7 @@ def first_order(
     )
 
 
-def likest(share: Array) -> Array:
+def assign_columns(share: Array) -> Array:
     """Assign to each row of weights (m, n) a column, each once, with the largest sum; -1 (m,) where none is left."""
     from scipy.optimize import linear_sum_assignment  # takes a fifth of a second to import
 
@@ -129,7 +129,7 @@ def _choose(vector: Array, pairs: Array, before: Array) -> tuple[Array, Array]:
     m = len(before)
     share, turn = vector[:m] ** 2, np.eye(m)
     share[pairs] = share[pairs + 1] = 0.5 * (share[pairs] + share[pairs + 1])
-    chosen = likest(share)
+    chosen = assign_columns(share)
     both = np.stack([pairs, pairs + 1], axis=1)
     block = both[:, :, None], both[:, None]
     left, _, right = np.linalg.svd(vector[both[:, :, None], chosen[both][:, None]])

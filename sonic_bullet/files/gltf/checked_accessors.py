@@ -10,7 +10,7 @@ import numpy as np
 from sonic_bullet.files.gltf.gltf_tree import GltfTree
 from sonic_bullet.files.gltf.gltf_writer import FLOAT
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 
 
 def named_values(
@@ -31,7 +31,7 @@ def named_values(
     if index is None:
         raise tree.error(f"{name} has no {key}", tree.remedy)
     if not isinstance(index, int) or not 0 <= index < len(all_of_them):
-        raise tree.error(f"{name}: {key} is accessor {shown(index)} of {len(all_of_them)}", tree.remedy)
+        raise tree.error(f"{name}: {key} is accessor {quote(index)} of {len(all_of_them)}", tree.remedy)
     it = all_of_them[index]
     types = index_types if whole else (FLOAT,)
     if it.get("type") != kind or it.get("componentType") not in types:
@@ -59,6 +59,6 @@ def named_triangles(tree: GltfTree, entry: Mapping[str, Any], name: str, points:
 def one_of(tree: GltfTree, entries: Any, index: Any, what: str) -> Mapping[str, Any]:
     """Pick the object of that number among ``entries``; raises the tree's error."""
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(entries):
-        raise tree.error(f"{what} is {shown(index)} of {len(entries)}", tree.remedy)
+        raise tree.error(f"{what} is {quote(index)} of {len(entries)}", tree.remedy)
     found: Mapping[str, Any] = entries[index]
     return found

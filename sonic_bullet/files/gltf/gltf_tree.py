@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import SonicBulletError
 from sonic_bullet.storage.reading import refuse_lfs_pointer
 
@@ -101,6 +101,6 @@ def _buffer(one: Mapping[str, Any], chunk: bytes, path: Path, error: type[SonicB
 def _neighbour(uri: str, folder: Path, error: type[SonicBulletError]) -> bytes:
     name = Path(uri)
     if name.is_absolute() or ".." in name.parts:
-        raise error(f"{shown(uri)} lies outside its folder", "keep it beside the .gltf")
+        raise error(f"{quote(uri)} lies outside its folder", "keep it beside the .gltf")
     refuse_lfs_pointer(folder / name, error)
     return (folder / name).read_bytes()

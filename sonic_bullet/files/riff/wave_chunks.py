@@ -15,7 +15,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sonic_bullet.records.coerce import as_items, as_text, as_whole, shown
+from sonic_bullet.records.coerce import as_items, as_text, as_whole, quote
 from sonic_bullet.records.errors import RecordError
 
 
@@ -48,7 +48,7 @@ def wave_chunks(cues: Sequence[Cue], *, description: str = "", time_reference: i
     listed = as_items(cues, "cues", remedy)
     for cue in listed:
         if not isinstance(cue, Cue):
-            raise RecordError(f"a cue is {shown(cue)}", remedy)
+            raise RecordError(f"a cue is {quote(cue)}", remedy)
     last_sample = 2**32 - 1  # last sample of a cue, which has 32 bits: a day at 48 kHz
     kept = [cue for cue in listed if cue.sample <= last_sample]
     points = [

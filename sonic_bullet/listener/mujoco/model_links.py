@@ -20,7 +20,7 @@ from sonic_bullet.listener.known_bodies import only_curvature
 from sonic_bullet.listener.mujoco.geom_shapes import shape_of_geom
 from sonic_bullet.listener.tables.motion_world import roster_of
 from sonic_bullet.records import Array, Body, Shape
-from sonic_bullet.records.coerce import as_whole, nearest, shown
+from sonic_bullet.records.coerce import as_whole, nearest, quote
 from sonic_bullet.records.errors import MeshError, SceneError
 
 
@@ -91,15 +91,15 @@ class ModelLinks:
         """Return (body, link) of a link as the roster has it; SceneError where there is none."""
         model = self.model
         if not 0 <= body < model.nbody:
-            raise SceneError(f"no body {shown(body)}", f"give a name, or a number below {model.nbody}")
+            raise SceneError(f"no body {quote(body)}", f"give a name, or a number below {model.nbody}")
         if body == 0:
             if not 0 <= link < model.ngeom or model.geom_bodyid[link] != 0:
-                raise SceneError(f"the world has no geom {shown(link)}", "give the name of one of its geoms")
+                raise SceneError(f"the world has no geom {quote(link)}", "give the name of one of its geoms")
             return 0, link
         if link == -1:
             return body, -1
         if not 0 <= link < self._below(body):
-            raise SceneError(f"body {body} has no link {shown(link)}", f"use -1, itself … {self._below(body) - 1}")
+            raise SceneError(f"body {body} has no link {quote(link)}", f"use -1, itself … {self._below(body) - 1}")
         return body + 1 + link, -1
 
     def row(self, body: int, link: int) -> int:
@@ -117,10 +117,10 @@ class ModelLinks:
         )  # fmt: skip
         if only is not None:
             if link not in (-1, "all"):
-                raise SceneError(f"link is {shown(link)}", "leave it out: a geom of the world is one thing")
+                raise SceneError(f"link is {quote(link)}", "leave it out: a geom of the world is one thing")
             return 0, (only,)
         if not 0 <= number < self.model.nbody:
-            raise SceneError(f"body is {shown(body)}", f"give a name, or a number below {self.model.nbody}")
+            raise SceneError(f"body is {quote(body)}", f"give a name, or a number below {self.model.nbody}")
         if isinstance(link, str) and link == "all":
             return number, self._all_of(number)
         if isinstance(link, str):
@@ -143,7 +143,7 @@ class ModelLinks:
         if geom >= 0 and self.model.geom_bodyid[geom] == 0:
             return 0, geom
         known = [self.name(*one) for one in zip(self.body.tolist(), self.geom.tolist(), strict=True)]
-        raise SceneError(f"no body is called {shown(name)}", nearest(name, known))
+        raise SceneError(f"no body is called {quote(name)}", nearest(name, known))
 
     def _all_of(self, body: int) -> tuple[int, ...]:
         """List the links with colliding geoms of a body and those below it; raises MeshError."""
@@ -161,7 +161,7 @@ class ModelLinks:
         names = {self.name(*self.own(body, link)): link for link in links}
         if name not in names:
             raise SceneError(
-                f"link is {shown(name)}, and body {body} has none of that name", nearest(name, list(names))
+                f"link is {quote(name)}, and body {body} has none of that name", nearest(name, list(names))
             )
         return names[name]
 
@@ -179,7 +179,7 @@ class ModelLinks:
         )
         return mujoco.mj_id2name(self.model, kind, number) or f"{word} {number}"
 
-    def described(self, body: int, link: int) -> Body:
+    def describe(self, body: int, link: int) -> Body:
         """Return the silent record of a link; raises SceneError."""
         model, row = self.model, self.row(body, link)
         number, of_world = int(self.body[row]), int(self.geom[row])

@@ -24,7 +24,7 @@ from sonic_bullet.listener.tables.motion_world import MotionWorld
 from sonic_bullet.listener.tables.soft_impacts import SoftImpacts
 from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Body, Shape
-from sonic_bullet.records.coerce import as_number, shown
+from sonic_bullet.records.coerce import as_number, quote
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.simulated import Values, finite
@@ -47,7 +47,7 @@ class MujocoWorld(MotionWorld):
     def __init__(self, model: Any, data: Any) -> None:
         if not isinstance(model, mujoco.MjModel) or not isinstance(data, mujoco.MjData):
             raise SceneError(
-                f"client is ({shown(model)}, {shown(data)})", "pass (model, data), MuJoCo's MjModel and MjData"
+                f"client is ({quote(model)}, {quote(data)})", "pass (model, data), MuJoCo's MjModel and MjData"
             )
         self.model, self.data = model, data
         self.links = ModelLinks(model)
@@ -82,9 +82,9 @@ class MujocoWorld(MotionWorld):
         """Return the body and links meant by names or numbers; raises SceneError, MeshError."""
         return self.links.called(body, link)
 
-    def described(self, body: int, link: int) -> Body:
+    def describe(self, body: int, link: int) -> Body:
         """Return the silent record of a link; raises SceneError."""
-        return self.links.described(body, link)
+        return self.links.describe(body, link)
 
     def link_name(self, body: int, link: int) -> str:
         """Return a link's own name."""

@@ -21,7 +21,7 @@ from sonic_bullet.listener.tables.known_world import KnownWorld
 from sonic_bullet.machine.package_version import find_version
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.arrays import store
-from sonic_bullet.records.coerce import LISTED, shown
+from sonic_bullet.records.coerce import LISTED, quote
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -38,12 +38,12 @@ def check_exists(client_id: int, body: int, link: int) -> None:
     if body not in known:
         few = ", ".join(map(str, known[:LISTED])) + (f" and {len(known) - LISTED} more" if len(known) > LISTED else "")
         raise SceneError(
-            f"no body {shown(body)}; known: {few or 'none'}", "load it first, and use the id that loading returned"
+            f"no body {quote(body)}; known: {few or 'none'}", "load it first, and use the id that loading returned"
         )
     joints = pybullet.getNumJoints(body, physicsClientId=client_id)
     if not -1 <= link < joints:
         raise SceneError(
-            f"body {body} has no link {shown(link)}",
+            f"body {body} has no link {quote(link)}",
             "use -1, the base, its only link" if joints == 0 else f"use -1 (base) … {joints - 1}",
         )
 

@@ -55,7 +55,7 @@ class Census:
             kept &= ~self.left_out.concerned(touches)
         return touches if kept.all() else touches.kept(kept)
 
-    def described(self, code: int, epoch: int) -> Body | None:
+    def describe(self, code: int, epoch: int) -> Body | None:
         """Return the silent record of a link; None, and mute it, where mass or inertia cannot be."""
         body, link = decode(code)
         if body in self.left_out.muted:

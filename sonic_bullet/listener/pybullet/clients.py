@@ -15,7 +15,7 @@ from sonic_bullet.listener.pybullet.colliding.pieces import collision_pieces
 from sonic_bullet.listener.pybullet.poses import body_ids, check_connected, is_soft
 from sonic_bullet.listener.pybullet.pybullet_world import PyBulletWorld
 from sonic_bullet.listener.quiet import quiet_stdout
-from sonic_bullet.records.coerce import as_whole, nearest, shown
+from sonic_bullet.records.coerce import as_whole, nearest, quote
 from sonic_bullet.records.errors import MeshError, SceneError
 
 
@@ -119,7 +119,7 @@ def _link_named(client_id: int, body: int, name: str) -> int:
     names = facts.link_names(client_id, body)
     if name not in names:
         raise SceneError(
-            f"link is {shown(name)}, and body {body} has none of that name", nearest(name, names, ', or "all"')
+            f"link is {quote(name)}, and body {body} has none of that name", nearest(name, names, ', or "all"')
         )
     return names.index(name) - 1
 
@@ -139,7 +139,7 @@ def client_id_of(client: Any) -> int:
     elif isinstance(getattr(client, "_client", None), int):
         client_id = client._client
     else:
-        raise SceneError(f"client is {shown(client)}", "pass a BulletClient, the pybullet module or a client id")
+        raise SceneError(f"client is {quote(client)}", "pass a BulletClient, the pybullet module or a client id")
     check_connected(client_id)
     return client_id
 
@@ -166,7 +166,7 @@ def bodies_called(client_id: int, name: str) -> tuple[int, ...]:
         if name in own:
             found.append(body)
     if not found:
-        raise SceneError(f"no body is called {shown(name)}", nearest(name, sorted(names), ", or a body's id"))
+        raise SceneError(f"no body is called {quote(name)}", nearest(name, sorted(names), ", or a body's id"))
     return tuple(found)
 
 

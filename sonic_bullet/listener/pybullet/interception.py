@@ -23,7 +23,7 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from sonic_bullet.listener.calls import FIRST_ABSENT, Call, InputFile, Plan, Who, mapped
+from sonic_bullet.listener.calls import FIRST_ABSENT, Call, InputFile, ObjectId, Plan, mapped
 from sonic_bullet.listener.pybullet.hooks import DYNAMICS_IN_ORDER
 
 IN_ORDER: dict[str, tuple[str, ...]] = {
@@ -98,17 +98,17 @@ class Interception:
         self.calls: list[Call] = []
         self.steps = 0
         self.client = 0
-        self.ids: dict[Who, int] = {}  # living or not; the latest owner of an id is the last
-        self._bearer: dict[tuple[str, int], Who] = {}
+        self.ids: dict[ObjectId, int] = {}  # living or not; the latest owner of an id is the last
+        self._bearer: dict[tuple[str, int], ObjectId] = {}
         self._shapes: dict[int, Mapping[str, Any]] = {}
         self._count = {"body": 0, "constraint": 0}
         self._folders: list[str] = []
         self.files: set[str] = set()
         self._real: dict[str, Any] = {}
 
-    def who(self, body: int, kind: str = "body") -> Who:
+    def who(self, body: int, kind: str = "body") -> ObjectId:
         """Return the body, or constraint, that has that id now."""
-        return self._bearer.get((kind, body)) or Who("", body, kind)
+        return self._bearer.get((kind, body)) or ObjectId("", body, kind)
 
     @contextmanager
     def watching(self) -> Iterator[None]:
@@ -130,7 +130,7 @@ class Interception:
 
     def _step(self, *args: Any, **kwargs: Any) -> Any:
         self.look()
-        self.make(self.plan.behind(self.steps) if self.plan is not None else [])
+        self.make(self.plan.remaining(self.steps) if self.plan is not None else [])
         result = self._real["stepSimulation"](*args, **kwargs)
         self.steps += 1
         return result
@@ -150,7 +150,7 @@ class Interception:
             return self._made(call, self._real[name](*args, **kwargs))
         if name == "createCollisionShape":
             return self._made(call, self._real[name](*args, **kwargs))
-        first, arguments = self.plan.instead(call)
+        first, arguments = self.plan.ahead_of(call)
         self.make(first)
         if arguments is None:
             return self._not_made(call)
@@ -198,17 +198,17 @@ class Interception:
         makes = name in ("createMultiBody", "loadURDF", "loadSDF", "loadMJCF", "loadBullet", "loadSoftBody")
         return [("body", body) for body in _ids(result)] if makes else []
 
-    def _whom(self, name: str, result: Any) -> list[Who]:
+    def _whom(self, name: str, result: Any) -> list[ObjectId]:
         """Assign serial numbers to the bodies and constraints that a call made."""
         found = []
         for kind, _ in self._kinds(name, result):
-            found.append(Who(self.side, self._count[kind], kind))
+            found.append(ObjectId(self.side, self._count[kind], kind))
             self._count[kind] += 1
         return found
 
     def _by_value(self, name: str, given: Mapping[str, Any]) -> Call:
         constraint = "userConstraintUniqueId"
-        whom: Who | None = None
+        whom: ObjectId | None = None
         arguments: dict[str, Any] = {}
         for key, raw in given.items():
             if key in PICTURES:
@@ -235,7 +235,7 @@ class Interception:
                 self._shapes[int(index)] = value
                 return index
             return [self._handle(key, one) for one in value] if isinstance(value, tuple) else value
-        if isinstance(value, Who):
+        if isinstance(value, ObjectId):
             return self.ids.get(value, value.serial)
         return value.path if isinstance(value, InputFile) else value
 

@@ -28,7 +28,7 @@ from sonic_bullet.listener.frames import (
 from sonic_bullet.listener.polling import Touches
 from sonic_bullet.listener.quiet import collector_waiting
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import SceneError
 
 POSE_BYTES, POSE_AND_TWIST = struct.Struct("7d"), struct.Struct(f"{MOTION_NUMBERS}d")
@@ -40,7 +40,7 @@ def check_connected(client_id: int) -> None:
     """Raise SceneError unless a physics server answers under this client id."""
     if not 0 <= client_id < 2**31 or not pybullet.getConnectionInfo(physicsClientId=client_id)["isConnected"]:
         raise SceneError(
-            f"PyBullet client {shown(client_id)} is not connected",
+            f"PyBullet client {quote(client_id)} is not connected",
             "connect first, e.g. BulletClient(pybullet.DIRECT), and attach before disconnecting",
         )
 

@@ -282,7 +282,7 @@ class PyBulletWorld(facts.AskedLinks):
                 self._past, now, touches, dt, undo=partial(undone, client_id=self.client_id), first=first
             )
         memory.touches, self._past = touches, now
-        silent = partial(self._census.described, epoch=self.epoch)
+        silent = partial(self._census.describe, epoch=self.epoch)
         row, made = self._rows(start, touches, past_touches, dt, silent)
         return memory.unusual(self._known, start, row, made, dt, gravity)
 
@@ -301,7 +301,7 @@ class PyBulletWorld(facts.AskedLinks):
         """Close records, without hooks, of links that jumped and changed name, mass or inertia: their id was reused."""
         for code in now.roster.code[jumped(self._past, now, dt)].tolist():
             before = self._known.records.get(self._known.live.get(code, -1))
-            seen = None if before is None else self._census.described(code, self.epoch)
+            seen = None if before is None else self._census.describe(code, self.epoch)
             if before is not None and seen is not None and not alike(before, seen):
                 self.epoch += 1
                 self._lose([code])

@@ -25,7 +25,7 @@ from sonic_bullet.listener.polling import TOUCH, Touches
 from sonic_bullet.listener.tables.motion_world import MotionWorld, roster_of
 from sonic_bullet.records import Array, Body, Shape
 from sonic_bullet.records.arrays import frozen_array
-from sonic_bullet.records.coerce import as_items, as_number, as_text, as_whole, nearest, shown
+from sonic_bullet.records.coerce import as_items, as_number, as_text, as_whole, nearest, quote
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import MeshError, SceneError
 
@@ -88,7 +88,7 @@ class ArrayWorld(MotionWorld):
             An argument is not valid, or a step was made already.
         """
         if self.step_count:
-            raise SceneError(f"{shown(name)} comes after a step", "add all bodies before the first step")
+            raise SceneError(f"{quote(name)} comes after a step", "add all bodies before the first step")
         who = as_text(name, "name", "give a text", error=SceneError)
         heaviest_kg = 1e12
         mass = as_number(mass_kg, f"{who}: mass_kg", "give kilograms, 0 or more", least=0, below=heaviest_kg)
@@ -119,7 +119,7 @@ class ArrayWorld(MotionWorld):
     def links_called(self, body: object, link: object) -> tuple[int, tuple[int, ...]]:
         """Return the number of a body, given as such or by name; raises SceneError."""
         if link not in (-1, "all"):
-            raise SceneError(f"link is {shown(link)}", "leave it out: add each link of a robot as a body of its own")
+            raise SceneError(f"link is {quote(link)}", "leave it out: add each link of a robot as a body of its own")
         number, only = self.link_of(body)
         return number, (only,)
 
@@ -127,21 +127,21 @@ class ArrayWorld(MotionWorld):
         """Return the number of a body, given as such or by name, and its only link; raises SceneError."""
         names = [one.record.name for one in self.defined]
         if isinstance(body, str) and body not in names:
-            raise SceneError(f"no body is called {shown(body)}", nearest(body, names))
+            raise SceneError(f"no body is called {quote(body)}", nearest(body, names))
         remedy = "give its number or name"
         number = names.index(body) if isinstance(body, str) else as_whole(body, "body", remedy, error=SceneError)
-        self.described(number, -1)
+        self.describe(number, -1)
         return number, -1
 
-    def described(self, body: int, link: int) -> Body:
+    def describe(self, body: int, link: int) -> Body:
         """Return the silent record of a body; raises SceneError."""
         if not 0 <= body < len(self.defined) or link != -1:
-            raise SceneError(f"no body {shown(body)}", f"give a number below {len(self.defined)}")
+            raise SceneError(f"no body {quote(body)}", f"give a number below {len(self.defined)}")
         return self.defined[body].record
 
     def shapes_of(self, body: int, link: int = -1) -> tuple[Shape, ...]:
         """Return a body's shapes about its centre of mass; raises SceneError, MeshError."""
-        record = self.described(body, link)
+        record = self.describe(body, link)
         if not self.defined[body].shapes:
             raise MeshError(f"{record.name} has no shape", "give it one, or add it with mesh=")
         return self.defined[body].shapes

@@ -57,7 +57,7 @@ class MotionWorld(KnownWorld):
         """The links in the world."""
 
     @abstractmethod
-    def described(self, body: int, link: int) -> Body:
+    def describe(self, body: int, link: int) -> Body:
         """Return the silent record of a link.
 
         Raises
@@ -72,7 +72,7 @@ class MotionWorld(KnownWorld):
 
     def dynamics_of(self, body: int, link: int) -> Values:
         """Return the properties of a link under the simulator's names."""
-        return self.described(body, link).dynamics
+        return self.describe(body, link).dynamics
 
     def engine(self) -> Values:
         """Return the settings of the simulator."""
@@ -94,14 +94,14 @@ class MotionWorld(KnownWorld):
 
     def name_of(self, body: int, link: int = -1) -> str:
         """Return a link's name and its body's id for messages; raises SceneError."""
-        record = self.described(*self.own(body, link))
+        record = self.describe(*self.own(body, link))
         called = self.properties.names.called(self._code(body, link), record.name)
         return with_body_id(called, record.body_id)
 
     def record_names(self, links: Sequence[tuple[int, int, str | None]]) -> list[str]:
         """Return the names that records of links (body, link, given name) would have if all were added now."""
         return self.properties.names.expected(
-            [(self._code(body, link), self.described(body, link).name, given) for body, link, given in links]
+            [(self._code(body, link), self.describe(body, link).name, given) for body, link, given in links]
         )
 
     def add(
@@ -119,7 +119,7 @@ class MotionWorld(KnownWorld):
         how: dict[str, Any] = {"material": material, "model": model, "shapes": tuple(shapes)}
         how |= {"options": options, "mounting": mounting}
         code = self._code(body, link)
-        record = replace(sounding_body(self.described(body, link), **how), since_step=self.step_count)
+        record = replace(sounding_body(self.describe(body, link), **how), since_step=self.step_count)
         self._close([code])
         self._added.pop(code, None)
         self._added[code] = how
@@ -132,7 +132,7 @@ class MotionWorld(KnownWorld):
         before.names.hand_over(added, self.properties.names)
         self._added = added
         for code, how in added.items():
-            self._append(code, sounding_body(self.described(*decode(code)), **how))
+            self._append(code, sounding_body(self.describe(*decode(code)), **how))
 
     def unhook(self) -> None:
         """Do nothing: there is no hook."""
@@ -162,7 +162,7 @@ class MotionWorld(KnownWorld):
             self.properties.first_step()
         start = hooked_start(self._past, now, moved, dt_s)
         start["born"] = 0
-        row, made = self._rows(start, touches, None, dt_s, lambda code: self.described(*decode(code)))
+        row, made = self._rows(start, touches, None, dt_s, lambda code: self.describe(*decode(code)))
         if self.impacts is not None:
             row = self._collected(row[:made], dt_s, gravity_m_s2)
             made = len(row)

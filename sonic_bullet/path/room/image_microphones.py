@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Ambisonics, Array, Binaural, Head, Microphone, ShoeboxRoom
 from sonic_bullet.records.errors import AudioError
 

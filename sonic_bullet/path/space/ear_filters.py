@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.records import Array, Head
 
 ONSET_SHARE = 0.1

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.path.minimum_phase import minimum_phase
 from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorResponse
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records.arrays import LARGEST_SI, Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import LogError
 
 LINK_MOTION = np.dtype(
@@ -36,7 +36,7 @@ def as_motions(rows: object, body: Array) -> Array:
     if rows is NO_MOTIONS:
         return NO_MOTIONS
     if not isinstance(rows, np.ndarray) or rows.dtype != LINK_MOTION or rows.ndim != 1:
-        raise LogError(f"step: motions is {shown(rows)}", "give rows (r,) of LINK_MOTION")
+        raise LogError(f"step: motions is {quote(rows)}", "give rows (r,) of LINK_MOTION")
     check_motions(rows, "step")
     if not np.isin(rows["body"], body).all():
         raise LogError("step: motions name a body that the step does not know", "use an unbroken contact log")

@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.files.gltf.gltf_tree import GltfTree
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 
 UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """World of glTF -> world with z up."""
@@ -74,7 +74,7 @@ class Nodes:
             if one in found:
                 continue
             if not isinstance(one, int) or not 0 <= one < len(self.entry):
-                raise self.tree.error(f"node {shown(one)} of {len(self.entry)}", self.tree.remedy)
+                raise self.tree.error(f"node {quote(one)} of {len(self.entry)}", self.tree.remedy)
             found.add(one)
             ahead += self.entry[one].get("children", ())
         return sorted(found)

@@ -83,7 +83,7 @@ def finish_entry(own: OwnSurface) -> dict[str, float]:
 def own_surface(surface: Mapping[str, Any]) -> OwnSurface | None:
     """Read our words of a surface, where the draft's fields are still as we write them."""
     try:
-        own = msgspec.convert(_said(surface), OwnSurface)
+        own = msgspec.convert(_entry_value(surface), OwnSurface)
     except msgspec.ValidationError:
         return None
     same = all(surface.get(key) == value for key, value in finish_entry(own).items())
@@ -93,7 +93,7 @@ def own_surface(surface: Mapping[str, Any]) -> OwnSurface | None:
 def own_model(entry: Mapping[str, Any], freq_hz: Array, decay_per_s: Array) -> OwnModel | None:
     """Read our words of a model, where they agree with its accessors."""
     try:
-        own = msgspec.convert(_said(entry), OwnModel)
+        own = msgspec.convert(_entry_value(entry), OwnModel)
     except msgspec.ValidationError:
         return None
     pairs = ((own.modes.freq_hz, freq_hz), (own.modes.decay_per_s, decay_per_s))
@@ -106,7 +106,7 @@ def own_model(entry: Mapping[str, Any], freq_hz: Array, decay_per_s: Array) -> O
 
 def own_mounting(node: Mapping[str, Any]) -> Mounting:
     """Read how a node's body is held; raises RecordError."""
-    said = _said(node)
+    said = _entry_value(node)
     return as_mounting(said["mounting"], "mounting") if isinstance(said, dict) and "mounting" in said else FREE
 
 
@@ -127,6 +127,6 @@ def with_grain(material: Material, own: OwnSurface) -> Array:
     return made if same else material.stiffness_pa
 
 
-def _said(entry: Mapping[str, Any]) -> Any:
+def _entry_value(entry: Mapping[str, Any]) -> Any:
     extras = entry.get("extras")
     return extras.get(EXTRAS) if isinstance(extras, dict) else None

@@ -11,7 +11,7 @@ from sonic_bullet.listener.animated import AnimatedBody, rotation
 from sonic_bullet.listener.frames import LINK_STATE
 from sonic_bullet.records import Array, frozen_array
 from sonic_bullet.records.arrays import store
-from sonic_bullet.records.coerce import as_kinds, as_number, shown
+from sonic_bullet.records.coerce import as_kinds, as_number, quote
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AnimationError
 
@@ -31,7 +31,7 @@ def check_orientations(names: Sequence[str], turn: Array) -> None:
         found = length[frame, body]
         what = "no number" if not np.isfinite(found) else "zero" if found == 0 else f"{found:.3g} long, not 1"
         raise AnimationError(
-            f"the quaternion of {shown(names[body])} in frame {frame} (the first is 0) is {what}",
+            f"the quaternion of {quote(names[body])} in frame {frame} (the first is 0) is {what}",
             "export orientations as unit quaternions (x, y, z, w)",
         )
 
@@ -79,7 +79,7 @@ class Animation:
         names = [one.name for one in bodies]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
-            raise AnimationError(f"two bodies are called {shown(twice)}", "give each its own name")
+            raise AnimationError(f"two bodies are called {quote(twice)}", "give each its own name")
         turn.setflags(write=False)
         store(self, fps=fps, bodies=bodies, position_m=place, quaternion_xyzw=turn,
               gravity_m_s2=frozen_array(self.gravity_m_s2, float, (3,), "animation: gravity_m_s2"))  # fmt: skip

@@ -17,7 +17,7 @@ import numpy as np
 from sonic_bullet.geometry import inertia, is_closed, volume_m3, welded
 from sonic_bullet.listener.animated import AnimatedBody, matrices
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.score.animation import Animation, check_orientations
 
@@ -106,7 +106,7 @@ def assembled(
 
 
 def _listed(names: Sequence[str]) -> str:
-    few = ", ".join(shown(name) for name in names[:5])
+    few = ", ".join(quote(name) for name in names[:5])
     return few + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
@@ -133,12 +133,12 @@ def _body(one: ExportedObject, said: Rule, density: float, moves: bool) -> tuple
         vertex, face = welded(*one.mesh)
         size = float(np.ptp(vertex, axis=0).max(initial=0.0))
         if not len(face) or size <= 0:
-            raise AnimationError(f"object {shown(one.name)} has no triangle", "delete it, or give it a mesh")
+            raise AnimationError(f"object {quote(one.name)} has no triangle", "delete it, or give it a mesh")
         if moves:
             volume = volume_m3(vertex, face)
             if not is_closed(face) or abs(volume) < 1e-6 * size**3:
                 raise AnimationError(
-                    f"the mesh of {shown(one.name)} encloses no volume",
+                    f"the mesh of {quote(one.name)} encloses no volume",
                     "close its holes and give it thickness before the export (Blender: modifier Solidify)",
                 )
             face = face if volume > 0 else face[:, ::-1]
@@ -199,6 +199,6 @@ def _check_apart(names: Sequence[str], place: Array, turn: Array, moving: Array)
         for j in range(i + 1, len(names)):
             if (moving[i] or moving[j]) and np.abs(place[:, i] - place[:, j]).max() < one_spot_m:
                 raise AnimationError(
-                    f"{shown(names[i])} and {shown(names[j])} are on one spot in every frame",
+                    f"{quote(names[i])} and {quote(names[j])} are on one spot in every frame",
                     "export each object once; leave out copies and collision hulls",
                 )

@@ -22,7 +22,7 @@ from sonic_bullet.files.gltf.gltf_animation import STRETCH, Sampler, local_trans
 from sonic_bullet.files.gltf.gltf_meshes import mesh_triangles
 from sonic_bullet.files.gltf.gltf_tree import GltfTree, read_tree
 from sonic_bullet.records import Array
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.frame_rates import rate_of_keys
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
@@ -134,14 +134,14 @@ def _rigid(name: str, matrix: Array) -> tuple[Array, Array, Array]:
 
     stretch = polar(matrix[0, :3, :3])[1]
     if not np.linalg.det(stretch) > 1e-18:
-        raise AnimationError(f"{shown(name)} has a scale of zero", "apply the scale before the export")
+        raise AnimationError(f"{quote(name)} has a scale of zero", "apply the scale before the export")
     frame = matrix[:, :3, :3] @ np.linalg.inv(stretch)
     if np.linalg.det(frame[0]) < 0:  # mirrored: the mirror belongs to the mesh
         stretch, frame = -stretch, -frame
     wrong = np.abs(np.einsum("tij,tik->tjk", frame, frame) - np.eye(3)).max(axis=(1, 2))
     if wrong.max() > 2 * STRETCH:
         raise AnimationError(
-            f"{shown(name)} changes its size at frame {int(wrong.argmax())}", "animate position and rotation alone"
+            f"{quote(name)} changes its size at frame {int(wrong.argmax())}", "animate position and rotation alone"
         )
     return stretch, matrix[:, :3, 3].copy(), Rotation.from_matrix(frame).as_quat()
 

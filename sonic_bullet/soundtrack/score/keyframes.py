@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.records.coerce import shown
+from sonic_bullet.records.coerce import quote
 from sonic_bullet.records.errors import AnimationError
 from sonic_bullet.soundtrack.frame_rates import fraction_of
 from sonic_bullet.soundtrack.score.export import Export, ExportedObject, Rule
@@ -101,7 +101,7 @@ def _numbers(arrays: Mapping[str, Array], name: str, bodies: int, width: int) ->
     """Check an array (frames, bodies, width) of floats of any precision."""
     found = arrays.get(name, np.zeros(0))
     if found.ndim != 3 or found.shape[1:] != (bodies, width) or found.dtype.kind != "f":
-        raise AnimationError(f"{name} is {shown(found)}", f"give floating-point numbers (frames, {bodies}, {width})")
+        raise AnimationError(f"{name} is {quote(found)}", f"give floating-point numbers (frames, {bodies}, {width})")
     return np.asarray(found, float)
 
 
@@ -109,7 +109,7 @@ def _rate(said: float | str) -> float:
     try:
         return float(fraction_of(said) if isinstance(said, str) else said)
     except (ValueError, ZeroDivisionError):
-        raise AnimationError(f"fps is {shown(said)}", 'give a number, or "30000/1001"') from None
+        raise AnimationError(f"fps is {quote(said)}", 'give a number, or "30000/1001"') from None
 
 
 def _poses(one: _Object) -> tuple[Array, Array]:
@@ -121,7 +121,7 @@ def _whole(name: str, position: Array, turn: Array, frames: int) -> tuple[Array,
     for what, rows in (("position", position), ("quaternion_xyzw", turn)):
         if len(rows) not in (1, frames):
             raise AnimationError(
-                f"{shown(name)}: {what} has {len(rows)} rows, others {frames}", "give one a frame, or one for all"
+                f"{quote(name)}: {what} has {len(rows)} rows, others {frames}", "give one a frame, or one for all"
             )
     return np.broadcast_to(position, (frames, 3)), np.broadcast_to(turn, (frames, 4))
 
@@ -130,7 +130,7 @@ def _object(one: _Object, position: Array, turn: Array, folder: Path, unit: floa
     given = [x for x in (one.mesh, one.sphere_m, one.box_m, one.cylinder_m) if x is not None]
     if len(given) != 1:
         raise AnimationError(
-            f"{shown(one.name)} has {len(given)} shapes", "give one of mesh, sphere_m, box_m, cylinder_m"
+            f"{quote(one.name)} has {len(given)} shapes", "give one of mesh, sphere_m, box_m, cylinder_m"
         )
     mesh: tuple[Array, Array] | None = None
     shapes: tuple[Shape, ...] = ()
@@ -153,7 +153,7 @@ def _mesh(one: _Object, folder: Path) -> tuple[Array, Array]:
 
     if isinstance(one.mesh, str):
         if Path(one.mesh).is_absolute() or ".." in Path(one.mesh).parts:
-            raise AnimationError(f"mesh {shown(one.mesh)} lies outside the animation's folder", "copy it beside it")
+            raise AnimationError(f"mesh {quote(one.mesh)} lies outside the animation's folder", "copy it beside it")
         surfaces = read_surfaces(folder / one.mesh)
         offset = np.cumsum([0] + [len(vertex) for vertex, _ in surfaces])[:-1]
         return np.concatenate([v for v, _ in surfaces]), np.concatenate(
@@ -162,7 +162,7 @@ def _mesh(one: _Object, folder: Path) -> tuple[Array, Array]:
     assert one.mesh is not None
     vertex, face = np.array(one.mesh.vertices, float).reshape(-1, 3), np.array(one.mesh.faces, np.int64).reshape(-1, 3)
     if face.size and (face.min() < 0 or face.max() >= len(vertex)):
-        raise AnimationError(f"{shown(one.name)}: a face names no vertex", "vertices count from 0")
+        raise AnimationError(f"{quote(one.name)}: a face names no vertex", "vertices count from 0")
     return vertex, face
 
 

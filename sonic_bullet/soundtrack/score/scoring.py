@@ -19,7 +19,7 @@ from sonic_bullet.files import check_sr
 from sonic_bullet.listener.animated import AnimatedBody, PoseStage
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.records import Array, Shape
-from sonic_bullet.records.coerce import as_number, as_path, shown
+from sonic_bullet.records.coerce import as_number, as_path, quote
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
 from sonic_bullet.runtime.replay import render_notes
 from sonic_bullet.scene import RenderResult, render_scene
@@ -225,7 +225,7 @@ def _check_fall(animation: Animation, noise_m: float | None) -> tuple[str, ...]:
 
 
 def _driven_notes(bodies: Sequence[AnimatedBody]) -> tuple[str, ...]:
-    names = [shown(one.name) for one in bodies if one.driven]
+    names = [quote(one.name) for one in bodies if one.driven]
     return (f"{', '.join(names[:8])} moved by hand: what it pushes is heard, not what pushes it",) if names else ()
 
 
@@ -240,7 +240,7 @@ def _noise_notes(animation: Animation, noise_m: float | None) -> tuple[str, ...]
         return ()
     return (
         f"poses are good to {noise_m * 1e6:.3g} µm: impacts below {speed:.2g} m/s ({worst[0] * 1e3:.2g} mN s of "
-        f"{shown(worst[1])}) are hidden in that and not played",
+        f"{quote(worst[1])}) are hidden in that and not played",
     )
 
 
@@ -265,7 +265,7 @@ def _turn_notes(animation: Animation, hidden: Array) -> tuple[str, ...]:
         k = int(turn.argmax())
         slow, fast = turn[k] / (2 * np.pi) * animation.fps, (1 - turn[k] / (2 * np.pi)) * animation.fps
         said.append(
-            f"{animation.fps:g} frames a second hide how {shown(animation.bodies[i].name)} turns: from frame {k} to "
+            f"{animation.fps:g} frames a second hide how {quote(animation.bodies[i].name)} turns: from frame {k} to "
             f"{k + 1} it is {slow:.3g} turns a second one way, or {fast:.3g} the other, or more; of what touches it "
             f"meanwhile only what changes the way of its centre is played. Bake at {4 * fast:.0f} frames a second or "
             "more"

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sonic_bullet.listener.animated import PoseStage, Shot, rotation
+from sonic_bullet.listener.animated import PoseStage, Rollout, rotation
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import whitening
@@ -30,7 +30,7 @@ class _Try:
 
     speed: Array
     restitution: Array
-    shot: Shot
+    shot: Rollout
     residual: Array
 
     def cost(self, island: Array) -> float:
@@ -77,7 +77,7 @@ class Shooting:
 
     def find_steps(self, found: list[tuple[Array, Array]], progress: Callable[[float], None] | None = None) -> None:
         """Append MOTION (b,) and loaded RAW rows of each step."""
-        before: Shot | None = None
+        before: Rollout | None = None
         owed = np.zeros_like(self._prior)
         for k in range(len(self._motion) - 1):
             best = self._searched(k)
@@ -107,7 +107,7 @@ class Shooting:
         within = self._animation.free & (np.maximum(away, self._gyration_m * turned) < hidden)
         return np.where(within, end, pose)
 
-    def _corrected(self, shot: Shot, missing: Array) -> list[tuple[Array, Array]]:
+    def _corrected(self, shot: Rollout, missing: Array) -> list[tuple[Array, Array]]:
         """Scale the impulses of a frame's steps, each strike by its own factor.
 
         The speed (b, 6) with which the next frame began beyond that with which this one ended also came from its
@@ -165,7 +165,7 @@ class Shooting:
                 for name in self.FORCE_ROWS:
                     raws[number][name][row] *= mean / load[number]
 
-    def _strikes(self, shot: Shot) -> dict[tuple[int, int, int], list[tuple[int, int]]]:
+    def _strikes(self, shot: Rollout) -> dict[tuple[int, int, int], list[tuple[int, int]]]:
         """List (step, row) of a pair's loaded places in steps without a pause, by pair and first step."""
         found: dict[tuple[int, int, int], list[tuple[int, int]]] = {}
         last: dict[tuple[int, int], tuple[int, int]] = {}  # first step, and latest, of a pair

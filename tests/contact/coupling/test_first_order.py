@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring, first_order
-from sonic_bullet.contact.coupling.first_order import likest
+from sonic_bullet.contact.coupling.first_order import assign_columns
 from sonic_bullet.records import Array
 from tests.made.newton import newton_modes
 
@@ -85,9 +85,9 @@ def test_reciprocity_of_what_passes() -> None:
 
 def test_each_mode_goes_on_as_the_one_that_is_most_like_it() -> None:
     share = np.array([[0.6, 0.3, 0.1], [0.9, 0.05, 0.02], [0.3, 0.2, 0.4]])
-    assert likest(share).tolist() == [1, 0, 2]
+    assert assign_columns(share).tolist() == [1, 0, 2]
     turned: Array = np.eye(30)[np.random.default_rng(0).permutation(30)]
-    assert (turned[np.arange(30), likest(turned)] == 1).all()
+    assert (turned[np.arange(30), assign_columns(turned)] == 1).all()
 
 
 def test_what_passes_is_reciprocal_mode_by_mode() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from sonic_bullet.listener.animated import AnimatedBody, Shot, matrices, rotation
+from sonic_bullet.listener.animated import AnimatedBody, Rollout, matrices, rotation
 from sonic_bullet.listener.frames import LINK_STATE, Motion, turned
 from sonic_bullet.listener.polling import NO_RAW, RAW
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect
@@ -170,7 +170,7 @@ class AnimatedStage:
 
     def shoot(
         self, start: Array, end: Array, steps: int, dt_s: float, restitution: Array, *, polled: bool = False
-    ) -> Shot:
+    ) -> Rollout:
         """Simulate from a start, see PoseStage."""
         cid, many = self.client_id, len(self.ids)
         self.hold(True)
@@ -197,7 +197,7 @@ class AnimatedStage:
             raws.append(raw)
         late = self._struck_late(motion, loaded, dt_s, polled)
         raws[-1] = np.concatenate([raws[-1], late[0]])
-        return Shot(motion, tuple(raws), touching | late[1])
+        return Rollout(motion, tuple(raws), touching | late[1])
 
     def _loaded(self, points: Sequence[tuple[Any, ...]]) -> Array:
         """Return the pairs (b, b) that exchange a force."""

@@ -20,14 +20,14 @@ Place = tuple[int, Path | None]
 
 
 @dataclass(slots=True, eq=False)
-class PutBack:
+class Substitution:
     """A `Plan` that gives places of pairs A's arguments."""
 
     pairs: Sequence[CallPair]
     chosen: frozenset[Place]
     _next: int = field(default=0)
 
-    def instead(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
+    def ahead_of(self, call: Call) -> tuple[list[Call], Mapping[str, Any] | None]:
         """Return calls of A before a call of B, and its substituted arguments, see `Plan`."""
         if call.who is not None and call.who.side == "a":  # B's own loop finds a body of A: its calls are made anyway
             return [], None
@@ -45,7 +45,7 @@ class PutBack:
         made = with_leaves(call.arguments, changed)
         return first, made if pair.a is not None or _asks(made) else None
 
-    def behind(self, step: int, name: str | None = None) -> list[Call]:
+    def remaining(self, step: int, name: str | None = None) -> list[Call]:
         """Return the remaining calls of A in a step, see `Plan`."""
         end = self._next
         while end < len(self.pairs) and self.pairs[end].step <= step:

@@ -20,7 +20,7 @@ from sonic_bullet.records.errors import FileError, SceneError, SceneWarning
 from sonic_bullet.storage.spooled_sound import SoundSpool
 
 
-class KeptRun:
+class RunRecorder:
     """The log, its events, and unread frames of so many channels.
 
     Attributes

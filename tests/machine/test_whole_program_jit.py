@@ -37,7 +37,7 @@ import os, sys
 from multiprocessing import get_context
 from numba import float64, int64
 from package.kernels import scaled, total
-from sonic_bullet.machine.linked_once import name_apart, take_in, write, written
+from sonic_bullet.machine.whole_program_jit import name_apart, take_in, write, written
 
 def work(pipe):
     name_apart()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 
-from sonic_bullet.machine.while_alive import WhileAlive
+from sonic_bullet.machine.identity_cache import WhileAlive
 
 
 class Thing:

@@ -174,7 +174,7 @@ def _undisturbed() -> Iterator[None]:
             gc.enable()
 
 
-def linked_once(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+def whole_program_jit(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Make the function a kernel; its ``part`` is what kernels call.
 
     Raises whatever numba's inner parts raise where they have changed.

@@ -1,6 +1,6 @@
 """Bodies that are to sound: arguments, checked, and their modes, computed side by side where there are several.
 
-    add's arguments -> WantedBody, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
+    add's arguments -> BodyRequest, nothing changed yet -> solved_bodies -> a modal model a link, its radiation known
 
 Two processes fill the cache, each taking the next job: modes and radiation of a link, and the machine code of run time
 and listener, which a first scene needs as well. They share nothing but cache entries. All bodies are then solved in
@@ -29,7 +29,7 @@ from sonic_bullet.machine.progress import says_so
 from sonic_bullet.parallel import one_thread, parallel_map, said_here
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
-from sonic_bullet.records.coerce import as_kind, as_number, check_options, shown
+from sonic_bullet.records.coerce import as_kind, as_number, check_options, quote
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeWarning, SonicBulletError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -44,7 +44,7 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WantedBody:
+class BodyRequest:
     """A body and those links of it that are to sound.
 
     Parameters
@@ -72,10 +72,10 @@ class WantedBody:
     mounting: Mounting | None = None
 
 
-def wanted_cast(world: World, cast: object, names: Iterable[str]) -> list[WantedBody]:
+def wanted_cast(world: World, cast: object, names: Iterable[str]) -> list[BodyRequest]:
     """Convert a cast, of whose entries ``names`` are the keywords; raises SceneError for what is no mapping."""
     if not isinstance(cast, Mapping):
-        raise SceneError(f"cast is {shown(cast)}", "give a dict from bodies to materials")
+        raise SceneError(f"cast is {quote(cast)}", "give a dict from bodies to materials")
     found = []
     for who, how in cast.items():
         if absent(who):
@@ -99,7 +99,7 @@ def wanted_body(
     name: str | None = None,
     mounting: str | float | None = None,
     **options: Any,
-) -> WantedBody:
+) -> BodyRequest:
     """Check the arguments of `Listener.add`; raises what it raises. options: of modal.ModalOptions."""
     made = as_material(material)
     if roughness_m is not None:
@@ -117,7 +117,7 @@ def wanted_body(
         with _naming(label, len(links)):
             parts.append((label, world.shapes_of(number, one) if given is None else given))
     held = None if mounting is None else as_mounting(mounting, error=SceneError)
-    return WantedBody(number, links, tuple(parts), made, asked, model, names, given is not None, held)
+    return BodyRequest(number, links, tuple(parts), made, asked, model, names, given is not None, held)
 
 
 def _names(world: World, body: int, links: Sequence[int], name: str, every: bool) -> Iterator[str]:
@@ -126,7 +126,7 @@ def _names(world: World, body: int, links: Sequence[int], name: str, every: bool
         yield f"{name}/{world.link_name(body, link)}" if every and link >= 0 else name
 
 
-def checked(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
+def checked(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:
     """Return the bodies to be added, as the run's hook has them.
 
     Raises
@@ -142,7 +142,7 @@ def checked(world: World, wanted: Sequence[WantedBody]) -> Sequence[WantedBody]:
         for link, name in zip(one.links, one.names, strict=bool(one.names)):
             body, other = bearer.setdefault(name, (one.body, link))
             if (body, other) != (one.body, link):
-                raise SceneError(f"the name {shown(name)} is that of body {body}{link_words(other)}", "give another")
+                raise SceneError(f"the name {quote(name)} is that of body {body}{link_words(other)}", "give another")
     return wanted
 
 
@@ -162,7 +162,7 @@ def _naming(link: str, of: int) -> Iterator[None]:
 @says_so(text="progress")
 def solved_bodies(
     world: World,
-    wanted: Sequence[WantedBody],
+    wanted: Sequence[BodyRequest],
     known: Iterable[ModalModel],
     air: Air | None,
     *,
@@ -195,9 +195,9 @@ def solved_bodies(
 
 def enter_bodies(
     world: World,
-    wanted: Sequence[WantedBody],
+    wanted: Sequence[BodyRequest],
     models: Sequence[Sequence[ModalModel]],
-    asked: Sequence[WantedBody],
+    asked: Sequence[BodyRequest],
 ) -> list[tuple[ModalModel, ...]]:
     """Add links with their models to the world; return the models of each body in ``asked``, in turn."""
     for one in wanted:  # all given names first, as default names are numbered
@@ -214,7 +214,7 @@ def enter_bodies(
     return [tuple(islice(each, len(one.links))) for one in asked]
 
 
-def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
+def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[ModalModel]]) -> Iterator[str]:
     """Yield a line for each link larger than anything that is struck to sound."""
     remedy = "load it with globalScaling=0.001, or give its mesh in metres, if its numbers are millimetres"
     for one, mine in zip(wanted, models, strict=True):
@@ -223,7 +223,7 @@ def oversize_notes(wanted: Sequence[WantedBody], models: Sequence[Sequence[Modal
                 yield f"{name} {large}; {remedy}"
 
 
-def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:
+def _solved(one: BodyRequest, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:
     """Compute the models of a body's links; check all and mesh the most intricate first, to fail early."""
     from sonic_bullet import modal
 
@@ -244,7 +244,7 @@ def _solved(one: WantedBody, known: Sequence[ModalModel], say: Say) -> list[Moda
     return [models[i] for i in range(len(one.parts))]
 
 
-def _analysed(shapes: tuple[Shape, ...], one: WantedBody, say: Say) -> ModalModel:
+def _analysed(shapes: tuple[Shape, ...], one: BodyRequest, say: Say) -> ModalModel:
     return analyse_body(shapes, one.material, **asdict(one.options), progress=say)
 
 
@@ -262,11 +262,11 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(world: World, wanted: Sequence[WantedBody], air: Air | None, say: Say) -> None:
+def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None, say: Say) -> None:
     """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
     missing, say_here, say = _missing(wanted), say, said_here(say)
 
-    def solve(number: int, name: str, shapes: tuple[Shape, ...], one: WantedBody) -> None:
+    def solve(number: int, name: str, shapes: tuple[Shape, ...], one: BodyRequest) -> None:
         head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
         model = _analysed(shapes, one, lambda text: say(f"{head}: {text}"))
         if air is not None and model.mode_count:
@@ -291,11 +291,11 @@ def _done(job: Callable[[], None]) -> None:
         job()
 
 
-def _missing(wanted: Sequence[WantedBody]) -> list[tuple[str, tuple[Shape, ...], WantedBody]]:
+def _missing(wanted: Sequence[BodyRequest]) -> list[tuple[str, tuple[Shape, ...], BodyRequest]]:
     """List links whose modes are not cached, each once, most triangles first; none where one cannot be meshed."""
     from sonic_bullet import modal
 
-    found: dict[str, tuple[str, tuple[Shape, ...], WantedBody]] = {}
+    found: dict[str, tuple[str, tuple[Shape, ...], BodyRequest]] = {}
     size: dict[str, int] = {}
     try:
         for one in wanted:
