@@ -18,8 +18,8 @@ import re
 import numpy as np
 
 from sonic_bullet.bake.baked_model import BakedModel
-from sonic_bullet.bake.strike_playback import NODES_PER_SAMPLE, TAP, pressure_of
-from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
+from sonic_bullet.bake.strike_playback import TAP, pressure_of
+from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.records import Array
 from sonic_bullet.storage.atomic import replacing
 
@@ -33,7 +33,7 @@ RESERVED = frozenset(
 
 BANK = """\
 #define NAME_PULSES 8
-typedef struct { double at, spacing, sum; int node, nodes, point; double j[3]; } NAME_pulse; /* nodes 0: free */
+typedef struct { double at, spacing, length, sum; int node, nodes, point; double j[3]; } NAME_pulse; /* nodes 0: free */
 typedef struct {
     double sr, re[NAME_MODES], im[NAME_MODES], turn_re[NAME_MODES], turn_im[NAME_MODES];
     NAME_pulse pulse[NAME_PULSES];
@@ -51,6 +51,11 @@ static void NAME_init(NAME_bank *b, double sr)
     }
 }
 
+static double NAME_force(const NAME_pulse *p, int node)
+{
+    return fmax(sin(NAME_PI * (node + 0.5) * p->spacing / p->length), 0);
+}
+
 /* Impulse j in N s at a point, as a half-sine of contact_s seconds from the next sample on; 0 where none is free. */
 static int NAME_strike(NAME_bank *b, int point, double jx, double jy, double jz, double contact_s)
 {
@@ -59,10 +64,11 @@ static int NAME_strike(NAME_bank *b, int point, double jx, double jy, double jz,
         NAME_pulse *p = &b->pulse[k];
         if (p->nodes) continue;
         double length = fmax(contact_s * b->sr, NAME_SHORTEST);
-        p->nodes = (int)fmax(NAME_NODES, ceil(NAME_PER_SAMPLE * length));
-        p->spacing = length / p->nodes; p->at = p->spacing / 2; p->node = 0; p->point = point;
+        double cells = fmax(NAME_PER_SAMPLE, ceil(NAME_NODES / length)); /* of a sample, a node in the middle of each */
+        p->nodes = (int)ceil(cells * length); p->length = length;
+        p->spacing = 1 / cells; p->at = p->spacing / 2; p->node = 0; p->point = point;
         p->j[0] = jx; p->j[1] = jy; p->j[2] = jz; p->sum = 0;
-        for (int i = 0; i < p->nodes; i++) p->sum += sin(NAME_PI * (i + 0.5) / p->nodes);
+        for (int i = 0; i < p->nodes; i++) p->sum += NAME_force(p, i);
         return 1;
     }
     return 0;
@@ -81,7 +87,7 @@ static void NAME_render(NAME_bank *b, float *out, int n)
         for (int k = 0; k < NAME_PULSES; k++) {
             NAME_pulse *p = &b->pulse[k];
             for (; p->node < p->nodes && p->at <= 0; p->node++, p->at += p->spacing) {
-                double part = sin(NAME_PI * (p->node + 0.5) / p->nodes) / p->sum;
+                double part = NAME_force(p, p->node) / p->sum;
                 for (int m = 0; m < NAME_MODES; m++) {
                     if (NAME_freq_hz[m] >= b->sr / 2) continue;
                     const float *s = &NAME_shape[3 * (m * NAME_POINTS + p->point)];

@@ -1,7 +1,7 @@
 """One strike of a baked body, as the run time's bank plays it: the reference for every format.
 
-    F(t) = J π/2τ sin(πt/τ),  0 < t < τ            half-sine pulse, as impulses at nodes u_j = (j + ½) τ/N
-        N = 24, or two a sample where that is more [bank: strike_pool]
+    F(t) = J π/2τ sin(πt/τ),  0 < t < τ            half-sine pulse, as impulses at nodes u_j = (j + ½)/c
+        c cells a sample: two, or as many as give the pulse 24 [bank: strike_pool]
     z(t) = Σ_{u_j ≤ t} (1 + i d/ω) φ(p)·j J_j e^{(-d + iω)(t - u_j)},   p(t) = Re Σ pressure·z     at 1 m, in Pa
 
 It has no travel time, no click of the rigid body and no residual: the modes alone, mean over directions.
@@ -17,14 +17,12 @@ import numpy as np
 from sonic_bullet.bake.baked_model import BakedModel
 from sonic_bullet.bake.mode_importance import SLOWEST_PER_S
 from sonic_bullet.bank import audible
-from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, SHORTEST_PULSE
+from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, NODES_PER_SAMPLE, SHORTEST_PULSE
 from sonic_bullet.geometry import closest_point
 from sonic_bullet.records import Air, Array, ModalModel, frozen_array
 from sonic_bullet.records.arrays import require, store
 from sonic_bullet.records.coerce import as_number, as_whole
 from sonic_bullet.records.errors import ModalError
-
-NODES_PER_SAMPLE = 2
 
 
 class _Tap(NamedTuple):
@@ -217,7 +215,7 @@ def pulse_nodes(length: float) -> tuple[Array, Array]:
     By the module's first equation.
     """
     length = max(length, SHORTEST_PULSE)
-    count = max(NODES_PER_PULSE, int(np.ceil(NODES_PER_SAMPLE * length)))
-    share = (np.arange(count) + 0.5) / count
-    force = np.sin(np.pi * share)
-    return share * length, force / force.sum()
+    cells = max(NODES_PER_SAMPLE, int(np.ceil(NODES_PER_PULSE / length)))
+    node = (np.arange(int(np.ceil(cells * length))) + 0.5) / cells
+    force = np.maximum(np.sin(np.pi * node / length), 0.0)
+    return node, force / force.sum()

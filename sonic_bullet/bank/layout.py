@@ -72,16 +72,16 @@ RINGING = np.dtype(
 
 BANK_STRIKE = np.dtype(
     [
-        ("start", "f8"),  # absolute time of the pulse, of its first node; in samples
-        ("node_start", "f8"),
+        ("start", "f8"),  # absolute time of the pulse, in samples
         ("length", "f8"),  # in samples
         ("flat", "i8"),  # half-sine, not Hertz'
         ("next", "i8"),  # slot of the body's next strike, -1 for none
         ("modal", "i8"),  # 1 while nodes are to come
         ("count", "i8"),  # nodes
         ("force_sum", "f8"),  # of the pulse at all of them
+        ("ahead", "f8"),  # how far after the edge of its first cell it starts
         ("spacing", "f8"),  # δ in samples
-        ("whole", "i8"),  # ⌊1/δ⌋
+        ("whole", "i8"),  # 1/δ
         ("first", "i8"),  # sample at or after the first node
         ("within", "i8"),  # nodes up to it
         ("upcoming", "i8"),  # next node

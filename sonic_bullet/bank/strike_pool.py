@@ -3,12 +3,14 @@
     modes: nodes u_j = u_0 + jδ, impulses J_j = F(u_j)/Σ F:   at each sample n the driven state gains
         r_n Σ J_j D^(last - j)   over the nodes in (n-1, n]
         D = e^{sδ},   r_n = g (1 + i d/ω) e^{s(n - u_last)},   r_{n+1} = r_n e^{s(1 - kδ)},
-            k = nodes in (n, n+1] = ⌊1/δ⌋ or one more
+            k = nodes in (n, n+1] = 1/δ
+        the middles of cells of the sample grid: at a sample all of the pulse has acted that is over, and no more, so
+        that what is slow moves a fast mode by its slope alone:   Σ_k e^{iωδ(k + 1/2)} = i/(2 sin(ωδ/2)),   no real part
     so each mode needs four phasors (r, D and the two turns of r), computed once, and no exponential at run time
     translations: `translation`
 
 Impulses are evaluated as they fall due, from the pulse's own shape; only their sum is known before. Times in samples, s
-per sample. A body's strikes are linked in order of their first node, then of arrival: which ends first changes no sum.
+per sample. A body's strikes are linked in order of their start, then of arrival: which ends first changes no sum.
 free: how many rows of the pool are free, then their numbers.
 """
 
@@ -26,6 +28,7 @@ from sonic_bullet.machine.vector import At
 from sonic_bullet.records import Array
 
 NODES_PER_PULSE = 24
+NODES_PER_SAMPLE = 2
 SHORTEST_PULSE = 1e-12
 """Shortest length of a pulse, in samples; shorter ones get it."""
 
@@ -53,7 +56,9 @@ class BodyPulse(NamedTuple):
 
 @uncounted
 def pulse_force(share, flat, hertz):  # pragma: no cover - compiled
-    """Interpolate the force at a fraction of the pulse in [0, 1], mean 1. hertz: table of `pulse_shape`."""
+    """Interpolate the force at a fraction of the pulse, mean 1, and 0 outside [0, 1]. hertz: table of `pulse_shape`."""
+    if not 0.0 <= share <= 1.0:
+        return 0.0
     if flat:
         return 0.5 * np.pi * np.sin(np.pi * share)
     cells = hertz.shape[1] - 1
@@ -81,17 +86,13 @@ def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
     slot = free[free[0]]
     free[0] -= 1
     length = max(pulse.length, SHORTEST_PULSE)
-    count = max(NODES_PER_PULSE, int(np.ceil(2.0 * length)))
-    delta = length / count
-    node_start = pulse.start + 0.5 * delta
     strikes[slot].start = pulse.start
-    strikes[slot].node_start = node_start
     strikes[slot].length = length
     strikes[slot].flat = pulse.flat
     strikes[slot].modal = 1 if modal else 0
     strikes[slot].rigid = 1 if rigid else 0
     if modal:
-        _enter_nodes(slot, b, at, count, delta, pulse, bank)
+        _enter_nodes(slot, b, at, pulse, bank)
     if rigid:
         _enter_cells(slot, b, bank)
         for axis in range(3):
@@ -101,18 +102,26 @@ def enter_strike(b, pulse, at, bank):  # pragma: no cover - compiled
 
 
 @uncounted
-def _enter_nodes(slot, b, at, count, delta, pulse, bank):  # pragma: no cover - compiled
+def _enter_nodes(slot, b, at, pulse, bank):  # pragma: no cover - compiled
+    """Divide the pulse into cells of the sample grid, with a node in the middle of each."""
     at_once = 1e-3  # Samples: a shorter pulse acts whole at the first sample that any of it has come to
     strike = bank.strikes[slot]
-    total = 0.0
-    for i in range(count):
-        total += pulse_force((i + 0.5) / count, strike.flat, bank.hertz)
-    first = max(int(np.ceil(strike.node_start)), at)
-    within = count - 1
     if strike.length > at_once:
-        within = min(int(np.floor((first - strike.node_start) / delta)), within)
-    phase = max((first - strike.node_start) - within * delta, 0.0)
-    whole = int(np.floor(1.0 / delta))
+        whole = max(NODES_PER_SAMPLE, int(np.ceil(NODES_PER_PULSE / strike.length)))
+        begin = int(np.floor(strike.start * whole))
+        count = int(np.ceil((strike.start + strike.length) * whole)) - begin
+        delta, edge = 1.0 / whole, begin / whole
+        first = max(int(np.ceil(edge + 0.5 * delta)), at)
+        within = min(first * whole - begin, count) - 1
+    else:
+        count, edge = NODES_PER_PULSE, strike.start
+        delta = strike.length / count
+        whole, within = int(np.floor(1.0 / delta)), count - 1
+        first = max(int(np.ceil(edge + 0.5 * delta)), at)
+    strike.ahead, total = strike.start - edge, 0.0
+    for i in range(count):
+        total += pulse_force(((i + 0.5) * delta - strike.ahead) / strike.length, strike.flat, bank.hertz)
+    phase = max((first - (edge + 0.5 * delta)) - within * delta, 0.0)
     strike.count, strike.spacing, strike.whole, strike.force_sum = count, delta, whole, total
     strike.first, strike.within, strike.upcoming, strike.phase = first, within + 1, 0, phase
     width = bank.rows.shape[2]
@@ -149,7 +158,7 @@ def _link(slot, b, bank):  # pragma: no cover - compiled
     """Put a strike behind those of its body that start before it or with it."""
     ringing, strikes = bank.ringing, bank.strikes
     before, after = -1, ringing[b].strike
-    while after >= 0 and strikes[after].node_start <= strikes[slot].node_start:
+    while after >= 0 and strikes[after].start <= strikes[slot].start:
         before, after = after, strikes[after].next
     strikes[slot].next = after
     if before < 0:
@@ -211,7 +220,8 @@ def plan_nodes(slot, at, count, bank, plan, due, final):  # pragma: no cover - c
         real = min(nodes, strike.count - upcoming)
         plan[k, 1], plan[k, 2] = real, nodes - real
         for i in range(upcoming, upcoming + real):
-            due[filled] = pulse_force((i + 0.5) / strike.count, strike.flat, bank.hertz) / strike.force_sum
+            share = ((i + 0.5) * strike.spacing - strike.ahead) / strike.length
+            due[filled] = pulse_force(share, strike.flat, bank.hertz) / strike.force_sum
             filled += 1
         upcoming += real
         k += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.bank.strike_pool import NODES_PER_PULSE
+from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, NODES_PER_SAMPLE
 from sonic_bullet.contact.pulse_shape import cumulated, pulse_table
 from sonic_bullet.records import Array
 
@@ -14,14 +14,20 @@ def cumulated_force(s: Array, *, flat: bool = False) -> Array:
     return np.array([cumulated(one, pulse_table(), flat) for one in np.asarray(s, float)])
 
 
-def pulse_nodes(tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, float, Array]:
-    """The pulse as equidistant micro-impulses: time of the first after the strike's start in s, spacing in s, weights
-    (count,), sum 1: midpoints of at least 24 cells, none longer than half a sample.
+def pulse_nodes(start: float, tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, float, Array]:
+    """The pulse as equidistant micro-impulses: place of the first and spacing in samples, weights (count,), sum 1.
+
+    They stand in the middles of `pulse_cells`, two a sample at least; within the pulse where it is next to nothing.
     """
-    count = max(NODES_PER_PULSE, int(np.ceil(2 * sr * tau_s)))
-    s = (np.arange(count) + 0.5) / count
-    force = np.sin(np.pi * s) if flat else np.interp(s, np.linspace(0, 1, pulse_table().shape[1]), pulse_table()[1])
-    return tau_s / count / 2, tau_s / count, force / force.sum()
+    if sr * tau_s > 1e-3:
+        first, spacing, part = pulse_cells(start, tau_s, sr, NODES_PER_SAMPLE, flat=flat)
+    else:
+        spacing = sr * tau_s / NODES_PER_PULSE
+        first, part = start + spacing / 2, np.zeros(NODES_PER_PULSE)
+    s = (first - start + spacing * np.arange(len(part))) / (sr * tau_s)
+    hertz = np.interp(s, np.linspace(0, 1, pulse_table().shape[1]), pulse_table()[1], left=0, right=0)
+    force = np.where((s >= 0) & (s <= 1), np.sin(np.pi * s), 0.0) if flat else hertz
+    return first, spacing, force / force.sum()
 
 
 def pulse_cells(start: float, tau_s: float, sr: int, least: int, *, flat: bool = False) -> tuple[float, float, Array]:

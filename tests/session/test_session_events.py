@@ -181,7 +181,8 @@ def test_a_log_of_an_earlier_version_replays_as_before() -> None:
     The air beside them is solved in single precision, whose last bits are a processor's: to 1e-7. The microphone's row
     was made anew when the phase at which a mode radiates ceased to hang on one direction, and both when the fourth of
     its five strikes, found a step late, was no longer set on the step's edge. Both again, by 0.5 % and 3e-6 of their
-    peaks, when the air was solved at each mode's own pitch; and when strikes below 20 µs were no longer lengthened.
+    peaks, when the air was solved at each mode's own pitch; when strikes below 20 µs were no longer lengthened; and, by
+    0.1 % of the microphone's peak, when a pulse's nodes came to lie on the grid of samples.
     """
     folder = Path(__file__).parents[1] / "data"
     log = sb.read_log(str(folder / "falling.npz"))
