@@ -2,6 +2,7 @@
 
 a free box, its material's axes its own  -> polynomials (polynomials.py)
 a free isotropic body of revolution      -> a Fourier series around its axis (revolution/)
+a free sheet, very thin or many-sided     -> wedges, one layer of them (sheets/)
 everything else                          -> tetrahedra (first_elements.py, elements.py)
 
 `converged` refines any of them to the accuracy asked for.
@@ -38,11 +39,14 @@ def chosen(
     from sonic_bullet.modal.first_elements import filled
     from sonic_bullet.modal.meshing.shape_meshes import check_fillable
     from sonic_bullet.modal.revolution import fourier
+    from sonic_bullet.modal.sheets import sheet_elements
 
     if len(shapes) == 1 and edge_m is None and thickness_m is None and not len(clamp):
         check_fillable(shapes, None)
-        found = polynomials.method_for(shapes[0], length_m, tensor, wanted) or fourier.method_for(
-            shapes[0], length_m, tensor, wanted
+        found = (
+            polynomials.method_for(shapes[0], length_m, tensor, wanted)
+            or fourier.method_for(shapes[0], length_m, tensor, wanted)
+            or sheet_elements.method_for(shapes[0], length_m, tensor, wanted)
         )
         if found is not None:
             return found

@@ -1,6 +1,7 @@
 """Child process that runs Netgen [Schöberl 1997]: it can hang, grow or abort, and must not take the parent with it.
 
     python _netgen.py IN.npz OUT.npz     IN: vertex, face, edge, point, size, memory (bytes), seconds
+                                         and skin, where triangles of the surface are wanted, no tetrahedra
 
 One thread, so that the same surface has the same tetrahedra, whatever else the machine does. It imports numpy only, so
 that starting it is cheap.
@@ -51,7 +52,13 @@ def main() -> None:
     wanted = netgen.meshing.MeshingParameters(maxh=float(given["edge"]), grading=grading, closeedgefac=None)
     for (x, y, z), size in zip(given["point"], given["size"], strict=True):
         wanted.RestrictH(x, y, z, size)
-    mesh = netgen.stl.STLGeometry(str(file)).GenerateMesh(wanted)
+    mesh = netgen.stl.STLGeometry(str(file)).GenerateMesh(
+        wanted, **({"perfstepsend": netgen.meshing.MeshingStep.MESHSURFACE} if "skin" in given else {})
+    )
+    if "skin" in given:
+        face = mesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.int64) - 1
+        np.savez(target, node=np.array(mesh.Coordinates()), face=face)
+        return
     tet = mesh.Elements3D().NumPy()["nodes"][:, :4].astype(np.int64) - 1
     np.savez(target, node=np.array(mesh.Coordinates()), tet=tet)
 

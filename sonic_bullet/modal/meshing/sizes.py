@@ -33,7 +33,6 @@ def edge_within_m(volume_m3: float, thickness_m: float, tets: float) -> float:
 
 def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Array]:
     """Find points (k, 3) of a closed surface whose bent walls need elements below edge_m, and their size (k,)."""
-    most_along = 40  # points at which a size is given, along a face's longest side
     least_edge = 0.25  # of the wanted edge: where the surface is bent as sharply as a crease
     curvature = np.abs(geometry.face_curvature(vertex_m, face))
     wall = wall_m(vertex_m, face)
@@ -42,15 +41,20 @@ def curved_sizes(vertex_m: Array, face: Array, edge_m: float) -> tuple[Array, Ar
     curved_factor = 1.5
     size = np.maximum(curved_factor * np.sqrt(wall / np.maximum(curvature, 1e-300)), least_edge * edge_m)
     bent = np.flatnonzero(size < edge_m)
-    corner = vertex_m[face[bent]]
+    return spread(vertex_m[face[bent]], size[bent])
+
+
+def spread(corner: Array, size: Array) -> tuple[Array, Array]:
+    """Spread points (k, 3) over faces of corners (f, 3, 3), about size (f,) apart, and return each one's size (k,)."""
+    most_along = 40  # points at which a size is given, along a face's longest side
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    along = np.clip(np.ceil(longest / size[bent]), 1, most_along).astype(int)
+    along = np.clip(np.ceil(longest / size), 1, most_along).astype(int)
     points, sizes = [np.zeros((0, 3))], [np.zeros(0)]
     for count in np.unique(along):
         mine = along == count
         part = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
         points.append(np.einsum("pc,fcx->fpx", part, corner[mine]).reshape(-1, 3))
-        sizes.append(np.repeat(size[bent][mine], len(part)))
+        sizes.append(np.repeat(size[mine], len(part)))
     return np.concatenate(points), np.concatenate(sizes)
 
 
