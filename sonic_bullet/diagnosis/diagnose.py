@@ -125,19 +125,23 @@ def diagnose(
     say = progress or (lambda _: None)
     check_meshes(case, (r.object for r in case.recordings))
     recorded = choose_lines(case, gather(case, cache=cache, progress=progress, clipped=True))
-    start = baseline(case, recorded, cache=cache, progress=progress)
-    found, bodies, takes = start.found, start.bodies, start.takes
-    every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
-    end = closed(
-        start.hypothesis,
-        bodies,
-        takes or listed(bodies),
-        tuple(e for e in effects if case.medium == "unknown" or not e.traits.needs_unknown_medium),
-        case.band_hz,
-        seed=seed,
-        progress=progress,
-        against_silence=[t for t in every["holdout"] if t.body.recorded is not None],
-    )
+    known = tuple(e for e in effects if case.medium == "unknown" or not e.traits.needs_unknown_medium)
+    for by_lines in (False, True):
+        start = baseline(case, recorded, by_lines=by_lines, cache=cache, progress=progress)
+        found, bodies, takes = start.found, start.bodies, start.takes
+        every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
+        end = closed(
+            start.hypothesis,
+            bodies,
+            takes or listed(bodies),
+            known,
+            case.band_hz,
+            seed=seed,
+            progress=progress,
+            against_silence=[t for t in every["holdout"] if t.body.recorded is not None],
+        )
+        if end.added or not start.doubtful:
+            break  # else no effect makes the shape's modes meet the lines: these may be another body's
     say("comparing with what was not fitted")
     errors: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     sone: dict[str, Any] = {"before": {}, "after": {}, "floor": None}

@@ -18,6 +18,11 @@ def test_every_number_says_what_it_is() -> None:
     assert RULES.least_drop_db == 0.2 and RULES.strong_evidence == 6
 
 
+def test_what_is_derived_follows_from_the_others() -> None:
+    assert RULES.little_share == (1 - RULES.most_share) ** 2
+    assert RULES.suffices_db == RULES.most_share * RULES.band_apart_db
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [

@@ -58,11 +58,18 @@ class Baseline:
     hypothesis: Hypothesis
     takes: tuple[Take, ...]
 
+    @property
+    def doubtful(self) -> bool:
+        """Decide whether a body has a shape whose bare modes meet its lines no more than by chance."""
+        shaped = [b.recorded for b in self.bodies if b.family is not None and b.recorded is not None]
+        return any(one.signals is not None and not self.found.plays_modes(one) for one in shaped)
+
 
 def baseline(
     case: Case,
     recorded: tuple[Recorded, ...],
     *,
+    by_lines: bool = False,
     cache: Place = "default",
     progress: Callable[[str], None] | None = None,
 ) -> Baseline:
@@ -74,6 +81,8 @@ def baseline(
         The case.
     recorded : tuple of RecordedObject
         Its evidence.
+    by_lines : bool
+        Play bodies whose lines meet their modes no more than by chance by these lines, as `fit` does.
     cache : Place
         Where solved modes are kept.
     progress : callable
@@ -82,7 +91,7 @@ def baseline(
     # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
     often, mostly = 0.4, 1.05
     nearer = 0.9  # of the distance, where chains are one line each
-    plain = _of(case, recorded, cache, progress)
+    plain = _of(case, recorded, cache, progress, by_lines)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
     directions += (
         [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)]
@@ -96,7 +105,7 @@ def baseline(
         progress(
             "modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without"
         )
-    best = min((_of(case, faint, cache, None) for faint in directions), key=_off_db)
+    best = min((_of(case, faint, cache, None, by_lines) for faint in directions), key=_off_db)
     changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
     most = mostly if all(share(one.lines, LINKS[0]) > often for one in changed) else nearer
     return best if _off_db(best) < most * _off_db(plain) else plain
@@ -163,10 +172,16 @@ def _off_db(b: Baseline) -> float:
     return mean_db(found.takes, made) if isinstance(found, Compared) else np.inf
 
 
-def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Callable[[str], None] | None) -> Baseline:
+def _of(
+    case: Case,
+    recorded: tuple[Recorded, ...],
+    cache: Place,
+    progress: Callable[[str], None] | None,
+    by_lines: bool,
+) -> Baseline:
     """Build the baseline of some evidence."""
     found = fit_evidence(case, recorded, progress=progress)
-    lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g)}
+    lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g, by_lines)}
     shaped = struck_bodies(found, cache=cache, progress=progress) if len(lines) < len(recorded) else ()
     bodies = (*(body for body in shaped if body.name not in lines), *lines.values())
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
@@ -178,13 +193,14 @@ def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, progress: Call
     return Baseline(found, bodies, replace(base, correction={b.name: b.correction for b in bodies}), takes_of(bodies))
 
 
-def _shaped(found: CaseFit, one: Recorded) -> bool:
-    """Decide whether an object is modelled by the modes of its shape, as in `fit`.
+def _shaped(found: CaseFit, one: Recorded, by_lines: bool) -> bool:
+    """Decide whether an object is modelled by the modes of its shape: where strikes have places and the gain is known.
 
-    For a list of lines it is where there is a shape: frequencies depend on stiffness.
+    Bare modes may meet its lines no more than by chance: a mass or a grain moves them. Then `fit` plays lines. For a
+    list of lines it is where there is a shape: frequencies depend on stiffness.
     """
-    placed = any(r.position_m is not None for r in one.recordings)
-    return one.family is not None and (one.signals is None or (placed and found.plays_modes(one)))
+    placed = any(r.position_m is not None for r in one.recordings) and bool(np.isfinite(found.gain_sd))
+    return one.family is not None and (one.signals is None or (placed and (found.plays_modes(one) or not by_lines)))
 
 
 def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:

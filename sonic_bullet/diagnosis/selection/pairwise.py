@@ -31,7 +31,7 @@ from sonic_bullet.diagnosis.selection.exchange import again
 from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.simplest import helps
 from sonic_bullet.diagnosis.selection.thresholds import RULES
-from sonic_bullet.effects.protocol import Dereverberates
+from sonic_bullet.effects.protocol import Dereverberates, Effect
 from sonic_bullet.parallel import parallel_map
 
 
@@ -69,19 +69,7 @@ def pairwise(
     kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
     problem.say("trying two at once")
 
-    def augmented(one: Candidate) -> list[Pair]:
-        evidence = evidence_of(one.hypothesis, problem.bodies, problem.band_hz, seed=problem.seed)
-        found = []
-        for kind in kinds:
-            other = None if kind is type(one.effect) else kind.propose(evidence)
-            if other is not None:
-                h = refitted(
-                    replace(one.hypothesis, effects=(*one.hypothesis.effects, other)), problem.bodies, evidence.observed
-                )
-                found.append(Pair(h, problem.distance_db(h)))
-        return found
-
-    pairs = [pair for some in parallel_map(augmented, first) for pair in some]
+    pairs = _propose_pairs([c.hypothesis for c in first], kinds, problem)
     now = problem.score(start)
     if not pairs or min(pair.db for pair in pairs) - now.floor_db > RULES.little_share * now.gap_db:
         return None
@@ -109,32 +97,35 @@ def in_a_room(
         return None
     problem.say("hearing the room anew beside what moves modes")
 
-    def augmented(c: Candidate) -> Pair | None:
-        alone = refitted(with_effects(h, (c.effect,), problem.bodies), problem.bodies)
-        evidence = evidence_of(alone, problem.bodies, problem.band_hz, seed=problem.seed)
-        room = type(rooms[0]).propose(evidence)
-        if room is None:
-            return None
-        pair = reidentified(
-            refitted(replace(alone, effects=(c.effect, room)), problem.bodies, evidence.observed),
-            problem.bodies,
-            fully=True,
-        )
-        return Pair(pair, problem.distance_db(pair))
-
     floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
     for some in (
         [c for c in movers if not mixes_neighbours(c.effect)],
         [c for c in movers if mixes_neighbours(c.effect)],
     ):  # what hardly moves modes is asked where nothing else will do
-        best = min(
-            (pair for pair in parallel_map(augmented, some) if pair is not None), key=lambda pair: pair.db, default=None
-        )
+        alone = [refitted(with_effects(h, (c.effect,), problem.bodies), problem.bodies) for c in some]
+        best = min(_propose_pairs(alone, [type(rooms[0])], problem), key=lambda pair: pair.db, default=None)
         if best is not None and best.db - floor <= RULES.little_share * (left - floor):
             break
     else:
         return None
     return _accepted_together(best.h, problem)
+
+
+def _propose_pairs(alone: Sequence[Hypothesis], kinds: Sequence[type[Effect]], problem: DiagnosisProblem) -> list[Pair]:
+    """Propose each kind beside the effect of each hypothesis; a room's response is that of both."""
+
+    def augmented(one: Hypothesis) -> list[Pair]:
+        evidence = evidence_of(one, problem.bodies, problem.band_hz, seed=problem.seed)
+        found = []
+        for kind in kinds:
+            other = None if any(isinstance(e, kind) for e in one.effects) else kind.propose(evidence)
+            if other is not None:
+                h = refitted(replace(one, effects=(*one.effects, other)), problem.bodies, evidence.observed)
+                h = reidentified(h, problem.bodies, fully=True)
+                found.append(Pair(h, problem.distance_db(h)))
+        return found
+
+    return [pair for some in parallel_map(augmented, alone) for pair in some]
 
 
 def _accepted_together(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, list[Candidate]] | None:

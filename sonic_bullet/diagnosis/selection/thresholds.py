@@ -43,15 +43,26 @@ class Thresholds:
         0.1,
         "of what is open",
         "what closes less says the same as what was there",
-        "unknown; since bb1e1b4. A fifth moves 0 of 22 decisions",
+        "unknown; since bb1e1b4. A fifth moves 1 of 17 verdicts (draw 6203)",
     )
     little_share: float = _rule(
-        0.25, "of a gap, of a gain", "so little left is nearly nothing", "unknown; since 08f1067"
+        0.25,
+        "of a gap, of a gain",
+        "so little left is nearly nothing",
+        "derivation: (1 − most_share)², what two leave that close half of it each",
     )
     least_drop_db: float = _rule(
-        0.2, "dB", "mean gain on strikes left out, at least", "unknown; since 0d18b91. A fifth moves 0 of 22 decisions"
+        0.2,
+        "dB",
+        "mean gain on strikes left out, at least",
+        "unknown; since 0d18b91. A fifth moves 2 of 61 comparisons (draw 6203)",
     )
-    suffices_db: float = _rule(1.5, "dB", "a smaller gap is the mesh's and the shapes' own", "unknown; since f650a3c")
+    suffices_db: float = _rule(
+        1.5,
+        "dB",
+        "a smaller gap is the mesh's and the shapes' own",
+        "derivation: most_share of band_apart_db: nearer to as loud than to twice as loud; two takes differ by 2.5",
+    )
     kept_lines_share: float = _rule(
         0.8,
         "of the lines",
