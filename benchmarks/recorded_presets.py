@@ -41,7 +41,7 @@ from sonic_bullet.estimator.fit.takes.best_gain import find_best_gain
 from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.files.cases import Case, CaseRecording, read_case
 from sonic_bullet.presets import (
-    RECORDED_FOLDER,
+    FOLDERS,
     Origin,
     Preset,
     material_of,
@@ -279,7 +279,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(OBJECTS)}; all without one")
     parser.add_argument("--data", type=Path, help="folder of the sets")
-    parser.add_argument("--out", type=Path, default=RECORDED_FOLDER)
+    parser.add_argument("--out", type=Path, default=FOLDERS.recorded)
     parser.add_argument("--table", action="store_true", help="print the rows of the page of materials, make nothing")
     asked = parser.parse_args()
     if asked.table:

@@ -4,7 +4,7 @@
 
 The second process is a fork, so that only results are transferred. Items that it could not process or send are
 processed here, where their errors are raised. Where processes do not fork (Windows; macOS, whose libraries forbid it)
-or there is one core, all items are processed here. Nested calls do not fork: in this process by _INSIDE, in the other
+or there is one core, all items are processed here. Nested calls do not fork: in this process by _inside, in the other
 because it is a daemon, which may have no children. Linear algebra has one thread in each process: its own threads,
 waiting for each other on small matrices, made two processes slower than one, and the order of sums depends on the
 number of threads.
@@ -30,8 +30,8 @@ from sonic_bullet.machine.worker import end_with
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
-_INSIDE: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
-_OUT: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
+_inside: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
+_out: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
 
 
 @contextmanager
@@ -57,7 +57,7 @@ def said_here(say: Callable[[str], None]) -> Callable[[str], None]:
         return say
 
     def tell(text: str) -> None:
-        out = _OUT.get()
+        out = _out.get()
         if out is None:
             say(text)
         else:
@@ -76,7 +76,7 @@ def parallel_map(
     further item to begin.
     """
     listed = list(items)
-    if _INSIDE.get():
+    if _inside.get():
         return [do(item) for item in listed]
     with one_thread():
         return _shared(do, listed, say) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
@@ -92,7 +92,7 @@ def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ..
     held, ahead = 2, 4
     import numpy as np
 
-    if count < 2 or _INSIDE.get() or not _can_fork():
+    if count < 2 or _inside.get() or not _can_fork():
         yield from map(make, range(count))
         return
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
@@ -162,7 +162,7 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
     except OSError:  # no memory or no process to be had
         return [do(item) for item in listed]
     made: dict[int, Made] = {}
-    before = _INSIDE.set(True)
+    before = _inside.set(True)
     try:
         while (i := _next(taken)) < len(listed):
             made[i] = do(listed[i])
@@ -175,7 +175,7 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
                     made[number] = what
         return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
     finally:
-        _INSIDE.reset(before)
+        _inside.reset(before)
         other.kill()
         other.join()
         ours.close()
@@ -242,7 +242,7 @@ def _help(
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process handles it, and ends this one
     end_with(parent)
     ours.close()
-    _OUT.set(theirs)
+    _out.set(theirs)
     with suppress(OSError):  # the pipe is closed
         while os.getppid() == parent and (i := _next(taken)) < len(items):
             try:

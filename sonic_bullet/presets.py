@@ -17,7 +17,7 @@ import os
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -45,9 +45,18 @@ from sonic_bullet.storage.reading import reading
 from sonic_bullet.storage.typed_json import decode_json
 
 PRESET_FORMAT = "sonic-bullet-preset/1"
-FOLDER = Path(__file__).parent / "materials"
-RECORDED_FOLDER = FOLDER / "recorded"
-MADE_FOLDER = FOLDER / "made"
+
+
+class _Folders(NamedTuple):
+    """Folders of the presets that are shipped."""
+
+    tables: Path = Path(__file__).parent / "materials"
+    recorded: Path = tables / "recorded"
+    made: Path = tables / "made"
+
+
+FOLDERS = _Folders()
+
 _REMEDY = "give a material's name, or the path of a preset file"
 DAMPING_TAKEN = "damping (from '"
 """First words of a provenance's line on the damping that was taken from a table, without radiation, where recordings
@@ -187,23 +196,23 @@ def material_names() -> tuple[str, ...]:
 @cache
 def table_names() -> tuple[str, ...]:
     """List the names of materials whose numbers come from tables, sorted."""
-    return tuple(sorted(path.stem for path in FOLDER.glob("*.json")))
+    return tuple(sorted(path.stem for path in FOLDERS.tables.glob("*.json")))
 
 
 @cache
 def made_names() -> tuple[str, ...]:
     """List the names of materials as things are made of them: loss of measured bodies, all else from tables, sorted."""
-    return tuple(sorted(path.stem for path in MADE_FOLDER.glob("*.json")))
+    return tuple(sorted(path.stem for path in FOLDERS.made.glob("*.json")))
 
 
 @cache
 def recorded_names() -> tuple[str, ...]:
     """List the names of objects that were struck and recorded, whose presets come with the package, sorted."""
-    return tuple(sorted(path.stem for path in RECORDED_FOLDER.glob("*.json")))
+    return tuple(sorted(path.stem for path in FOLDERS.recorded.glob("*.json")))
 
 
 def _folder_of(name: str) -> Path:
-    return RECORDED_FOLDER if name in recorded_names() else MADE_FOLDER if name in made_names() else FOLDER
+    return FOLDERS.recorded if name in recorded_names() else FOLDERS.made if name in made_names() else FOLDERS.tables
 
 
 def read_preset(path: str | os.PathLike[str]) -> Preset:

@@ -23,14 +23,6 @@ from sonic_bullet.bank.strike_pool import NODES_PER_PULSE, NODES_PER_SAMPLE, SHO
 from sonic_bullet.records import Array
 from sonic_bullet.storage.atomic import replacing
 
-RESERVED = frozenset(
-    re.findall(
-        r"\w+",
-        "auto break case char const continue default do double else enum extern float for goto if inline int long "
-        "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while",
-    )
-)
-
 BANK = """\
 #define NAME_PULSES 8
 typedef struct { double at, spacing, length, sum; int node, nodes, point; double j[3]; } NAME_pulse; /* nodes 0: free */
@@ -139,8 +131,16 @@ def c_bank_text(model: BakedModel) -> str:
 
 def identifier(name: str) -> str:
     """Make a name that C and Faust accept."""
+    reserved = frozenset(
+        re.findall(
+            r"\w+",
+            "auto break case char const continue default do double else enum extern float for goto if inline int long "
+            "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile "
+            "while",
+        )
+    )
     plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lower()
-    return plain if plain and not plain[0].isdigit() and plain not in RESERVED else f"body_{plain}".rstrip("_")
+    return plain if plain and not plain[0].isdigit() and plain not in reserved else f"body_{plain}".rstrip("_")
 
 
 def _table(kind: str, name: str, values: Array) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.bake.baked_form import BAKED_FORMAT, ExtrasForm, common_form
 from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassProperties
-from sonic_bullet.files.gltf.gltf_writer import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GltfBuffer
+from sonic_bullet.files.gltf.gltf_writer import GLTF_CODE, GltfBuffer
 from sonic_bullet.session.gltf_in.own_words import EXTRAS, OwnSurface, finish_entry
 
 EXTENSION = "KHR_audio_rigid_bodies"
@@ -81,8 +81,8 @@ class GltfAudio:
     def add_mesh(self, name: str, vertex_m: Any, face: Any) -> int:
         """Write a mesh of triangles; return its number."""
         primitive = {
-            "attributes": {"POSITION": self.buffer.append(vertex_m, target=ARRAY_BUFFER)},
-            "indices": self.buffer.append(np.asarray(face).ravel(), target=ELEMENT_ARRAY_BUFFER),
+            "attributes": {"POSITION": self.buffer.append(vertex_m, target=GLTF_CODE.vertices)},
+            "indices": self.buffer.append(np.asarray(face).ravel(), target=GLTF_CODE.triangles),
         }
         self.meshes.append({"name": name, "primitives": [primitive]})
         return len(self.meshes) - 1
@@ -95,7 +95,7 @@ class GltfAudio:
     def _model_entry(self, model: BakedModel, material: int) -> tuple[dict[str, Any], dict[str, Any] | None]:
         """Write a model's entry, and the mesh primitive of its surface, None where it has no triangle."""
         buffer = self.buffer
-        positions = buffer.append(model.point_m, target=ARRAY_BUFFER)
+        positions = buffer.append(model.point_m, target=GLTF_CODE.vertices)
         entry: dict[str, Any] = {
             "name": model.name,
             "frequencies": buffer.append(model.freq_hz),
@@ -106,7 +106,7 @@ class GltfAudio:
         }
         primitive = None
         if len(model.face):
-            entry["indices"] = buffer.append(model.face.ravel(), target=ELEMENT_ARRAY_BUFFER)
+            entry["indices"] = buffer.append(model.face.ravel(), target=GLTF_CODE.triangles)
             primitive = {"attributes": {"POSITION": positions}, "indices": entry["indices"]}
         if model.mass is not None:
             entry["massProperties"] = mass_entry(model.mass)

@@ -45,8 +45,6 @@ from sonic_bullet.cli.solids.bake_command import bake
 from sonic_bullet.cli.soundtrack.film_command import film
 from sonic_bullet.cli.soundtrack.score_command import score
 
-DEFAULT_MODES_MATERIAL = "steel"
-
 
 @click.group(
     epilog=EXAMPLES["group"], context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
@@ -72,8 +70,7 @@ cli.add_command(dataset)
 @click.option(
     "--material",
     metavar="M",
-    help=f"A name ('sonic-bullet materials') or a preset file. [default: {DEFAULT_MODES_MATERIAL}, if no "
-    "constants are given]",
+    help="A name ('sonic-bullet materials') or a preset file. [default: steel, if no constants are given]",
 )
 @click.option(
     "--young", "youngs_pa", type=float, metavar="E", help="Young's modulus in Pa, in place of the material's."

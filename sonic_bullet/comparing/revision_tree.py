@@ -45,36 +45,36 @@ class RevisionTree:
 
 @dataclass(slots=True)
 class ReadFiles:
-    """Absolute paths of files opened for reading while it is the last of `_NOTED`."""
+    """Absolute paths of files opened for reading while it is the last of `_noted`."""
 
     paths: set[str] = field(default_factory=set)
 
 
-_NOTED: list[ReadFiles] = []
-_HOOKS: list[Any] = []
+_noted: list[ReadFiles] = []
+_hooks: list[Any] = []
 
 
 def _audit(event: str, arguments: tuple[Any, ...]) -> None:
-    if event != "open" or not _NOTED:
+    if event != "open" or not _noted:
         return
     path, mode, flags = arguments
     reads = mode is None or "r" in str(mode) or "+" in str(mode)
     if reads and isinstance(path, (str, bytes)) and not (mode is None and flags & (os.O_WRONLY | os.O_CREAT)):
         with suppress(OSError, ValueError):
-            _NOTED[-1].paths.add(os.path.join(os.getcwd(), os.fsdecode(path)))
+            _noted[-1].paths.add(os.path.join(os.getcwd(), os.fsdecode(path)))
 
 
 @contextmanager
 def noted_files() -> Iterator[ReadFiles]:
     """Record the files that Python opens within the block."""
-    if not _HOOKS:
-        _HOOKS.append(_audit)
+    if not _hooks:
+        _hooks.append(_audit)
         sys.addaudithook(_audit)
-    _NOTED.append(ReadFiles())
+    _noted.append(ReadFiles())
     try:
-        yield _NOTED[-1]
+        yield _noted[-1]
     finally:
-        _NOTED.pop()
+        _noted.pop()
 
 
 def unpinned(paths: set[str], revision: RevisionTree, *, old: bool) -> set[str]:

@@ -24,8 +24,6 @@ from sonic_bullet.records.simulated import with_body_id
 from sonic_bullet.records.units import REFERENCE_PRESSURE_PA
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-NAMED_SILENT, MANY_SILENT = 3, 20
-
 
 def silence_notes(samples: Array | KeptSound, log: ContactLog) -> tuple[str, ...]:
     """Return one note that says why (channels, n) samples are silent; none where they are not.
@@ -63,6 +61,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
 
     Kinds: not touched, no mode in the band, a sensor on a body that was not added, radiation by a simpler law.
     """
+    many_silent = 20
     untouched = "touched by nobody, so silent"
     rows, added = log.rows, [i for i, body in enumerate(log.bodies) if body.material is not None]
     touched = set(np.unique(np.concatenate([rows.a, rows.b])).tolist())
@@ -71,11 +70,11 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     dull = [body for body, model in models if not (model.freq_hz < log.sr / 2).any()]
     notes = []
     if alone and log.steps:
-        notes.append(f"{untouched}: {_names(alone, MANY_SILENT)}")
+        notes.append(f"{untouched}: {_names(alone, many_silent)}")
     for still, said in ((False, "they click but do not ring"), (True, "they do not move either, so they are silent")):
         mute = [body for body in dull if (body.mass_kg == 0) == still]
         if mute:
-            notes.append(f"no mode below {min(20_000.0, log.sr / 2):g} Hz: {_names(mute, MANY_SILENT)}; {said}")
+            notes.append(f"no mode below {min(20_000.0, log.sr / 2):g} Hz: {_names(mute, many_silent)}; {said}")
     here = {(body.body_id, body.link) for body in log.bodies if body.material is not None}
     off = [one for one in log.sensors if isinstance(one, Vibrometer) and (one.body_id, one.link) not in here]
     if off and here:
@@ -84,7 +83,7 @@ def body_notes(log: ContactLog) -> tuple[str, ...]:
     if any(isinstance(sensor, Microphone) for sensor in log.sensors):
         simple = [body for body, model in models if radiation_note(model, log.air)]
         if simple:
-            notes.append(f"{COMPACT}: {_names(simple, MANY_SILENT)}")
+            notes.append(f"{COMPACT}: {_names(simple, many_silent)}")
     return tuple(notes)
 
 
@@ -216,6 +215,6 @@ def _arrives_late(log: ContactLog, mine: Array) -> str | None:
     )
 
 
-def _names(bodies: Iterable[Body], most: int = NAMED_SILENT) -> str:
+def _names(bodies: Iterable[Body], most: int = 3) -> str:
     names = [with_body_id(body.name, body.body_id) for body in bodies]
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -36,25 +36,25 @@ class AttachHook(Protocol):
         ...
 
 
-_DIRECTION: ContextVar[AttachHook | None] = ContextVar("direction", default=None)
+_direction: ContextVar[AttachHook | None] = ContextVar("direction", default=None)
 
 
 @contextmanager
 def directed(direction: AttachHook) -> Iterator[None]:
     """Use a hook for listeners that are made, and bodies that are added, within the block."""
-    before = _DIRECTION.set(direction)
+    before = _direction.set(direction)
     try:
         yield
     finally:
-        _DIRECTION.reset(before)
+        _direction.reset(before)
 
 
 def absent(who: Any) -> bool:
     """Tell whether the hook left out a body, or (body, link)."""
-    director = _DIRECTION.get()
+    director = _direction.get()
     return director is not None and director.absent(who[0] if isinstance(who, tuple) else who)
 
 
 def direction() -> AttachHook | None:
     """Return the hook in use, or None."""
-    return _DIRECTION.get()
+    return _direction.get()

@@ -129,22 +129,22 @@ def as_choice(
     )
 
 
-_CHOICE: ContextVar[MaterialChoice] = ContextVar("choice", default=MaterialChoice())  # noqa: B039 - a frozen record
+_choice: ContextVar[MaterialChoice] = ContextVar("choice", default=MaterialChoice())  # noqa: B039 - a frozen record
 
 
 @contextmanager
 def choosing(choice: MaterialChoice) -> Iterator[None]:
     """Apply a choice to listeners that are made, and bodies that are added, within the block."""
-    before = _CHOICE.set(choice)
+    before = _choice.set(choice)
     try:
         yield
     finally:
-        _CHOICE.reset(before)
+        _choice.reset(before)
 
 
 def current_choice() -> MaterialChoice:
     """Return the choice in use; an empty one by default."""
-    return _CHOICE.get()
+    return _choice.get()
 
 
 def choose_materials(world: World, wanted: Sequence[BodyRequest]) -> Sequence[BodyRequest]:

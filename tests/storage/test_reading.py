@@ -31,7 +31,7 @@ def case(**changes: Any) -> bytes:
 
 
 def preset(**changes: Any) -> bytes:
-    known: dict[str, Any] = json.loads((presets.FOLDER / "steel.json").read_text())
+    known: dict[str, Any] = json.loads((presets.FOLDERS.tables / "steel.json").read_text())
     return json.dumps(known | changes).encode()
 
 

@@ -73,7 +73,7 @@ class SessionWish:
             return self
         if stems is not None:
             raise FileError("--session holds the stems, and --stems asks for them elsewhere", "give one of both")
-        from sonic_bullet.soundtrack.editing.timeline import FILM
+        from sonic_bullet.soundtrack.editing.timeline import SESSION_FILE
 
         folder = folder_place(self.folder, "")
         if self.film_fps is not None:
@@ -81,7 +81,7 @@ class SessionWish:
 
             as_fps(self.film_fps), check_size(self.film_size or (1280, 720)), pyav()
         Path(folder).mkdir(parents=True, exist_ok=True)
-        for name in (OTIO, REAPER, FILM):
+        for name in (OTIO, REAPER, SESSION_FILE.film):
             from sonic_bullet.files import check_output
 
             check_output(Path(folder) / name)
@@ -90,9 +90,9 @@ class SessionWish:
     @property
     def mix(self) -> str:
         """Path of the session's mix."""
-        from sonic_bullet.soundtrack.editing.timeline import MIX
+        from sonic_bullet.soundtrack.editing.timeline import SESSION_FILE
 
-        return str(Path(self.folder or "") / MIX)
+        return str(Path(self.folder or "") / SESSION_FILE.mix)
 
     def write(
         self,
@@ -110,7 +110,7 @@ class SessionWish:
         from sonic_bullet.files import replacing
         from sonic_bullet.soundtrack.editing.otio_timeline import is_installed, otio_timeline
         from sonic_bullet.soundtrack.editing.reaper_project import reaper_project
-        from sonic_bullet.soundtrack.editing.timeline import MIX, SoundItem, Timeline
+        from sonic_bullet.soundtrack.editing.timeline import SESSION_FILE, SoundItem, Timeline
         from sonic_bullet.soundtrack.sound_events import cues_of
 
         folder = Path(self.folder or "")
@@ -120,7 +120,7 @@ class SessionWish:
         timeline = Timeline(
             folder.name,
             mix.sr,
-            (SoundItem("mix", MIX, mix.frames, mix.channels, muted=bool(stems)), *stems),
+            (SoundItem("mix", SESSION_FILE.mix, mix.frames, mix.channels, muted=bool(stems)), *stems),
             film,
             cues_of(made.events, result.log, mix.sr, mix.frames),
             made.time_reference,
@@ -151,13 +151,13 @@ class SessionWish:
     ) -> FilmItem | None:
         if self.film_fps is None:
             return None
-        from sonic_bullet.soundtrack.editing.timeline import FILM, FilmItem
+        from sonic_bullet.soundtrack.editing.timeline import SESSION_FILE, FilmItem
         from sonic_bullet.soundtrack.film import FilmLook, make_film
         from sonic_bullet.soundtrack.film_writer import as_fps
 
         look = FilmLook(as_fps(self.film_fps), self.film_size or (1280, 720))
         report = make_film(
-            Path(self.folder or "") / FILM,
+            Path(self.folder or "") / SESSION_FILE.film,
             result.log,
             result.sound,
             result.sr,
@@ -166,4 +166,4 @@ class SessionWish:
             level=level,
             progress=progress,
         )
-        return FilmItem(FILM, report.pictures, report.fps)
+        return FilmItem(SESSION_FILE.film, report.pictures, report.fps)

@@ -18,7 +18,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-STEPS_MOST = 60
 PHASOR_BLOCK = 256  # about the square root of a second's samples
 
 
@@ -134,7 +133,7 @@ def fitted(
     *,
     band: tuple[float, float],
     fastest_per_s: float,
-    steps: int = STEPS_MOST,
+    steps: int = 60,
     tolerance: float = 1e-4,
 ) -> Sinusoids:
     """Modes at the least sum of squares near ``start``; band in rad/s.

@@ -11,7 +11,7 @@ import os
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,17 @@ from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage.atomic import replacing
 from sonic_bullet.storage.json_text import json_bytes
 
-FLOAT, UNSIGNED_INT = 5126, 5125
-ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+
+class _GltfCodes(NamedTuple):
+    """Numbers for kinds of values, and for what a view holds [glTF 2.0, sec. 3.6.2.2 and 5.11.5]."""
+
+    float32: int = 5126
+    uint32: int = 5125
+    vertices: int = 34962  # ARRAY_BUFFER
+    triangles: int = 34963  # ELEMENT_ARRAY_BUFFER
+
+
+GLTF_CODE = _GltfCodes()
 
 
 @dataclass(slots=True)
@@ -45,7 +54,7 @@ class GltfBuffer:
         self.accessors.append(
             {
                 "bufferView": len(self.views) - 1,
-                "componentType": UNSIGNED_INT if whole else FLOAT,
+                "componentType": GLTF_CODE.uint32 if whole else GLTF_CODE.float32,
                 "count": len(packed),
                 "type": "SCALAR" if packed.ndim == 1 else f"VEC{packed.shape[1]}",
                 "min": rows.min(axis=0).tolist(),

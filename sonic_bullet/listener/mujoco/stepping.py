@@ -25,45 +25,45 @@ class StepWatcher(Protocol):
         """Take the step just made."""
 
 
-_WATCHERS: dict[int, list[weakref.ref[Any]]] = {}
-_REAL: dict[str, Callable[..., Any]] = {}
+_watchers: dict[int, list[weakref.ref[Any]]] = {}
+_real: dict[str, Callable[..., Any]] = {}
 
 
 def watch(data: Any, watcher: StepWatcher) -> Callable[[], None]:
     """Call a watcher around every step of an MjData, while it lives; return what ends it, harmless when ended."""
     key, here = id(data), mujoco
-    if not _WATCHERS:
-        _REAL.update({name: getattr(here, name) for name in ("mj_step", "mj_step2")})
+    if not _watchers:
+        _real.update({name: getattr(here, name) for name in ("mj_step", "mj_step2")})
         vars(here).update(mj_step=_step, mj_step2=_step2)
     one = weakref.ref(watcher, lambda dead: _leave(key, dead))
-    _WATCHERS.setdefault(key, []).append(one)
+    _watchers.setdefault(key, []).append(one)
     return lambda: _leave(key, one)
 
 
 def _leave(key: int, one: weakref.ref[Any]) -> None:
-    mine = _WATCHERS.get(key, [])
+    mine = _watchers.get(key, [])
     if one in mine:
         mine.remove(one)
         if not mine:
-            del _WATCHERS[key]
-        if not _WATCHERS and mujoco.mj_step is _step:
-            vars(mujoco).update(_REAL)
+            del _watchers[key]
+        if not _watchers and mujoco.mj_step is _step:
+            vars(mujoco).update(_real)
 
 
 def _step(m: Any, d: Any, nstep: int = 1) -> None:
-    if id(d) not in _WATCHERS:
-        _REAL["mj_step"](m, d, nstep)
+    if id(d) not in _watchers:
+        _real["mj_step"](m, d, nstep)
         return
     for _ in range(nstep):
-        _watched(_REAL["mj_step"], m, d)
+        _watched(_real["mj_step"], m, d)
 
 
 def _step2(m: Any, d: Any) -> None:
-    _watched(_REAL["mj_step2"], m, d)
+    _watched(_real["mj_step2"], m, d)
 
 
 def _watched(step: Callable[..., object], m: Any, d: Any) -> None:
-    watchers = [one for one in (ref() for ref in _WATCHERS.get(id(d), [])) if one is not None]
+    watchers = [one for one in (ref() for ref in _watchers.get(id(d), [])) if one is not None]
     for one in watchers:
         one.before_step()
     step(m, d)

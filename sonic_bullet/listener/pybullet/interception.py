@@ -58,7 +58,6 @@ IN_ORDER: dict[str, tuple[str, ...]] = {
     "changeConstraint": ("userConstraintUniqueId",),
 }  # fmt: skip
 """Positional arguments, by PyBullet's names for them."""
-BODY_ARGUMENT = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
 SHAPE_ARGUMENTS = {"baseCollisionShapeIndex", "linkCollisionShapeIndices"}
 PICTURES = {"baseVisualShapeIndex", "linkVisualShapeIndices", "rgbaColor", "specularColor"}
 
@@ -207,6 +206,7 @@ class Interception:
         return found
 
     def _by_value(self, name: str, given: Mapping[str, Any]) -> Call:
+        body_argument = re.compile("^(body|object|multiBody|parentBody|childBody)UniqueId[AB]?$")
         constraint = "userConstraintUniqueId"
         whom: ObjectId | None = None
         arguments: dict[str, Any] = {}
@@ -214,7 +214,7 @@ class Interception:
             if key in PICTURES:
                 continue
             value = _plain(raw)
-            if BODY_ARGUMENT.match(key) or key == constraint:
+            if body_argument.match(key) or key == constraint:
                 value = self.who(int(raw), "constraint" if key == constraint else "body")
                 whom = whom or value
             elif key in SHAPE_ARGUMENTS:

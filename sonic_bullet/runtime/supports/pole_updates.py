@@ -43,7 +43,7 @@ from sonic_bullet.runtime.synthesis_state import State
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-FASTEST_TURN, STOPPED = 3.0, 0.05
+STOPPED = 0.05
 """Radians a sample beyond which the contacts have made a mode too fast to play, and its decay a sample then."""
 
 
@@ -117,8 +117,10 @@ def _lanes(state: State, b: int) -> Array:
 
 def _audible(new: Array, free: Array) -> Array:
     """Limit poles to what the bank can play: a mode that the contacts stop or make too fast decays within a block."""
-    stopped = np.minimum(free.real, -STOPPED) + 1j * np.minimum(free.imag, FASTEST_TURN)
-    fast = ~np.isfinite(new) | (new.imag > FASTEST_TURN) | (new.imag <= 1e-6) | (-new.real > new.imag)
+    # radians a sample beyond which the contacts have made a mode too fast to play, and its decay a sample then
+    fastest_turn = 3.0
+    stopped = np.minimum(free.real, -STOPPED) + 1j * np.minimum(free.imag, fastest_turn)
+    fast = ~np.isfinite(new) | (new.imag > fastest_turn) | (new.imag <= 1e-6) | (-new.real > new.imag)
     return np.asarray(np.where(fast, stopped, np.minimum(new.real, 0.0) + 1j * new.imag))
 
 

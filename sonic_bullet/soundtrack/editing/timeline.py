@@ -8,10 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 from sonic_bullet.files.riff.wave_chunks import Cue
 
-MIX, FILM = "mix.wav", "film.mov"
+
+class _SessionFiles(NamedTuple):
+    """Files of a session."""
+
+    mix: str = "mix.wav"
+    film: str = "film.mov"
+
+
+SESSION_FILE = _SessionFiles()
 
 
 @dataclass(frozen=True, slots=True)

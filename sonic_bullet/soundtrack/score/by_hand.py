@@ -22,7 +22,7 @@ from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AnimationError
-from sonic_bullet.soundtrack.score.animation import STILL_M, STILL_RAD, Animation
+from sonic_bullet.soundtrack.score.animation import STILL, Animation
 from sonic_bullet.soundtrack.score.impulse_fit import fit_steps
 
 
@@ -50,8 +50,8 @@ def moves_of(log: ContactLog) -> tuple[Moves, ...]:
     for number, step in enumerate(log.steps):
         by_hand[number, step.body] = step.teleported
         if before is not None and np.array_equal(before.body, step.body):
-            away = np.abs(step.position_m - before.position_m).max(axis=1, initial=0) > STILL_M
-            turned = np.linalg.norm(rotation(before.quaternion_xyzw, step.quaternion_xyzw), axis=1) > STILL_RAD
+            away = np.abs(step.position_m - before.position_m).max(axis=1, initial=0) > STILL.place_m
+            turned = np.linalg.norm(rotation(before.quaternion_xyzw, step.quaternion_xyzw), axis=1) > STILL.turn_rad
             by_hand[number, step.body] |= (mass[step.body] == 0) & (away | turned)
         before = step
     found = []

@@ -34,7 +34,6 @@ JOINT_KINDS: dict[int, JointKind] = {
     pybullet.JOINT_FIXED: "fixed",
     pybullet.JOINT_POINT2POINT: "point",
 }
-X_AXIS = np.array([1.0, 0.0, 0.0])
 Link = tuple[int, int]
 """Body and link, base -1."""
 
@@ -102,7 +101,7 @@ def _link_joints(
                 why = "PyBullet's kind of it is not written" if kind is None else "one of its links has no shape"
                 notes.append(f"joint {name} is left out: {why}")
                 continue
-            axis = _turned(state[5], np.array(info[13])) if kind in ("hinge", "slider") else X_AXIS
+            axis = _turned(state[5], np.array(info[13])) if kind in ("hinge", "slider") else np.array([1.0, 0.0, 0.0])
             limits = None
             if kind in ("hinge", "slider"):
                 now = pybullet.getJointState(body, link, physicsClientId=client_id)[0]
@@ -126,7 +125,7 @@ def _constraints(client_id: int, number: dict[Link, int], notes: list[str]) -> l
             notes.append(f"constraint {one} is left out: {why}")
             continue
         position, turn = _pose(client_id, *parent)
-        axis = _turned(turn, np.array(info[5], float)) if kind == "slider" else X_AXIS
+        axis = _turned(turn, np.array(info[5], float)) if kind == "slider" else np.array([1.0, 0.0, 0.0])
         place = position + _turned(turn, np.array(info[6]))
         found.append(RigidJoint(kind, ends[0], ends[1], place, axis / np.linalg.norm(axis), None, True))
     return found
