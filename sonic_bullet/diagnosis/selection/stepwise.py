@@ -57,7 +57,7 @@ class Closed:
     verdict, before_db, after_db, floor_db : str, float, float, float
         "explained", "none" or "unexplained", and mean distances.
     mesh_off : float
-        Relative error of the mesh's frequencies where that decides the verdict, else 0.
+        Relative error of the mesh's frequencies that the verdict allows for, else 0.
     bands : tuple of BandOff
         Where levels are off, which is why the verdict is not `none`.
     judged, left_out : Comparable, tuple of LeftOut
@@ -162,17 +162,15 @@ def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, lef
     scored = problem.scored(made)
     before, one = scored.distance_db, _one_by_one(start, scored, problem)
     h, added, now, last = one.h, one.added, one.now, dict(one.last)
-    verdict, off, by = _verdict(h, added, before, now, problem), 0.0, h
-    if verdict == "unexplained":
-        verdict, off, by = _by_a_finer_mesh(start, h, added, before, problem)
+    verdict, off, bare = _verdict(start, h, added, before, now, problem)
     if verdict == "unexplained" and not one.pairwise and (pair := pairwise(start, one.first, problem)):
         h, added = pair
         last |= {c.id: c for c in added}
         now = problem.score(h)
-        verdict, off = _verdict(h, added, before, now, problem), 0.0
+        verdict, off, bare = _verdict(start, h, added, before, now, problem)
     bands: tuple[BandOff, ...] = ()
     if verdict == "none":
-        bands = bands_off(problem.takes, made if by is start else problem.predict(by))
+        bands = bands_off(problem.takes, made if bare is start else problem.predict(bare))
     if bands:
         verdict, off = "unexplained", 0.0
     withheld: tuple[tuple[str, ...], str] = ((), "")
@@ -297,34 +295,30 @@ def _deferred(found: Sequence[Candidate], evidence: Evidence, effects: Sequence[
     return [k for k in effects if mixes_neighbours(k) and tensor and k.id not in {c.id for c in found}]
 
 
-def _verdict(h: Hypothesis, added: Sequence[Candidate], before_db: float, now: Score, problem: DiagnosisProblem) -> str:
-    """Decide the verdict; effects must close most_share of the gap, or all but a mesh's errors."""
-    gap, left = before_db - now.floor_db, now.gap_db
+def _verdict(
+    start: Hypothesis,
+    h: Hypothesis,
+    added: Sequence[Candidate],
+    before_db: float,
+    now: Score,
+    problem: DiagnosisProblem,
+) -> tuple[str, float, Hypothesis]:
+    """Decide the verdict by what a finer mesh would leave: effects must close most of that, or all but its errors.
+
+    Returns it, the largest move of a mode that it allows for, and the start with its modes so moved.
+    """
+    bare, off = beyond(start, problem)
+    ideal = problem.score(bare) if off else replace(now, distance_db=before_db)
+    gap, whole = min(ideal.distance_db, before_db) - ideal.floor_db, before_db - now.floor_db
     if not added:
-        excused = gap < RULES.suffices_db or (
-            gap < of_the_mesh(h, problem) and of_no_body(problem.takes, problem.predict(h)) < RULES.most_share
+        excused = whole < RULES.suffices_db or (
+            (gap < RULES.suffices_db or whole < of_the_mesh(h, problem))
+            and of_no_body(problem.takes, problem.predict(h)) < RULES.most_share
         )
-        return "none" if excused else "unexplained"
+        return ("none", off, bare) if excused else ("unexplained", 0.0, bare)
+    left = problem.distance_db(beyond(h, problem)[0]) - ideal.floor_db if off else now.gap_db
     # whose response takes up what a mesh gets wrong, too: that is no excuse
     room = any(isinstance(e, Dereverberates) for e in h.effects)
     most = max((RULES.little_share if room else 1 - RULES.most_share) * gap, RULES.suffices_db)
-    return "explained" if left <= most or (not room and left <= of_the_mesh(h, problem)) else "unexplained"
-
-
-def _by_a_finer_mesh(
-    start: Hypothesis, h: Hypothesis, added: Sequence[Candidate], before_db: float, problem: DiagnosisProblem
-) -> tuple[str, float, Hypothesis]:
-    """Decide the verdict with upper modes moved to their lines; the largest move, 0 without help; that hypothesis."""
-    verdict, (far, off) = "unexplained", beyond(start, problem)
-    if not off:
-        return verdict, 0.0, start
-    ideal = problem.score(far)
-    ideal = replace(ideal, distance_db=min(ideal.distance_db, before_db))
-    if ideal.gap_db < RULES.suffices_db and of_no_body(problem.takes, problem.predict(start)) < RULES.most_share:
-        verdict = "none"
-    elif added:
-        both, _ = beyond(h, problem)
-        verdict = _verdict(
-            both, added, ideal.distance_db, replace(ideal, distance_db=problem.distance_db(both)), problem
-        )
-    return verdict, off if verdict != "unexplained" else 0.0, far
+    explained = left <= most or (not room and left <= of_the_mesh(h, problem))
+    return ("explained", off, bare) if explained else ("unexplained", 0.0, bare)
