@@ -19,7 +19,7 @@ import numpy as np
 
 from studies.thin_walls import calculix, reference
 from studies.thin_walls.ours import LIMIT_S, THREADS, _used
-from studies.twenty_shapes import cad_truth, polynomials
+from studies.twenty_shapes import axisymmetric, cad_truth, polynomials
 from studies.twenty_shapes.catalogue import ENTRIES
 
 HEAD = (
@@ -89,6 +89,8 @@ def make_truth(names: list[str]) -> int:
         entry = next(one for one in ENTRIES.values() if one.truth == name)
         if entry.edge_mm is not None:
             cad_truth.keep(name, polynomials=cad_truth.by_polynomials(entry))
+        elif name in axisymmetric.ROUND:
+            cad_truth.keep(name, polynomials=axisymmetric.solve(axisymmetric.ROUND[name], cad_truth.COUNT))
         if "fine" not in {**reference.read()["bodies"].get(name, {}), **cad_truth.read().get(name, {})}:
             cad_truth.keep(name, **cad_truth.by_calculix(entry))
         true, beside = cad_truth.limit(name), cad_truth.calculix_limit(name)

@@ -1,7 +1,8 @@
 """The modes of the twenty shapes that count as true, how uncertain they are, and where they are kept.
 
     a drawing: NGSolve's, polynomials of three degrees on two meshes (polynomials.py); CalculiX's C3D10 beside them
-    bricks: CalculiX's C3D20R in two sizes, f∞ = f(h) − (f(rh) − f(h)) / (r³ − 1); uncertain by f(h) to f∞
+    a round body: the same on its section, with a Fourier series round (axisymmetric.py)
+    other bricks: CalculiX's C3D20R in two sizes, f∞ = f(h) − (f(rh) − f(h)) / (r³ − 1); uncertain by f(h) to f∞
 
 The power 3 lies between 4, smooth, and 1.1 to 2.7, creases [Strang & Fix 1973, 6.3].
 """

@@ -233,9 +233,35 @@ def wheel() -> Any:
     return made - _cylinder(0, 0, -10, 5, 20)
 
 
+def angle() -> Any:
+    """Angle of 50 × 30 × 35 with sharp corners, legs of 6 and 3."""
+    return _box(0, 0, 0, 50, 30, 6) + _box(0, 0, 0, 3, 30, 35)
+
+
+def mallet() -> Any:
+    """Head of 40 × 40 × 110 with a round handle of 9, 220 long."""
+    return _box(-55, -20, -20, 55, 20, 20) + _cylinder(0, 0, -240, 4.5, 225)
+
+
+def finned_block() -> Any:
+    """Block of 60 × 40 × 20 with five fins of 2 × 15 across."""
+    made = _box(0, 0, 0, 60, 40, 20)
+    for k in range(5):
+        made = made + _box(5 + 12 * k, 0, 20, 7 + 12 * k, 40, 35)
+    return made
+
+
+def grooved_ring() -> Any:
+    """Ring of 70 outside, 50 inside, 16 high, a groove of 4 × 5 round it, cut through at one side by 6."""
+    made = _cylinder(0, 0, 0, 35, 16) - _cylinder(0, 0, -1, 25, 18)
+    made = made - (_cylinder(0, 0, 6, 40, 4) - _cylinder(0, 0, 5, 30, 6))
+    return made - _box(0, -3, -1, 50, 3, 20)
+
+
 DRAWINGS: dict[str, Callable[[], Any]] = {
     one.__name__: one
     for one in (
         nut, fork, bracket, clip, perforated, flywheel, heat_sink, crank, housing, spoon, hammer, fan, spanner, wheel,
+        angle, mallet, finned_block, grooved_ring,
     )
 }  # fmt: skip
