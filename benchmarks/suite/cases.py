@@ -62,7 +62,7 @@ TRIES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Take:
+class AudioObservation:
     """A case made, not yet written: bodies and sensors, strikes with the body each is of, sounds, what rings, truth."""
 
     bodies: list[Body]
@@ -81,20 +81,20 @@ def make_case(folder: Path, plan: Plan, cache: Path) -> dict[str, Any]:
     that comes nearest.
     """
     short: list[float] = []
-    take: Take | float = 0.0
+    take: AudioObservation | float = 0.0
     for attempt in range(TRIES):
         take = _take(plan, np.random.default_rng([plan.seed, attempt]), cache, lacking=0.0)
-        if isinstance(take, Take):
+        if isinstance(take, AudioObservation):
             break
         short.append(take)
-    if not isinstance(take, Take):
+    if not isinstance(take, AudioObservation):
         take = _take(plan, np.random.default_rng([plan.seed, int(np.argmin(short))]), cache, lacking=np.inf)
-    assert isinstance(take, Take)
+    assert isinstance(take, AudioObservation)
     _save(folder / plan.name, plan, take)
     return take.truth
 
 
-def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> Take | float:
+def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> AudioObservation | float:
     """A case, or only the dB that it lacks to be heard where these are more than ``lacking``."""
     recipe = RECIPES[plan.recipe]
     material = _as_it_is(MATERIALS[recipe.material], rng)
@@ -157,10 +157,10 @@ def _take(plan: Plan, rng: np.random.Generator, cache: Path, lacking: float) -> 
         "beside_db": {e.id: d for e, d in zip(effects, beside, strict=False)},
         "plan": asdict(plan),
     }
-    return Take(bodies, sensors, all_strikes, owner, heard, ringing, truth)
+    return AudioObservation(bodies, sensors, all_strikes, owner, heard, ringing, truth)
 
 
-def _save(where: Path, plan: Plan, take: Take) -> None:
+def _save(where: Path, plan: Plan, take: AudioObservation) -> None:
     where.mkdir(parents=True, exist_ok=True)
     if plan.form == "features":
         entries = _measured(take.ringing, plan.recipe, np.random.default_rng(plan.seed))

@@ -108,9 +108,9 @@ class DiagnosisReport:
     def lines(self) -> list[str]:
         """Return verdict, effects with their numbers, distances, and what to measure next."""
         from sonic_bullet.diagnosis.deciding_measurement import next_measurement
-        from sonic_bullet.diagnosis.remainder import NOTHING
         from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
         from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
+        from sonic_bullet.diagnosis.unexplained import NOTHING
 
         splits = {r.split for r in self.found.case.recordings}
 

@@ -22,11 +22,19 @@ from sonic_bullet.diagnosis.evidence.baseline import baseline
 from sonic_bullet.diagnosis.prediction.line_score import CAP, listed, off_by
 from sonic_bullet.diagnosis.prediction.loudness_distance import sone_distance
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
-from sonic_bullet.diagnosis.prediction.score import Compared, LeftOut, Take, comparable, least_db, mean_db, take_of
+from sonic_bullet.diagnosis.prediction.score import (
+    AudioObservation,
+    Compared,
+    LeftOut,
+    comparable,
+    least_db,
+    mean_db,
+    take_of,
+)
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.remainder import indistinct_places, listing, remainder
 from sonic_bullet.diagnosis.selection.effect_table import effect_table
-from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, select_effects
+from sonic_bullet.diagnosis.unexplained import describe_unexplained, indistinct_places, listing
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.estimator.fit.case_fit import CaseFit
@@ -74,7 +82,7 @@ class Diagnosis:
     case: Case
     found: CaseFit
     bodies: tuple[Struck, ...]
-    takes: tuple[Take, ...]
+    takes: tuple[AudioObservation, ...]
     closed: Closed | NothingCompared
     errors: dict[str, Any]
     errors_sone: dict[str, Any]
@@ -82,7 +90,7 @@ class Diagnosis:
     unexplained: dict[str, Any]
     not_compared: dict[str, tuple[LeftOut, ...]]
     warnings: tuple[str, ...]
-    unfitted: tuple[Take, ...] = ()
+    unfitted: tuple[AudioObservation, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -130,7 +138,7 @@ def diagnose(
         start = baseline(case, recorded, by_lines=by_lines, cache=cache, progress=progress)
         found, bodies, takes = start.found, start.bodies, start.takes
         every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
-        end = closed(
+        end = select_effects(
             start.hypothesis,
             bodies,
             takes or listed(bodies),
@@ -155,7 +163,7 @@ def diagnose(
             sone[name][split] = sone_distance(held.takes, one) if isinstance(held, Compared) else None
         if split == "fit" and isinstance(held, Compared):
             errors["floor"] = least_db(held.takes, made["after"])
-    left, warnings = remainder(end, takes), (*found.warnings, *_warnings(end, out))
+    left, warnings = describe_unexplained(end, takes), (*found.warnings, *_warnings(end, out))
     lines, unfitted = _of_lines(case, bodies, end), tuple(t for split in SPLITS[1:] for t in every[split])
     return Diagnosis(case, found, bodies, takes, end, errors, sone, lines, left, out, warnings, unfitted)
 
@@ -207,7 +215,9 @@ def _of_lines(case: Case, bodies: tuple[Struck, ...], end: Closed | NothingCompa
     return found
 
 
-def _others(case: Case, bodies: tuple[Struck, ...], takes: tuple[Take, ...], split: str) -> tuple[Take, ...]:
+def _others(
+    case: Case, bodies: tuple[Struck, ...], takes: tuple[AudioObservation, ...], split: str
+) -> tuple[AudioObservation, ...]:
     """Read the strikes of another split whose audio is there."""
     found = []
     for body in bodies if takes else ():

@@ -15,7 +15,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
-from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
 from sonic_bullet.signal.log_spectral import with_noise
 
@@ -114,15 +114,15 @@ def _name(h: Hypothesis) -> str:
     return " + ".join(effect.id for effect in h.effects) or "no effect"
 
 
-def _one_a_place(judged: Sequence[Judged]) -> list[Take]:
+def _one_a_place(judged: Sequence[ScoredObservation]) -> list[AudioObservation]:
     """Return one recorded strike of each place."""
-    found: dict[tuple[str, object], Take] = {}
-    for take in (t for t in judged if isinstance(t, Take)):
+    found: dict[tuple[str, object], AudioObservation] = {}
+    for take in (t for t in judged if isinstance(t, AudioObservation)):
         found.setdefault((take.body.name, take.body.recordings[take.strike].position_m), take)
     return list(found.values())
 
 
-def _apart_db(take: Take, one: Prediction, other: Prediction, impulse_n_s: float) -> float:
+def _apart_db(take: AudioObservation, one: Prediction, other: Prediction, impulse_n_s: float) -> float:
     """Compute by how much a take of one model at an impulse is farther from the other than from itself."""
     level = take.body.level_n_s.copy()
     level[take.strike] = impulse_n_s

@@ -12,10 +12,10 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection.band_levels import CENTRE_HZ, HALF_BAND, BandOff, in_words, off_in, over_db
-from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
+from sonic_bullet.diagnosis.selection.stepwise import Closed, select_effects
 from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.records import Array
@@ -61,14 +61,14 @@ def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], fr
     """By the mean alone both are `none`, the model suffices."""
     body = made()
     takes = takes_of((body,))
-    end = closed(fitted(body), (body,), takes, (), BAND)
+    end = select_effects(fitted(body), (body,), takes, (), BAND)
     assert isinstance(end, Closed)
     assert end.before_db - end.floor_db < RULES.suffices_db
     assert end.verdict == "unexplained" and end.added == () and end.bands
     assert all(
         from_hz < b.from_hz < b.to_hz < to_hz and b.recorded_over_played_db > 3.0 and b.strikes == 5 for b in end.bands
     )
-    words = remainder(end, takes)
+    words = describe_unexplained(end, takes)
     assert words["words"].startswith("recorded ") and " dB more than played between " in words["words"]
     assert words["bands_off"][0]["strikes"] == 5
 
@@ -76,7 +76,7 @@ def test_what_a_mean_distance_blurs_is_no_comfort(made: Callable[[], Struck], fr
 @parametrize_few("seed", [6, 7], 1)
 def test_nothing_is_off_where_nothing_lacks(seed: int) -> None:
     body = recorded(seed=seed)
-    end = closed(fitted(body), (body,), takes_of((body,)), (), BAND)
+    end = select_effects(fitted(body), (body,), takes_of((body,)), (), BAND)
     assert isinstance(end, Closed) and end.verdict == "none" and end.bands == ()
 
 
@@ -87,11 +87,11 @@ def test_no_effect_is_looked_for_where_comfort_alone_is_taken_away(monkeypatch: 
     body = one_mode_more()
     monkeypatch.setattr(loop, "cross_validated", lambda *_, **__: asked.append(1) or [])
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: asked.append(2))
-    end = closed(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
+    end = select_effects(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
     assert end.verdict == "unexplained"
     rounds = len(asked)
     monkeypatch.setattr(loop, "bands_off", lambda *_: ())
-    end = closed(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
+    end = select_effects(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
     assert end.verdict == "none" and len(asked) == 2 * rounds
 
 

@@ -13,11 +13,11 @@ from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
-from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body, out_of_phase
+from sonic_bullet.diagnosis.selection.coherent_residual import incoherent_fraction, out_of_phase
 from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.effects import Effect
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.damping_law import DampingLaw
@@ -44,9 +44,9 @@ def test_modes_are_in_phase_and_sidebands_are_not() -> None:
     assert still.recorded is not None and turning.recorded is not None
     assert not out_of_phase(still.recorded.lines).any()
     off = replace(fitted(still), correction={"plate": np.full(18, 1e-3)})
-    assert of_no_body(takes_of((still,)), {still: predict(off, still)}) < 0.05
+    assert incoherent_fraction(takes_of((still,)), {still: predict(off, still)}) < 0.05
     assert out_of_phase(turning.recorded.lines).any()
-    assert of_no_body(takes_of((turning,)), {turning: predict(fitted(turning), turning)}) > 0.7
+    assert incoherent_fraction(takes_of((turning,)), {turning: predict(fitted(turning), turning)}) > 0.7
 
 
 @parametrize_few(
@@ -103,11 +103,11 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(
     off = replace(fitted(body), correction={"plate": np.full(18, 1e-3)})
     monkeypatch.setattr(loop, "refitted", lambda h, _: h)
     monkeypatch.setattr(loop, "beyond", lambda h, *_: (h, 0.0))
-    end = loop.closed(off, (body,), takes_of((body,)), (), BAND)
+    end = loop.select_effects(off, (body,), takes_of((body,)), (), BAND)
     assert end.before_db - end.floor_db > RULES.suffices_db
     assert end.verdict == verdict
     if depth > 0:
-        assert "do not play it" in remainder(end, takes_of((body,)))["words"]
+        assert "do not play it" in describe_unexplained(end, takes_of((body,)))["words"]
 
 
 @parametrize_few(

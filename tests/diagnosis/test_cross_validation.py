@@ -274,7 +274,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     # however little the room leaves
     monkeypatch.setattr(loop, "RULES", replace(RULES, same_share=1e-9, little_share=1e-9))
     monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
-    end = loop.closed(fitted(body), (body,), takes, EFFECTS, BAND)
+    end = loop.select_effects(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]
     assert asked == [every, every, ["support-damping"]]
     assert anew == [["tensor"], ["support-damping"]], "the room is identified anew beside both"

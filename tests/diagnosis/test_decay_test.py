@@ -12,7 +12,7 @@ import pytest
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.prediction import predict_each
-from sonic_bullet.diagnosis.prediction.score import Score, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, Score
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
@@ -36,7 +36,7 @@ def tried(*effects: DampingLaw) -> tuple[list[Candidate], bool]:
     body = recorded(*effects, ROOM)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
+    takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     h = reidentified(refitted(truth(ROOM), (body,)), (body,))
     found = cross_validated(h, posed((body,), takes, DampingLaw), evidence_of(h, (body,), BAND))
     problem, shapeless = posed((body,), takes), posed((replace(body, family=None),), takes)

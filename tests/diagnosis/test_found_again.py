@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.score import least_db, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.stepwise import Closed, closed
+from sonic_bullet.diagnosis.selection.stepwise import Closed, select_effects
 from sonic_bullet.effects import EFFECTS, Effect
 from sonic_bullet.effects.added_mass import AddedMass
 from sonic_bullet.effects.amplitude_damping import AmplitudeDamping
@@ -58,7 +58,7 @@ def fitted(body: Struck) -> Hypothesis:
 
 def ended(body: Struck) -> Closed:
     """The loop on a recorded plate."""
-    return closed(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
+    return select_effects(fitted(body), (body,), takes_of((body,)), EFFECTS, BAND)
 
 
 def test_nothing_is_added_where_nothing_lacks() -> None:
@@ -137,7 +137,7 @@ def of_somebody_else() -> ModuleType:
 def test_an_effect_of_somebody_else_is_tried_and_named() -> None:
     theirs = of_somebody_else()
     body = recorded(theirs.SquareLaw(20.0), seconds=0.5)
-    end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
+    end = select_effects(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.SquareLaw), BAND)
     assert [c.id for c in end.added] == ["square-law"]
     assert end.added[0].effect.parameters()["q"] == pytest.approx(20.0, rel=0.05)
 
@@ -147,7 +147,9 @@ def test_an_effect_of_somebody_else_may_move_and_mix_modes() -> None:
     """Its traits are all that the host knows: modes are paired with lines anew, and corrections come after it."""
     theirs = of_somebody_else()
     body = recorded(theirs.GroundedSpring(124, 3e5))
-    end = closed(fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.GroundedSpring), BAND)
+    end = select_effects(
+        fitted(body), (body,), takes_of((body,)), (DampingLaw, ForeignMode, theirs.GroundedSpring), BAND
+    )
     assert [c.id for c in end.added] == ["grounded-spring"]
     assert end.verdict == "explained"
     assert end.added[0].effect.parameters()["stiffness_n_m"] == pytest.approx(3e5, rel=0.1)

@@ -19,17 +19,17 @@ from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import (
     EDGE_DB,
+    AudioObservation,
     Compared,
     Incomparable,
-    Take,
     comparable,
     mean_db,
     predict_takes,
 )
-from sonic_bullet.diagnosis.remainder import remainder
 from sonic_bullet.diagnosis.selection import stepwise as loop
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
-from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, closed
+from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, select_effects
+from sonic_bullet.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.effects import EFFECTS
 from sonic_bullet.effects.protocol import Effect, Evidence, Owner, Sound, Stage
 from sonic_bullet.signal.log_spectral import noise_floor_db, white
@@ -60,23 +60,23 @@ def test_no_distance_has_a_number_to_fall_back_on() -> None:
 
 
 def test_nothing_measured_is_unexplained() -> None:
-    end = closed(truth(), (), (), EFFECTS, BAND)
+    end = select_effects(truth(), (), (), EFFECTS, BAND)
     assert end.verdict == "unexplained" and isinstance(end, NothingCompared)
     assert end.left_out == () and end.added == () and end.tried == ()
-    assert remainder(end, ())["words"] == "nothing could be compared: nothing was measured"
+    assert describe_unexplained(end, ())["words"] == "nothing could be compared: nothing was measured"
 
 
-def spoiled(takes: tuple[Take, ...], *which: int) -> tuple[Take, ...]:
+def spoiled(takes: tuple[AudioObservation, ...], *which: int) -> tuple[AudioObservation, ...]:
     return tuple(replace(t, sample=np.full(len(t.sample), np.nan)) if i in which else t for i, t in enumerate(takes))
 
 
 def test_strikes_that_are_no_numbers_are_unexplained_by_name() -> None:
     body = recorded()
     takes = spoiled(takes_of((body,)), 0, 1, 2, 3, 4)
-    end = closed(fitted(body), (body,), takes, (), BAND)
+    end = select_effects(fitted(body), (body,), takes, (), BAND)
     assert end.verdict == "unexplained" and isinstance(end, NothingCompared)
     assert [one.name for one in end.left_out] == [f"strike-{i}.wav" for i in range(5)]
-    words = remainder(end, takes)["words"]
+    words = describe_unexplained(end, takes)["words"]
     assert words.startswith("nothing could be compared: strike-0.wav holds 11200 samples that are no numbers; ")
     assert words.endswith("; and 1 more")
 
@@ -85,7 +85,7 @@ def test_the_others_are_judged_and_those_that_could_not_be_are_named() -> None:
     body = recorded()
     takes = takes_of((body,))
     short, silent = replace(takes[1], sample=takes[1].sample[:300]), replace(takes[2], floor=white(1e3))
-    end = closed(fitted(body), (body,), (*spoiled(takes[:1], 0), short, silent, *takes[3:]), (), BAND)
+    end = select_effects(fitted(body), (body,), (*spoiled(takes[:1], 0), short, silent, *takes[3:]), (), BAND)
     assert isinstance(end, Closed) and end.verdict == "none"
     assert end.judged == takes[3:] and end.before_db == mean_db(takes[3:], predict_takes(end.before, takes[3:]))
     assert [str(one) for one in end.left_out] == [
@@ -168,14 +168,14 @@ def test_what_cannot_be_played_is_rejected() -> None:
     assert mean_db(takes, predict_takes(replace(off, effects=(Spoils(),)), takes)) == np.inf
     found = cross_validated(off, posed((body,), takes, Spoils), evidence_of(off, (body,), BAND))
     assert [c.id for c in found] == ["spoils"] and (found[0].drop_db == -np.inf).all()
-    end = closed(fitted(body), (body,), takes, (Spoils,), BAND)
+    end = select_effects(fitted(body), (body,), takes, (Spoils,), BAND)
     assert isinstance(end, Closed) and end.added == () and end.verdict == "none"
 
 
 def test_a_model_that_cannot_be_played_compares_with_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     body = recorded()
     monkeypatch.setattr(loop, "refitted", lambda h, _: h)
-    end = closed(replace(fitted(body), effects=(Spoils(),)), (body,), takes_of((body,)), (), BAND)
+    end = select_effects(replace(fitted(body), effects=(Spoils(),)), (body,), takes_of((body,)), (), BAND)
     assert isinstance(end, NothingCompared) and len(end.left_out) == 5
     assert str(end.left_out[0]) == "strike-0.wav is played by the model with samples that are no numbers"
 
@@ -211,7 +211,7 @@ def test_the_command_says_it_on_the_console_in_json_and_on_the_page(
 def test_what_was_left_out_of_a_split_is_a_warning() -> None:
     body = recorded()
     takes = takes_of((body,))
-    end = closed(fitted(body), (body,), (*spoiled(takes[:1], 0), takes[1]), (), BAND)
+    end = select_effects(fitted(body), (body,), (*spoiled(takes[:1], 0), takes[1]), (), BAND)
     assert _warnings(end, {"fit": end.left_out}) == [
         "1 of split 'fit' could not be compared: strike-0.wav holds 11200 samples that are no numbers",
         "one strike alone: nothing can be left out, so no effect can be named; record more strikes",

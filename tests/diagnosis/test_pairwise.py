@@ -10,7 +10,7 @@ import pytest
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation
 from sonic_bullet.diagnosis.selection import pairwise as pairs
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
@@ -39,7 +39,7 @@ def tried(
     body = recorded(*effects)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
+    takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     start = refitted(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
     first = []
@@ -86,7 +86,7 @@ def room_anew(planted: tuple[Effect, ...], candidate: Effect) -> tuple[Hypothesi
     body = recorded(*planted)
     assert body.recorded is not None and body.recorded.signals is not None
     floor = floor_between(list(body.recorded.signals))
-    takes = [Take(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
+    takes = [AudioObservation(body, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     start = refitted(truth(), (body,))
     told = evidence_of(start, (body,), BAND)
     room = Room.propose(told)

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from sonic_bullet.cli import cli
 from sonic_bullet.diagnosis.evidence.baseline import baseline
-from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation
 from sonic_bullet.estimator.fit.recorded import gather
 from sonic_bullet.files.cases import read_case
 from tests.estimator.test_held_out_takes import case_of
@@ -37,7 +37,7 @@ def test_a_measured_list_without_places_keeps_its_mesh(tmp_path: Path) -> None:
 def test_a_take_without_an_impulse_has_one_floor_and_distance_at_any_gain(tmp_path: Path, gain: float) -> None:
     case = read_case(case_of(tmp_path, 0))
     take = baseline(case, gather(case, clipped=True)).takes[0]
-    assert isinstance(take, Take) and np.isnan(take.body.impulse_n_s[take.strike])
+    assert isinstance(take, AudioObservation) and np.isnan(take.body.impulse_n_s[take.strike])
 
     class Played:
         """What is predicted, at a gain."""

@@ -12,7 +12,7 @@ import pytest
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of, thinned
 from sonic_bullet.diagnosis.evidence.refit import refitted
 from sonic_bullet.diagnosis.prediction.prediction import predict
-from sonic_bullet.diagnosis.prediction.score import Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import accepted
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
@@ -39,12 +39,12 @@ def alone(body: Struck, strike: int) -> Struck:
     return replace(body, recorded=mine)
 
 
-def takes_of(*bodies: Struck) -> list[Take]:
+def takes_of(*bodies: Struck) -> list[AudioObservation]:
     made = []
     for body in bodies:
         assert body.recorded is not None and body.recorded.signals is not None
         made += [
-            Take(body, i, x, SR, floor_between(list(body.recorded.signals)))
+            AudioObservation(body, i, x, SR, floor_between(list(body.recorded.signals)))
             for i, x in zip(body.fitted, body.recorded.signals, strict=True)
         ]
     return made

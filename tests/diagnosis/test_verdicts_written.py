@@ -17,8 +17,8 @@ from sonic_bullet.cli import diagnose_command
 from sonic_bullet.diagnosis.diagnose import Diagnosis
 from sonic_bullet.diagnosis.evidence.baseline import takes_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.remainder import remainder
-from sonic_bullet.diagnosis.selection.stepwise import closed
+from sonic_bullet.diagnosis.selection.stepwise import select_effects
+from sonic_bullet.diagnosis.unexplained import describe_unexplained
 from sonic_bullet.effects.damping_law import DampingLaw
 from tests.diagnosis.test_bands import one_band_louder, one_mode_more
 from tests.diagnosis.test_found_again import BAND, fitted
@@ -77,12 +77,12 @@ def test_every_verdict_can_be_written(
 ) -> None:
     body = made()
     takes, base = takes_of((body,)), truth() if made is spoiled else fitted(body)
-    end = closed(base, (body,), takes, effects, BAND)
+    end = select_effects(base, (body,), takes, effects, BAND)
     case: Any = SimpleNamespace(name="made", warnings=(), recordings=())
     material = SimpleNamespace(gamma_m2_s2=np.float64("nan"), poisson_ratio=0.3, covariance=np.full((5, 5), np.nan))
     fit: Any = SimpleNamespace(fit=material, has_material=True, objects=(body,), evidence=())
     errors: dict[str, Any] = {"before": {"fit": None}, "after": {"fit": np.float64(1.0)}, "floor": np.nan}
-    left = remainder(end, takes)
+    left = describe_unexplained(end, takes)
     found = Diagnosis(case, fit, (body,), takes, end, errors, errors, {}, left, {}, ())
     module = import_module("sonic_bullet.diagnosis.diagnose")  # as an attribute of its package it is the function
     monkeypatch.setattr(module, "diagnose", lambda *_, **__: found)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from sonic_bullet.diagnosis.remainder import indistinct_places, remainder
 from sonic_bullet.diagnosis.selection.thresholds import RULES
+from sonic_bullet.diagnosis.unexplained import describe_unexplained, indistinct_places
 from sonic_bullet.effects.contact_time import ContactTime
 from sonic_bullet.effects.support_damping import SupportDamping
 from tests.diagnosis.test_separating_strike import ended
@@ -18,7 +18,7 @@ from tests.made.body import SIDE_M
 def test_explained_says_what_is_left_beside_the_name(left_db: float) -> None:
     end = ended(ContactTime(4e-4, 0.02))
     end = replace(end, before_db=12.0, after_db=end.floor_db + left_db)
-    told = remainder(end, end.judged)  # type: ignore[arg-type]
+    told = describe_unexplained(end, end.judged)  # type: ignore[arg-type]
     assert bool(told) == (left_db > RULES.suffices_db)
     if told:
         assert told["left_db"] == pytest.approx(left_db) and told["words"].startswith("5.4 dB beside what is named")

@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
-from sonic_bullet.diagnosis.prediction.score import Take, mean_db, predict_takes
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, mean_db, predict_takes
 from sonic_bullet.effects import added_mass
 from sonic_bullet.effects.added_mass import AddedMass, _in_place
 from sonic_bullet.effects.contact_time import ContactTime
@@ -38,7 +38,7 @@ def test_a_mass_is_found_beside_the_wrong_elasticity(monkeypatch: pytest.MonkeyP
     h = refitted(replace(base, effects=(found,)), (off,))
     assert h.stretch == pytest.approx(-np.log(low), abs=2e-3)
     floor = floor_between(list(body.recorded.signals))
-    takes = [Take(off, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
+    takes = [AudioObservation(off, i, x, SR, floor) for i, x in zip(body.fitted, body.recorded.signals, strict=True)]
     assert mean_db(takes, predict_takes(h, takes)) < 0.3 * mean_db(takes, predict_takes(base, takes))
     again = AddedMass.propose(replace(evidence_of(base, (off,), BAND), known=found))
     assert again is not None and again.position_m == found.position_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
-from sonic_bullet.diagnosis.prediction.score import Comparable, Judged
+from sonic_bullet.diagnosis.prediction.score import Comparable, ScoredObservation
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Effect
 
@@ -13,7 +13,7 @@ BAND = (50.0, 7_500.0)
 
 
 def posed(
-    bodies: tuple[Struck, ...], takes: Sequence[Judged], *effects: type[Effect], seed: int = 0
+    bodies: tuple[Struck, ...], takes: Sequence[ScoredObservation], *effects: type[Effect], seed: int = 0
 ) -> DiagnosisProblem:
     """The problem of these strikes, all of which are known to be comparable."""
     return DiagnosisProblem(bodies, Comparable(tuple(takes)), BAND, effects, seed)

@@ -21,7 +21,14 @@ from sonic_bullet.diagnosis.evidence.strike_levels import with_levels
 from sonic_bullet.diagnosis.evidence.unmatched_modes import settled
 from sonic_bullet.diagnosis.prediction.elastic_bodies import with_elastic
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
-from sonic_bullet.diagnosis.prediction.score import Compared, Take, comparable, mean_db, predict_takes, take_of
+from sonic_bullet.diagnosis.prediction.score import (
+    AudioObservation,
+    Compared,
+    comparable,
+    mean_db,
+    predict_takes,
+    take_of,
+)
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, shapeless, struck_bodies
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.effects.measurement_chain import limit_of
@@ -56,7 +63,7 @@ class Baseline:
     found: CaseFit
     bodies: tuple[Struck, ...]
     hypothesis: Hypothesis
-    takes: tuple[Take, ...]
+    takes: tuple[AudioObservation, ...]
 
     @property
     def doubtful(self) -> bool:
@@ -203,9 +210,9 @@ def _shaped(found: CaseFit, one: Recorded, by_lines: bool) -> bool:
     return one.family is not None and (one.signals is None or (placed and (found.plays_modes(one) or not by_lines)))
 
 
-def takes_of(bodies: tuple[Struck, ...]) -> tuple[Take, ...]:
+def takes_of(bodies: tuple[Struck, ...]) -> tuple[AudioObservation, ...]:
     """Return the fitted strikes that have audio."""
-    takes: list[Take] = []
+    takes: list[AudioObservation] = []
     for body in bodies:
         if body.recorded is None or body.recorded.signals is None:
             continue

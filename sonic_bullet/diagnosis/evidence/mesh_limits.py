@@ -2,7 +2,7 @@
 
     modes moved at random as much as the others are off           -> what that adds                    (of_the_mesh)
     lines of no mode, that have a mode's pattern and lie FAR_FOR_MESH from it at most, where waves are short: modes put
-        there     -> what is left   (beyond)
+        there     -> what is left   (with_unmatched_modes_moved)
     modes FAR_FOR_MESH below the band's edge at most, of which nothing is recorded: modes put
         outside   -> the same
 
@@ -22,7 +22,7 @@ from sonic_bullet.diagnosis.evidence.refit import ROUGH_LINES, refitted
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
-from sonic_bullet.diagnosis.prediction.score import Comparable, Take, mean_db, predict_takes
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, Comparable, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.fit.pairing import PAIRING
 from sonic_bullet.records import Array
@@ -32,7 +32,7 @@ MESH = 1e-3  # of a frequency: what a good mesh gets wrong
 FAR_FOR_MESH = 0.03  # of a frequency: what a coarse one does, in modes of few elements a wavelength
 
 
-def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
+def with_unmatched_modes_moved(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]:
     """Move unmatched modes to lines of their pattern, or outside the band.
 
     Returns
@@ -57,7 +57,7 @@ def beyond(h: Hypothesis, problem: DiagnosisProblem) -> tuple[Hypothesis, float]
 
 def finer_mesh_db(h: Hypothesis, problem: DiagnosisProblem) -> Array:
     """Compute how much nearer a finer mesh would come (s,), in dB, at each strike: what moved modes take away."""
-    far, most = beyond(h, problem)
+    far, most = with_unmatched_modes_moved(h, problem)
     if not most:
         return np.zeros(len(problem.takes))
     now, then = problem.predict(h), problem.predict(far)
@@ -134,7 +134,7 @@ def of_the_mesh(h: Hypothesis, problem: DiagnosisProblem) -> float:
         model = body.model if h.poisson is None or body.other is None else body.other(h.poisson)
         other[body.name] = _roughened(replace(body, model=model, other=None), rng)
     far = replace(h, correction=moved)
-    takes = [t for t in problem.takes if isinstance(t, Take)]
+    takes = [t for t in problem.takes if isinstance(t, AudioObservation)]
     if not takes:
         return 0.0  # lists of lines are held against frequencies alone, and corrected by them
     made = predict_takes(h, takes)

@@ -14,7 +14,14 @@ from dataclasses import dataclass, replace
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.diagnosis.prediction.score import Comparable, Score, Take, least_db, mean_db, predict_takes
+from sonic_bullet.diagnosis.prediction.score import (
+    AudioObservation,
+    Comparable,
+    Score,
+    least_db,
+    mean_db,
+    predict_takes,
+)
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Effect
 
@@ -65,7 +72,7 @@ class DiagnosisProblem:
     @property
     def has_audio(self) -> bool:
         """Decide whether all that is compared are recordings, no lists of lines."""
-        return all(isinstance(take, Take) for take in self.takes)
+        return all(isinstance(take, AudioObservation) for take in self.takes)
 
     @property
     def has_meshes(self) -> bool:

@@ -26,7 +26,7 @@ DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Listed:
+class LineObservation:
     """Some lines (k,) of a body, by index, to be compared with a hypothesis; the others are for learning."""
 
     body: Struck
@@ -71,12 +71,12 @@ class Listed:
         return tuple(mine if b is self.body else b for b in bodies), replace(h, correction=correction)
 
 
-def listed(bodies: tuple[Struck, ...]) -> tuple[Listed, ...]:
+def listed(bodies: tuple[Struck, ...]) -> tuple[LineObservation, ...]:
     """Divide every body's lines into parts that are left out in turn; too few stay together (`Listed.hindrance`)."""
     made = []
     for body in (b for b in bodies if b.recorded is not None):
         count = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
-        made += [Listed(body, np.arange(i, count, FOLDS)) for i in range(FOLDS if count >= 2 * FOLDS else 1)]
+        made += [LineObservation(body, np.arange(i, count, FOLDS)) for i in range(FOLDS if count >= 2 * FOLDS else 1)]
     return tuple(made)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.diagnosis.prediction.score import Comparable, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, Comparable
 from sonic_bullet.estimator.perceptual.image import loudness_levels
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.signal.log_spectral import with_noise
@@ -24,7 +24,7 @@ def sone_distance(takes: Comparable, made: Predictions) -> float | None:
     """Compute the mean distance of the takes from a prediction in sone; None where none is audible."""
     levels = 2
     found = []
-    for take in (t for t in takes if isinstance(t, Take)):
+    for take in (t for t in takes if isinstance(t, AudioObservation)):
         played = with_noise(take.played(made[take.body]), take.floor, take.strike)
         try:
             a, b = (

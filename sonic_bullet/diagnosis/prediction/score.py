@@ -33,7 +33,7 @@ EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * SPECTRAL.above_noise))
 KEPT_SPECTRA = 24  # takes whose spectra are kept
 
 
-class Judged(Protocol):
+class ScoredObservation(Protocol):
     """Something measured with which a hypothesis is compared, in dB."""
 
     @property
@@ -59,7 +59,9 @@ class Judged(Protocol):
         ...
 
 
-Comparable = NewType("Comparable", tuple[Judged, ...])  # one or more without a hindrance; `comparable` alone makes it
+Comparable = NewType(
+    "Comparable", tuple[ScoredObservation, ...]
+)  # one or more without a hindrance; `comparable` alone makes it
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +91,12 @@ class Incomparable:
     left_out: tuple[LeftOut, ...]
 
 
-def predict_takes(h: Hypothesis, takes: Iterable[Judged]) -> Predictions:
+def predict_takes(h: Hypothesis, takes: Iterable[ScoredObservation]) -> Predictions:
     """Predict the bodies that the takes are of, once each."""
     return predict_each(h, (take.body for take in takes))
 
 
-def comparable(takes: Sequence[Judged], made: Predictions) -> Compared | Incomparable:
+def comparable(takes: Sequence[ScoredObservation], made: Predictions) -> Compared | Incomparable:
     """Divide takes into those with a distance from a prediction of their bodies, and those without.
 
     Those with one have a distance from any other prediction, too.
@@ -129,7 +131,7 @@ class Score:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Take:
+class AudioObservation:
     """A recorded strike.
 
     Attributes
@@ -226,15 +228,15 @@ class Take:
 
 
 @lru_cache(maxsize=KEPT_SPECTRA)
-def _spectra(take: Take) -> tuple[tuple[Array, ...], Floor]:
+def _spectra(take: AudioObservation) -> tuple[tuple[Array, ...], Floor]:
     """Compute the powers of a take, and its noise in the band that is recorded."""
     return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)
 
 
-def take_of(body: Struck, strike: int, sample: Array, sr: int) -> Take:
+def take_of(body: Struck, strike: int, sample: Array, sr: int) -> AudioObservation:
     """Build a recorded strike, with the noise of its own end."""
     finite = bool(np.isfinite(sample).all()) and len(sample) >= min(SPECTRAL.windows)
-    return Take(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
+    return AudioObservation(body, strike, sample, sr, floor_between([sample]) if finite else white(np.inf))
 
 
 def _stated(db: float) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.diagnosis.selection.acceptance import evidence
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.records import Array
@@ -71,10 +71,12 @@ class BandOff:
         return f"recorded {abs(self.recorded_over_played_db):.1f} dB {less} than played {where} {when}, {strikes}"
 
 
-def bands_off(takes: Sequence[Judged], made: Predictions) -> tuple[BandOff, ...]:
+def bands_off(takes: Sequence[ScoredObservation], made: Predictions) -> tuple[BandOff, ...]:
     """Find the bands in which a prediction is not as loud as the recordings; lists of lines have no levels."""
     rows = [
-        over_db(t.sample, t.played(made[t.body]), t.sr, t.floor, t.body.band_hz) for t in takes if isinstance(t, Take)
+        over_db(t.sample, t.played(made[t.body]), t.sr, t.floor, t.body.band_hz)
+        for t in takes
+        if isinstance(t, AudioObservation)
     ]
     return off_in(np.array(rows)) if rows else ()
 

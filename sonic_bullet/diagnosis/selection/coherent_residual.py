@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, lines_of, noise_rms
 from sonic_bullet.records import Array
@@ -50,9 +50,9 @@ def _in_time(a: Array, freq_hz: Array) -> Array:
     return a
 
 
-def of_no_body(takes: Sequence[Judged], made: Predictions) -> float:
+def incoherent_fraction(takes: Sequence[ScoredObservation], made: Predictions) -> float:
     """Compute the fraction, 0 to 1, of the squared distance over noise that the strikes' lines in phase leave."""
-    observed = [take for take in takes if isinstance(take, Take)]
+    observed = [take for take in takes if isinstance(take, AudioObservation)]
     played = {id(g): _played(g) for g in {id(t.place[0]): t.place[0] for t in observed}.values()}
     left, gap = 0.0, 0.0
     for take in observed:
@@ -83,7 +83,7 @@ def _sum(lines: Lines, count: int, sr: int) -> Array:
     return made
 
 
-def _off(take: Take, made: Array) -> float:
+def _off(take: AudioObservation, made: Array) -> float:
     """Compute D of a take and a synthesis."""
     n = len(take.sample)
     return take.apart_db(np.pad(made, (0, max(n - len(made), 0)))[:n])

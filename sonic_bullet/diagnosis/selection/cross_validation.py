@@ -25,9 +25,9 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, mixes_neighbours, moves
-from sonic_bullet.diagnosis.prediction.line_score import Listed
+from sonic_bullet.diagnosis.prediction.line_score import LineObservation
 from sonic_bullet.diagnosis.prediction.prediction import predict, predict_each
-from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, accepted, jackknife, mean
 from sonic_bullet.diagnosis.selection.control_effect import ControlEffect
@@ -59,7 +59,7 @@ def cross_validated(
     folds = _folds(h, problem, evidence)
     if not folds:
         return found
-    observed = any(isinstance(take, Take) for take in problem.takes)  # else no lines are left out
+    observed = any(isinstance(take, AudioObservation) for take in problem.takes)  # else no lines are left out
     whole_lines = cache(lambda: _folds(h, problem, evidence, keep=1.0) if observed else folds)
     anew = cache(lambda: refitted(h, problem.bodies, anew=True) if observed else h)
     fair = cache(lambda by_line: _learnt_anew(anew(), whole_lines() if by_line else folds))
@@ -142,7 +142,7 @@ class Fold:
         Distance by noise alone, and what a finer mesh would take away: no effect closes that.
     """
 
-    take: Judged
+    take: ScoredObservation
     bodies: tuple[Struck, ...]
     evidence: Evidence
     base: Hypothesis
@@ -161,11 +161,11 @@ def _folds(
     rng = np.random.default_rng([problem.seed, 1])
     made = []
     for take, mesh_db in zip(problem.takes, finer_mesh_db(h, problem), strict=True):
-        if isinstance(take, Listed):
+        if isinstance(take, LineObservation):
             mine, start = take.rest(problem.bodies, h)
             less = evidence_of(start, mine, evidence.band_hz, seed=problem.seed)
             base = refitted(start, mine)
-        elif isinstance(take, Take):
+        elif isinstance(take, AudioObservation):
             mine, less = problem.bodies, thinned(evidence, take.place, keep, rng)
             base = refitted(h, problem.bodies, less.observed)
         p = predict(base, take.body)
@@ -180,10 +180,10 @@ def _learnt_anew(every: Hypothesis, folds: list[Fold]) -> list[Fold]:
 
     every is the hypothesis with these corrections, by all strikes.
     """
-    made = predict_each(every, (f.take.body for f in folds if not isinstance(f.take, Listed)))
+    made = predict_each(every, (f.take.body for f in folds if not isinstance(f.take, LineObservation)))
 
     def least(f: Fold) -> float:
-        if isinstance(f.take, Listed):
+        if isinstance(f.take, LineObservation):
             return min(f.before, f.take.distance(predict(refitted(f.base, f.bodies, anew=True), f.take.body)))
         return min(f.before, f.take.distance(made[f.take.body]))
 
@@ -197,7 +197,7 @@ def _at_rest_folds(folds: list[Fold]) -> list[Fold]:
         rested = at_rest(f.base, f.bodies, f.evidence.observed, every=True)
         return min(f.before, f.take.distance(predict(rested, f.take.body)))
 
-    return [replace(f, least=least(f)) if isinstance(f.take, Take) else f for f in folds]
+    return [replace(f, least=least(f)) if isinstance(f.take, AudioObservation) else f for f in folds]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,7 +222,7 @@ def _cross_validated(
         effect = kind.propose(replace(less, known=whole, held_out=True))
         if effect is None:
             return Gain()
-        asks_lines = isinstance(fold.take, Take) and tells(h, effect)
+        asks_lines = isinstance(fold.take, AudioObservation) and tells(h, effect)
         lined = [b for b in bodies if b.recorded is not None] if asks_lines else []
         # such axes are whole's (Evidence.held_out)
         free = effect.freedom() - (effect.angles() if isinstance(effect, RotatesPairs) else 0)
@@ -266,13 +266,15 @@ def _cross_validated(
 
 def _levels(folds: Sequence[Fold]) -> np.ndarray[Any, Any]:
     """Return the levels of the folds' strikes."""
-    return np.array([f.take.body.level_n_s[f.take.strike] if isinstance(f.take, Take) else np.nan for f in folds])
+    return np.array(
+        [f.take.body.level_n_s[f.take.strike] if isinstance(f.take, AudioObservation) else np.nan for f in folds]
+    )
 
 
 def _augmented(fold: Fold, effect: Effect) -> Hypothesis:
     """Add an effect to a fold's hypothesis, fitted to its evidence."""
     h = replace(fold.base, effects=(*fold.base.effects, effect))
-    if isinstance(fold.take, Listed):
+    if isinstance(fold.take, LineObservation):
         return refitted(h, fold.bodies)
     fitted = refitted(h, fold.bodies, fold.evidence.observed)
     return reidentified(fitted, fold.bodies, fold.evidence.observed) if isinstance(effect, Dereverberates) else fitted

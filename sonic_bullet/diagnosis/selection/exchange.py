@@ -21,7 +21,7 @@ from sonic_bullet.diagnosis.evidence.refit import refitted, with_effects
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.diagnosis.prediction.prediction import predict, predict_fitted
-from sonic_bullet.diagnosis.prediction.score import Judged, Take
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, evidence_between
 from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
@@ -103,12 +103,12 @@ def left_out_db(h: Hypothesis, i: int, problem: DiagnosisProblem) -> Array:
     neither gains by it.
     """
 
-    def without(take: Judged) -> Less:
-        assert isinstance(take, Take)
+    def without(take: ScoredObservation) -> Less:
+        assert isinstance(take, AudioObservation)
         place = take.place
         return lambda evidence: thinned(evidence, place, 1.0, np.random.default_rng(0))
 
-    def distance_db(take: Judged) -> float:
+    def distance_db(take: ScoredObservation) -> float:
         return take.distance(predict(again(h, i, problem, less=without(take)), take.body))
 
     return np.array(parallel_map(distance_db, problem.takes))

@@ -16,18 +16,18 @@ from typing import ClassVar
 import numpy as np
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
-from sonic_bullet.diagnosis.evidence.mesh_limits import beyond, of_the_mesh
+from sonic_bullet.diagnosis.evidence.mesh_limits import of_the_mesh, with_unmatched_modes_moved
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
 from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.score import (
+    AudioObservation,
     Comparable,
     Incomparable,
-    Judged,
     LeftOut,
     Score,
-    Take,
+    ScoredObservation,
     comparable,
     mean_db,
     predict_takes,
@@ -35,7 +35,7 @@ from sonic_bullet.diagnosis.prediction.score import (
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
-from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
+from sonic_bullet.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
 from sonic_bullet.diagnosis.selection.exchange import exchanged, rivals
 from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
@@ -106,16 +106,16 @@ class WorseThanSilence(NothingCompared):
     verdict: ClassVar[str] = "worse-than-silence"
 
 
-def closed(
+def select_effects(
     base: Hypothesis,
     bodies: tuple[Struck, ...],
-    takes: Sequence[Judged],
+    takes: Sequence[ScoredObservation],
     effects: Sequence[type[Effect]],
     band_hz: tuple[float, float],
     *,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
-    against_silence: Sequence[Take] = (),
+    against_silence: Sequence[AudioObservation] = (),
 ) -> Closed | NothingCompared:
     """Select effects on fitted strikes alone, those that can be compared.
 
@@ -137,7 +137,7 @@ def closed(
     found = comparable(takes, made)
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
-    own = [take for take in found.takes if isinstance(take, Take)]
+    own = [take for take in found.takes if isinstance(take, AudioObservation)]
     if worse := _worse_than_silence(start, against_silence or own, found.left_out):
         return worse
     problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent)
@@ -145,7 +145,7 @@ def closed(
 
 
 def _worse_than_silence(
-    start: Hypothesis, takes: Sequence[Take], left_out: tuple[LeftOut, ...]
+    start: Hypothesis, takes: Sequence[AudioObservation], left_out: tuple[LeftOut, ...]
 ) -> WorseThanSilence | None:
     """Return the verdict that the start is no nearer to the takes with a distance than silence is, if it is."""
     made = predict_takes(start, takes)
@@ -153,7 +153,9 @@ def _worse_than_silence(
     if isinstance(held, Incomparable):
         return None
     before = mean_db(held.takes, made)
-    silence = float(np.mean([t.apart_db(np.zeros(len(t.sample))) for t in held.takes if isinstance(t, Take)]))
+    silence = float(
+        np.mean([t.apart_db(np.zeros(len(t.sample))) for t in held.takes if isinstance(t, AudioObservation)])
+    )
     return WorseThanSilence(start, left_out, before, silence) if before >= silence else None
 
 
@@ -307,16 +309,16 @@ def _verdict(
 
     Returns it, the largest move of a mode that it allows for, and the start with its modes so moved.
     """
-    bare, off = beyond(start, problem)
+    bare, off = with_unmatched_modes_moved(start, problem)
     ideal = problem.score(bare) if off else replace(now, distance_db=before_db)
     gap, whole = min(ideal.distance_db, before_db) - ideal.floor_db, before_db - now.floor_db
     if not added:
         excused = whole < RULES.suffices_db or (
             (gap < RULES.suffices_db or whole < of_the_mesh(h, problem))
-            and of_no_body(problem.takes, problem.predict(h)) < RULES.most_share
+            and incoherent_fraction(problem.takes, problem.predict(h)) < RULES.most_share
         )
         return ("none", off, bare) if excused else ("unexplained", 0.0, bare)
-    left = problem.distance_db(beyond(h, problem)[0]) - ideal.floor_db if off else now.gap_db
+    left = problem.distance_db(with_unmatched_modes_moved(h, problem)[0]) - ideal.floor_db if off else now.gap_db
     # whose response takes up what a mesh gets wrong, too: that is no excuse
     room = any(isinstance(e, Dereverberates) for e in h.effects)
     most = max((RULES.little_share if room else 1 - RULES.most_share) * gap, RULES.suffices_db)

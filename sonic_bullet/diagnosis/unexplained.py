@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
-from sonic_bullet.diagnosis.prediction.score import LeftOut, Take, predict_takes
+from sonic_bullet.diagnosis.prediction.score import AudioObservation, LeftOut, predict_takes
 from sonic_bullet.diagnosis.selection.band_levels import in_words
-from sonic_bullet.diagnosis.selection.coherent_residual import of_no_body
+from sonic_bullet.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared, WorseThanSilence
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.common.points import places_alike
@@ -27,7 +27,7 @@ SHOWN = 4
 NOTHING = "nothing could be compared"
 
 
-def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str, Any]:
+def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObservation]) -> dict[str, Any]:
     """Describe what the last hypothesis leaves; empty where that is nothing, or there is no audio.
 
     Of `explained` it is what is left beside the names, where that is more than suffices_db.
@@ -40,7 +40,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         return {"left_db": None, "words": words}
     if isinstance(end, NothingCompared):
         return {"left_db": None, "words": f"{NOTHING}: {listing(end.left_out) or 'nothing was measured'}"}
-    judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, Take)}
+    judged = {(t.body.name, t.strike) for t in end.judged if isinstance(t, AudioObservation)}
     takes = [t for t in takes if (t.body.name, t.strike) in judged]
     left_db = end.after_db - end.floor_db
     if not takes or not (end.verdict == "unexplained" or (end.added and left_db > RULES.suffices_db)):
@@ -78,7 +78,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
         words += f"; its share {goes} (as its impulse to the power {slope:.1f} ± {slope_sd:.1f})"
     if len(total) > 1:
         words += f"; {_places(takes, scatter)}"
-    strange = of_no_body(takes, made)
+    strange = incoherent_fraction(takes, made)
     if strange > RULES.most_share:
         words += (
             "; modes of one frequency, decay and phase each, whatever they are, do not play it: something goes "
@@ -104,7 +104,7 @@ def remainder(end: Closed | NothingCompared, takes: Sequence[Take]) -> dict[str,
     }
 
 
-def _places(takes: Sequence[Take], scatter: float) -> str:
+def _places(takes: Sequence[AudioObservation], scatter: float) -> str:
     """Describe its dependence on the strike's place; scatter: standard deviation of its logarithm."""
     at = {t.body.recordings[t.strike].position_m for t in takes} - {None}
     if not at:
@@ -140,7 +140,7 @@ def listing(left_out: Sequence[LeftOut]) -> str:
     return f"{said}; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else said
 
 
-def _again(takes: Sequence[Take]) -> float | None:
+def _again(takes: Sequence[AudioObservation]) -> float | None:
     """Find the ratio of frequencies at which a body's lines recur, if they do."""
     recorded = [g for body in {id(t.body): t.body for t in takes}.values() if (g := body.recorded) is not None]
     return next(
@@ -149,7 +149,7 @@ def _again(takes: Sequence[Take]) -> float | None:
     )
 
 
-def _shares(takes: Sequence[Take], made: Predictions) -> tuple[Array, Array, Array]:
+def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array, Array, Array]:
     """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
     window = 1024
     sr = takes[0].sr
