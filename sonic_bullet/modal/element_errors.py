@@ -51,6 +51,11 @@ def recovered_errors(
     -------
     Array, shape (m,)
         (λ_h − λ)/2λ.
+
+    Raises
+    ------
+    MeshError
+        A curved element is folded at one of its nodes: there is no stress.
     """
     at_once = 8  # modes at a time: keeps their stresses out of memory
     value, vector = found
@@ -78,9 +83,13 @@ def log_changes(other: Array, value: Array) -> Array:
 
     Modes closer to one another than their change may have changed places: they get its mean.
     """
-    lost = np.log(extended(other[: len(value)] / value[: len(other)], len(value))) / 2
-    apart = np.flatnonzero(np.diff(np.log(value)) / 2 > np.abs(lost[:-1])) + 1
-    return np.concatenate([np.full(len(few), few.mean()) for few in np.split(lost, apart) if len(few)])
+    return with_neighbours(np.log(extended(other[: len(value)] / value[: len(other)], len(value))) / 2, value)
+
+
+def with_neighbours(change: Array, value: Array) -> Array:
+    """Return changes (m,) of ln f of modes with λ ``value``; modes closer than theirs to one another get the mean."""
+    distant = np.flatnonzero(np.diff(np.log(value)) / 2 > np.abs(change[:-1])) + 1
+    return np.concatenate([np.full(len(few), few.mean()) for few in np.split(change, distant) if len(few)])
 
 
 def extended(values: Array, count: int) -> Array:

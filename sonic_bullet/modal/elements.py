@@ -24,7 +24,7 @@ import numpy as np
 from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import cost, fem, lagrange, lanczos
 from sonic_bullet.modal.cost import ELEMENT_LIMITS
-from sonic_bullet.modal.element_errors import extended, log_changes, recovered_errors
+from sonic_bullet.modal.element_errors import extended, log_changes, recovered_errors, with_neighbours
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
@@ -123,7 +123,9 @@ class Elements:
         nodes, free, _ = raw.place
         most = self._most(tensors[0], raw)
         most_off = 0.01  # where elements err by more, their stress tells it badly
-        off = np.minimum(np.nan_to_num(most) / 2, most_off) if self._same_body else np.zeros(len(most))
+        off = np.zeros(len(most))
+        if self._same_body and len(most):
+            off = with_neighbours(np.minimum(np.nan_to_num(most) / 2, most_off), raw.found[0][0])  # pairs stay pairs
         left = np.maximum(most - off, off)
         found = tuple((value * np.exp(-2 * extended(off, len(value))), vector) for value, vector in raw.found)
         return [raw._replace(found=found, place=(nodes, free, left))]
@@ -138,7 +140,10 @@ class Elements:
             return np.full(len(fine), np.nan)
         power = 2.0  # 4μ of a cut, μ = 1/2: no crease is sharper. Of the size, where nothing is singular: the least
         held = fem.clamped(self.solid, self.clamp / self.length_m)
-        most = recovered_errors(self.solid, raw.place[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
+        try:
+            most = recovered_errors(self.solid, raw.place[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
+        except MeshError:  # a curved element is folded at a node, though nowhere where it is integrated
+            most = np.full(len(fine), np.nan)
         lower = self._lost(self._with_degree(self.degree - 1), tensor, fine)
         most = np.fmin(most, np.maximum(lower, 0) / ((self.degree / (self.degree - 1)) ** power - 1))
         coarser, ratio = (None, np.nan) if self._same_body else self._coarser()

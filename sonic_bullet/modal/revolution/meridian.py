@@ -69,14 +69,21 @@ def meridian(point: Array, face: Array) -> tuple[Array, Array, Array] | None:
             break
         point, turn, shift = point @ by.T + off, by @ turn, by @ shift + off
         walk = _outline(walk, flattened(point), at.place, fine, diagonal)
+        if not _has_area(walk):
+            return None
     flat = flattened(point)
     at = placed(walk, flat)
     order = np.lexsort((at.across, at.place))
     outline = _outline(walk, flat, at.place, fine, diagonal)
-    if not _is_one_curve(walk, flat[order], at.place[order], diagonal):
+    if not _has_area(outline) or not _is_one_curve(walk, flat[order], at.place[order], diagonal):
         return None
     whole = _is_round(outline, point[edge].mean(axis=1), flat[edge, 0].mean(axis=1), length, diagonal)
     return (outline, turn, shift) if whole and _holds(outline, volume_m3(point, face)) else None
+
+
+def _has_area(outline: Array) -> bool:
+    """Say whether an outline (p, 2) has three corners, and one off the axis: all of a prism's may be one ring."""
+    return len(outline) > 2 and bool((outline[:, 0] > 0).any())
 
 
 def flattened(point: Array) -> Array:
