@@ -131,6 +131,7 @@ def tapping() -> Iterator[str]:
     ):
         log = tapped(material, thickness)
         model = next(one.model for one in log.bodies if one.name == "floor")
+        assert model is not None
         yield f"{name}: {model.mode_count} modes, {model.note}"
         measured = 1e-12 * 10 ** ((np.array(reference) + db(10 / 4)) / 10)
         for loss in (IN_PLACE / 3, IN_PLACE, 3 * IN_PLACE):

@@ -18,6 +18,7 @@ from sonic_bullet.geometry import CREASE_RAD
 from sonic_bullet.modal import fem, lagrange
 from sonic_bullet.modal.meshing.solid import Solid, corner_volume_m3, outer_faces
 from sonic_bullet.records import Array
+from sonic_bullet.records.errors import MeshError
 
 SLOPES = np.array(
     [
@@ -50,12 +51,7 @@ def recovered_errors(
     Returns
     -------
     Array, shape (m,)
-        (λ_h − λ)/2λ.
-
-    Raises
-    ------
-    MeshError
-        A curved element is folded at one of its nodes: there is no stress.
+        (λ_h − λ)/2λ; NaN where a curved element is folded at one of its nodes, so that it has no stress there.
     """
     at_once = 8  # modes at a time: keeps their stresses out of memory
     value, vector = found
@@ -69,7 +65,10 @@ def recovered_errors(
     energy = np.empty(len(value))
     for start in range(0, len(value), at_once):
         mine = slice(start, min(start + at_once, len(value)))
-        stress = _stress(solid, field, tensor, vector[:, mine])
+        try:
+            stress = _stress(solid, field, tensor, vector[:, mine])
+        except MeshError:
+            return np.full(len(value), np.nan)
         smooth = (mean @ stress.reshape(len(volume) * 10, -1)).reshape(len(solid.node_m), 6, -1)
         smooth[node] = without @ smooth[node]
         off = (smooth[solid.tet] - stress).reshape(len(volume), 10, -1)
@@ -89,7 +88,9 @@ def log_changes(other: Array, value: Array) -> Array:
 def with_neighbours(change: Array, value: Array) -> Array:
     """Return changes (m,) of ln f of modes with λ ``value``; modes closer than theirs to one another get the mean."""
     distant = np.flatnonzero(np.diff(np.log(value)) / 2 > np.abs(change[:-1])) + 1
-    return np.concatenate([np.full(len(few), few.mean()) for few in np.split(change, distant) if len(few)])
+    return np.concatenate(
+        [np.zeros(0), *(np.full(len(few), few.mean()) for few in np.split(change, distant) if len(few))]
+    )
 
 
 def extended(values: Array, count: int) -> Array:

@@ -123,9 +123,8 @@ class Elements:
         nodes, free, _ = raw.place
         most = self._most(tensors[0], raw)
         most_off = 0.01  # where elements err by more, their stress tells it badly
-        off = np.zeros(len(most))
-        if self._same_body and len(most):
-            off = with_neighbours(np.minimum(np.nan_to_num(most) / 2, most_off), raw.found[0][0])  # pairs stay pairs
+        off = np.minimum(np.nan_to_num(most) / 2, most_off if self._same_body else 0.0)
+        off = with_neighbours(off, raw.found[0][0])  # pairs stay pairs
         left = np.maximum(most - off, off)
         found = tuple((value * np.exp(-2 * extended(off, len(value))), vector) for value, vector in raw.found)
         return [raw._replace(found=found, place=(nodes, free, left))]
@@ -140,10 +139,7 @@ class Elements:
             return np.full(len(fine), np.nan)
         power = 2.0  # 4μ of a cut, μ = 1/2: no crease is sharper. Of the size, where nothing is singular: the least
         held = fem.clamped(self.solid, self.clamp / self.length_m)
-        try:
-            most = recovered_errors(self.solid, raw.place[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
-        except MeshError:  # a curved element is folded at a node, though nowhere where it is integrated
-            most = np.full(len(fine), np.nan)
+        most = recovered_errors(self.solid, raw.place[0], tensor, held, (fine, _whole(raw, raw.found[0][1])))
         lower = self._lost(self._with_degree(self.degree - 1), tensor, fine)
         most = np.fmin(most, np.maximum(lower, 0) / ((self.degree / (self.degree - 1)) ** power - 1))
         coarser, ratio = (None, np.nan) if self._same_body else self._coarser()
