@@ -39,7 +39,7 @@ def commands_run_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     do those of a module's fixtures, which are called before; processes that tests start supervise.
     """
     monkeypatch.setattr("sonic_bullet.machine.supervisor.ASK_WHERE", None)
-    monkeypatch.setattr("sonic_bullet.storage.user_folder.NOTES", [])  # a command prints what another test left
+    monkeypatch.setattr("sonic_bullet.storage.user_folder.notes", [])  # a command prints what another test left
     put_back_signals()
     yield
     put_back_signals()

@@ -17,7 +17,7 @@ from llvmlite import binding, ir
 from numba import types
 from numba.extending import intrinsic
 
-from sonic_bullet.machine.vector import BITS, I64, LANES, Emit, Pair, Value, constant
+from sonic_bullet.machine.vector import LANES, Emit, Pair, Value, constant, i1x8, i64
 
 TILE_ROW = 16
 ROWS = 16
@@ -56,8 +56,8 @@ def turn(typingctx, z, pole, block, lanes, floor, now, powers):  # type: ignore[
                 p = e.product(p, p)
             return [builder.or_(carried[0], alive)]
 
-        (alive,) = e.loop(count, LANES, [ir.Constant(BITS, [0] * LANES)], body)
-        return builder.zext(builder.bitcast(alive, ir.IntType(LANES)), I64)
+        (alive,) = e.loop(count, LANES, [ir.Constant(i1x8, [0] * LANES)], body)
+        return builder.zext(builder.bitcast(alive, ir.IntType(LANES)), i64)
 
     return types.int64(z, pole, block, lanes, floor, now, powers), codegen
 
@@ -84,7 +84,7 @@ def rows(typingctx, powers, count, table):  # type: ignore[no-untyped-def]
             ]
             low: Pair | None = None
             for bit in range(3):
-                mask = ir.Constant(BITS, [(lane >> bit) & 1 for lane in range(LANES)])
+                mask = ir.Constant(i1x8, [(lane >> bit) & 1 for lane in range(LANES)])
                 factor = builder.select(mask, power[bit][0], one), builder.select(mask, power[bit][1], zero)
                 low = factor if low is None else e.product(low, factor)
             high = e.product(low, power[3])  # type: ignore[arg-type]

@@ -48,7 +48,7 @@ from numba.extending import intrinsic
 
 from sonic_bullet.contact.octave_heights import OCTAVE_LATTICE, reach_of_ball
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.vector import F64, I32, I64, LANES, VEC, Emit, Value, constant
+from sonic_bullet.machine.vector import LANES, Emit, Value, constant, f64, f64x8, i32, i64
 from sonic_bullet.records.roughness import LONGEST_M, OCTAVES, WAVE_M
 
 
@@ -102,9 +102,9 @@ def _refine(typingctx, work, coarse, fine, change, pairs, place, heights):
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         work, coarse, fine, change, pairs, key, low, points, inverse, height, growth = e.args
-        whole = ir.VectorType(I32, LANES)
-        start, low = builder.trunc(key, I32), builder.trunc(low, I32)
-        floor = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC]), "llvm.floor.v8f64")
+        whole = ir.VectorType(i32, LANES)
+        start, low = builder.trunc(key, i32), builder.trunc(low, i32)
+        floor = cgutils.get_or_insert_function(builder.module, ir.FunctionType(f64x8, [f64x8]), "llvm.floor.v8f64")
 
         def number(value: int) -> Value:
             return ir.Constant(whole, [value] * LANES)
@@ -113,12 +113,12 @@ def _refine(typingctx, work, coarse, fine, change, pairs, place, heights):
             none = ir.Constant(whole, ir.Undefined)
 
             def spread(value: Value) -> Value:
-                one = builder.insert_element(none, value, ir.Constant(I32, 0))
+                one = builder.insert_element(none, value, ir.Constant(i32, 0))
                 return builder.shuffle_vector(one, none, ir.Constant(whole, [0] * LANES))
 
-            h = spread(builder.add(low, builder.trunc(at, I32)))
+            h = spread(builder.add(low, builder.trunc(at, i32)))
             h = builder.add(h, ir.Constant(whole, list(range(offset, offset + LANES))))
-            point = builder.sitofp(h, VEC)
+            point = builder.sitofp(h, f64x8)
             turns = builder.fmul(builder.fadd(point, constant(0.5)), e.spread(inverse))
             turns = builder.call(floor, [turns])
             h = builder.fptosi(builder.fsub(point, builder.fmul(turns, e.spread(points))), whole)
@@ -126,7 +126,7 @@ def _refine(typingctx, work, coarse, fine, change, pairs, place, heights):
             h = builder.mul(builder.xor(h, builder.lshr(h, number(16))), number(0x7FEB352D))
             h = builder.mul(builder.xor(h, builder.lshr(h, number(15))), number(0x846CA68B))
             h = builder.xor(h, builder.lshr(h, number(16)))
-            return builder.fmul(builder.sitofp(h, VEC), constant(1.0 / 2147483648.0))
+            return builder.fmul(builder.sitofp(h, f64x8), constant(1.0 / 2147483648.0))
 
         def body(i: Value, carried: list[Value]) -> list[Value]:
             at = builder.mul(i, e.index(2))
@@ -160,11 +160,11 @@ def _read(typingctx, work, samples, lattice, pace, rate):
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         work, where, share, count, lattice, change, origin, inverse, speed, gain, rate, out = e.args
-        four = ir.VectorType(F64, 4)
+        four = ir.VectorType(f64, 4)
         nothing = ir.Constant(four, ir.Undefined)
 
         def mixed(a: Value, b: Value, *lanes: int) -> Value:
-            return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(lanes)), lanes))
+            return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(i32, len(lanes)), lanes))
 
         def four_of(at: Value) -> Value:
             return builder.load(builder.bitcast(builder.gep(work, [at]), four.as_pointer()), align=8)
@@ -172,15 +172,15 @@ def _read(typingctx, work, samples, lattice, pace, rate):
         def body(i: Value, carried: list[Value]) -> list[Value]:
             x = e.load(work, builder.add(share, i))
             u = builder.fsub(builder.fmul(e.load(work, builder.add(where, i)), e.spread(inverse)), e.spread(origin))
-            cell = builder.fptosi(u, ir.VectorType(I32, LANES))
-            t = builder.fsub(u, builder.sitofp(cell, VEC))
+            cell = builder.fptosi(u, ir.VectorType(i32, LANES))
+            t = builder.fsub(u, builder.sitofp(cell, f64x8))
             halves = []
             for first in (0, 4):
                 c = []
                 for k in range(first, first + 4):
-                    lane = ir.Constant(I32, k)
-                    at = builder.add(lattice, builder.sext(builder.extract_element(cell, lane), I64))
-                    own = builder.insert_element(nothing, builder.extract_element(x, lane), ir.Constant(I32, 0))
+                    lane = ir.Constant(i32, k)
+                    at = builder.add(lattice, builder.sext(builder.extract_element(cell, lane), i64))
+                    own = builder.insert_element(nothing, builder.extract_element(x, lane), ir.Constant(i32, 0))
                     more = builder.fmul(mixed(own, nothing, 0, 0, 0, 0), four_of(builder.add(at, change)))
                     c.append(builder.fadd(four_of(at), more))
                 low = mixed(c[0], c[1], 0, 4, 2, 6), mixed(c[0], c[1], 1, 5, 3, 7)

@@ -43,7 +43,7 @@ from sonic_bullet.contact.hertz import ball_patch_m, ball_stiffness
 from sonic_bullet.contact.profile import gained_heights, sweep_profile
 from sonic_bullet.contact.track import sweep_track
 from sonic_bullet.machine.compiled import njit
-from sonic_bullet.machine.vector import F64, I32, LANES, VEC, At, Emit, Value, constant
+from sonic_bullet.machine.vector import LANES, At, Emit, Value, constant, f64, f64x8, i32
 from sonic_bullet.records.roughness import OCTAVES
 
 MOST_SUBSTEPS = 8.0
@@ -245,7 +245,7 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         lanes, x, count, most, rate, apart = e.args
-        root = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC]), "llvm.sqrt.v8f64")
+        root = cgutils.get_or_insert_function(builder.module, ir.FunctionType(f64x8, [f64x8]), "llvm.sqrt.v8f64")
         none, one, two_thirds = constant(0.0), constant(1.0), constant(2.0 / 3.0)
 
         def row(number: int) -> Value:
@@ -272,9 +272,9 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
 
         def sample(i: Value, state: list[Value]) -> list[Value]:
             spots = [builder.gep(rate, [builder.add(place, i)]) for place in places]
-            dh = ir.Constant(VEC, ir.Undefined)
+            dh = ir.Constant(f64x8, ir.Undefined)
             for lane, spot in enumerate(spots):
-                dh = builder.insert_element(dh, builder.load(spot), ir.Constant(I32, lane))
+                dh = builder.insert_element(dh, builder.load(spot), ir.Constant(i32, lane))
             dh = builder.fmul(dh, rate_unit)
             share = e.broadcast(x, i)
             d0 = builder.fadd(rest, builder.fmul(rest_gain, share))
@@ -283,7 +283,7 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
 
             def substep(k: Value, carried: list[Value]) -> list[Value]:
                 z, u, total = carried
-                runs = builder.fcmp_ordered("<", e.spread(builder.sitofp(k, F64)), substeps)
+                runs = builder.fcmp_ordered("<", e.spread(builder.sitofp(k, f64)), substeps)
                 moved = builder.fadd(z, builder.fsub(dh, u))
                 elastic = hertz(larger(builder.fadd(d0, moved), none))
                 loss = builder.fmul(elastic, c)
@@ -301,7 +301,7 @@ def _oscillate(typingctx, lanes, x, count, most, rate, apart):
             z, u, total = (builder.select(rests, none, value) for value in (z, u, total))
             f = builder.fmul(total, unit)
             for lane, spot in enumerate(spots):
-                builder.store(builder.extract_element(f, ir.Constant(I32, lane)), spot)
+                builder.store(builder.extract_element(f, ir.Constant(i32, lane)), spot)
             return [z, u]
 
         for number, value in enumerate(e.loop(count, 1, [row(LAW_ROW.depth), row(LAW_ROW.lift)], sample)):

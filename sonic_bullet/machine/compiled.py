@@ -20,7 +20,7 @@ from typing import Any
 
 import numba
 
-from sonic_bullet.storage.user_folder import START_FOLDER, cache_folder, private_folder
+from sonic_bullet.storage.user_folder import cache_folder, private_folder, start_folder
 
 KNOWN_NUMBA = ["0", "68"]
 """The release of numba whose inner parts `whole_program_jit` uses. With any other, numba's own compilation is used: the
@@ -59,5 +59,5 @@ def folder() -> Path | None:
     """Return the folder of machine code; None for none."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
-        return private_folder(START_FOLDER / given / "sonic_bullet")
+        return private_folder(start_folder / given / "sonic_bullet")
     return cache_folder("compiled")

@@ -29,15 +29,15 @@ def kinds_of(groups: type) -> dict[str, Any]:
 def gather(group: type, *holders: Any) -> Any:
     """Fill a group by name: each field from the first of ``holders`` that has it. Raises AttributeError for none."""
     key = group, *map(type, holders)
-    if key not in _HOLDERS:
+    if key not in _holders:
         fields = group._fields  # type: ignore[attr-defined]
-        _HOLDERS[key] = [
+        _holders[key] = [
             (next((i for i, one in enumerate(holders) if hasattr(one, name)), -1), name) for name in fields
         ]
-    return group(*[getattr(holders[i], name) for i, name in _HOLDERS[key]])
+    return group(*[getattr(holders[i], name) for i, name in _holders[key]])
 
 
-_HOLDERS: dict[tuple[type, ...], list[tuple[int, str]]] = {}
+_holders: dict[tuple[type, ...], list[tuple[int, str]]] = {}
 """Which of the holders, by their types, has each field of a group."""
 
 

@@ -32,8 +32,8 @@ COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 """A command, a call from Python that takes less shows nothing."""
 LONGEST = 300  # characters of a line
 
-_SHOWN: list[Say] = []
-_LISTENER: ContextVar[Say | None] = ContextVar("listener", default=None)
+_shown: list[Say] = []
+_listener: ContextVar[Say | None] = ContextVar("listener", default=None)
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class _Sink:
     last: tuple[str, str] = ("", "")
 
 
-_SINK = _Sink()
+_sink = _Sink()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class PipeSay:
 
     def __call__(self, text: str) -> None:
         """Write what is being done."""
-        _SINK.last = self.label, text
+        _sink.last = self.label, text
         _send(os.getpid(), self.label, text)
 
 
@@ -101,11 +101,11 @@ class ProgressLines:
 @contextmanager
 def shown_by(say: Say) -> Iterator[Say]:
     """Let `status` write through ``say`` within the context."""
-    _SHOWN.append(say)
+    _shown.append(say)
     try:
         yield say
     finally:
-        _SHOWN.remove(say)
+        _shown.remove(say)
 
 
 @contextmanager
@@ -114,8 +114,8 @@ def status(label: str) -> Iterator[Say]:
 
     Yields a function that takes its text. An activity that starts within another writes into that one.
     """
-    if _SHOWN:
-        yield _SHOWN[-1]
+    if _shown:
+        yield _shown[-1]
     elif not is_shown():
         yield lambda text: None
     elif on_terminal():
@@ -143,7 +143,7 @@ def report_progress(text: str) -> None:
 
 def progress_listener() -> Say:
     """Return whoever listens, to be handed to code that takes a function of its own; without one, a deaf one."""
-    return _LISTENER.get() or (lambda text: None)
+    return _listener.get() or (lambda text: None)
 
 
 @contextmanager
@@ -152,11 +152,11 @@ def progress_to(say: Say | None) -> Iterator[None]:
     if say is None:
         yield
         return
-    before = _LISTENER.set(say)
+    before = _listener.set(say)
     try:
         yield
     finally:
-        _LISTENER.reset(before)
+        _listener.reset(before)
 
 
 def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[Params, Made]], Callable[Params, Made]]:
@@ -200,7 +200,7 @@ def percent(say: Say) -> Callable[[float], None]:
 def show_stage(text: str) -> Iterator[None]:
     """Show a stage within the context, beside the present one; a terminal's line stays as it is."""
     with status("sonic_bullet") as say:
-        before = _SINK.last[1]
+        before = _sink.last[1]
         if not isinstance(say, PipeSay) or text in before:
             yield
             return
@@ -223,7 +223,7 @@ def on_terminal() -> bool:
 
 def open_sink(fd: int) -> None:
     """Set the pipe for messages, read by another process."""
-    _SINK.fd = fd
+    _sink.fd = fd
 
 
 def forward(message: str) -> None:
@@ -239,13 +239,13 @@ def clear_stage(process: int | None = None) -> None:
 @contextmanager
 def waiting_for(process: int) -> Iterator[None]:
     """Show only the other process's messages while this one waits for it."""
-    last = _SINK.last
+    last = _sink.last
     clear_stage()
     try:
         yield
     finally:
         clear_stage(process)
-        if _SHOWN and any(last):
+        if _shown and any(last):
             _send(os.getpid(), *last)
 
 
@@ -267,15 +267,15 @@ def _send(process: int, label: str, text: str) -> None:
 
 
 def _write(message: str) -> None:
-    if _SINK.fd >= 0:
+    if _sink.fd >= 0:
         with suppress(OSError):
-            os.write(_SINK.fd, message.encode("utf-8", "surrogateescape"))
+            os.write(_sink.fd, message.encode("utf-8", "surrogateescape"))
 
 
 @contextmanager
 def _printed() -> Iterator[None]:
     """Ensure a reader of the pipe within the context: an existing one, or a thread."""
-    if _SINK.fd >= 0:
+    if _sink.fd >= 0:
         yield
         return
     out, into = os.pipe()

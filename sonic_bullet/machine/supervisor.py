@@ -186,7 +186,7 @@ def _work(run: Callable[[], int], fds: tuple[int, int], clock: Any, alone: bool,
     finally:
         with suppress(Exception):
             sys.stdout.flush(), sys.stderr.flush()
-        if os.getpid() != worker._LINE.process:  # a fork of the scene's own that came this far
+        if os.getpid() != worker._line.process:  # a fork of the scene's own that came this far
             leave(code)
         tell("done", str(code))
         if alone:  # as an interpreter ends; the caller of `supervised` continues in the other process alone

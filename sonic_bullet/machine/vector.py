@@ -14,9 +14,9 @@ from numba.core import cgutils
 
 LANES = 8
 
-F64, I64, I32 = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
-VEC = ir.VectorType(F64, LANES)
-BITS = ir.VectorType(ir.IntType(1), LANES)
+f64, i64, i32 = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+f64x8 = ir.VectorType(f64, LANES)
+i1x8 = ir.VectorType(ir.IntType(1), LANES)
 
 Value = Any
 Pair = tuple[Value, Value]
@@ -46,18 +46,19 @@ class Emit:
         self.builder = builder
         pairs = zip(signature.args, args, strict=True)
         self.args = [one for kind, arg in pairs for one in _flat(context, builder, kind, arg)]
-        self._fma = cgutils.get_or_insert_function(builder.module, ir.FunctionType(VEC, [VEC] * 3), "llvm.fma.v8f64")
+        kind = ir.FunctionType(f64x8, [f64x8] * 3)
+        self._fma = cgutils.get_or_insert_function(builder.module, kind, "llvm.fma.v8f64")
 
     def index(self, value: int) -> Value:
         """Return a 64-bit integer constant."""
-        return ir.Constant(I64, value)
+        return ir.Constant(i64, value)
 
     def shifted(self, base: Value, offset: int) -> Value:
         """Return the index base + offset."""
         return self.builder.add(base, self.index(offset)) if offset else base
 
     def _place(self, array: Value, offset: Value) -> Value:
-        return self.builder.bitcast(self.builder.gep(array, [offset]), VEC.as_pointer())
+        return self.builder.bitcast(self.builder.gep(array, [offset]), f64x8.as_pointer())
 
     def load(self, array: Value, offset: Value) -> Value:
         """Load eight doubles of an array from an offset."""
@@ -69,9 +70,9 @@ class Emit:
 
     def spread(self, scalar: Value) -> Value:
         """Copy the scalar to all lanes."""
-        none = ir.Constant(VEC, ir.Undefined)
-        first = self.builder.insert_element(none, scalar, ir.Constant(I32, 0))
-        return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(I32, LANES), [0] * LANES))
+        none = ir.Constant(f64x8, ir.Undefined)
+        first = self.builder.insert_element(none, scalar, ir.Constant(i32, 0))
+        return self.builder.shuffle_vector(first, none, ir.Constant(ir.VectorType(i32, LANES), [0] * LANES))
 
     def broadcast(self, array: Value, offset: Value) -> Value:
         """Load one double and copy it to all lanes."""
@@ -80,7 +81,7 @@ class Emit:
     def reversed(self, vector: Value) -> Value:
         """Reverse the order of the lanes."""
         return self.builder.shuffle_vector(
-            vector, ir.Constant(VEC, ir.Undefined), ir.Constant(ir.VectorType(I32, LANES), list(range(LANES))[::-1])
+            vector, ir.Constant(f64x8, ir.Undefined), ir.Constant(ir.VectorType(i32, LANES), list(range(LANES))[::-1])
         )
 
     def fma(self, a: Value, b: Value, c: Value) -> Value:
@@ -98,7 +99,7 @@ class Emit:
         before, inside, after = b.block, b.append_basic_block("each"), b.append_basic_block("after")
         b.cbranch(b.icmp_signed(">", count, self.index(0)), inside, after)
         b.position_at_end(inside)
-        k = b.phi(I64)
+        k = b.phi(i64)
         k.add_incoming(self.index(0), before)
         phis = []
         for value in carried:
@@ -126,14 +127,14 @@ class Emit:
             width //= 2
             none = ir.Constant(vector.type, ir.Undefined)
             low, high = (
-                ir.Constant(ir.VectorType(I32, width), list(range(first, first + width))) for first in (0, width)
+                ir.Constant(ir.VectorType(i32, width), list(range(first, first + width))) for first in (0, width)
             )
             vector = self.builder.fadd(
                 self.builder.shuffle_vector(vector, none, low), self.builder.shuffle_vector(vector, none, high)
             )
-        return self.builder.extract_element(vector, ir.Constant(I32, 0))
+        return self.builder.extract_element(vector, ir.Constant(i32, 0))
 
 
 def constant(value: float) -> Value:
     """Return the number in all lanes."""
-    return ir.Constant(VEC, [float(value)] * LANES)
+    return ir.Constant(f64x8, [float(value)] * LANES)

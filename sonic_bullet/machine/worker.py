@@ -43,7 +43,7 @@ class WorkerState:
     stopped: str = ""
 
 
-_LINE = WorkerState()
+_line = WorkerState()
 
 
 def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
@@ -54,7 +54,7 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
     """
     import faulthandler
 
-    _LINE.fd, _LINE.clock, _LINE.process = fd, clock, os.getpid()
+    _line.fd, _line.clock, _line.process = fd, clock, os.getpid()
     catch_stops()
     open_sink(fd)
     report_leftovers(lambda path: tell("left", path))
@@ -65,7 +65,7 @@ def connect(fd: int, traces: int, clock: Any, at_idle: Handler) -> None:
     leave = os._exit
 
     def tell_and_leave(status: int) -> None:
-        if os.getpid() == _LINE.process:
+        if os.getpid() == _line.process:
             frame: FrameType | None = sys._getframe(1)
             tell("exit", " ".join(_lines_of(frame))[: LONGEST - 10])
         leave(status)
@@ -111,20 +111,20 @@ def _stop(number: int, _: FrameType | None) -> None:
     """Handle the first interrupt: cleaning up is not interrupted again."""
     for word in STOPS:
         signal.signal(word, signal.SIG_IGN)
-    _LINE.stopped = STOPS[signal.Signals(number)]
-    raise KeyboardInterrupt(_LINE.stopped)
+    _line.stopped = STOPS[signal.Signals(number)]
+    raise KeyboardInterrupt(_line.stopped)
 
 
 def stop_word() -> str:
     """Return how this process was told to end; "": it was not."""
-    return _LINE.stopped
+    return _line.stopped
 
 
 def tell(kind: str, text: str = "") -> None:
     """Send a message to the supervisor, if there is one."""
-    if _LINE.fd >= 0:
+    if _line.fd >= 0:
         with suppress(OSError):
-            os.write(_LINE.fd, f"{kind} {' '.join(text.splitlines())}\n".encode("utf-8", "surrogateescape")[:LONGEST])
+            os.write(_line.fd, f"{kind} {' '.join(text.splitlines())}\n".encode("utf-8", "surrogateescape")[:LONGEST])
 
 
 def note_closing() -> None:
@@ -135,29 +135,29 @@ def note_closing() -> None:
 @contextmanager
 def running_scene(path: Path) -> Iterator[None]:
     """Report that a scene's code runs within the context."""
-    before, _LINE.scene = _LINE.scene, str(path)
+    before, _line.scene = _line.scene, str(path)
     tell("scene", str(path))
     mark_step()
     try:
         yield
     finally:
-        _LINE.scene = before
-        if not before and _LINE.clock is not None:
-            struct.pack_into("d", _LINE.clock, 0, 0.0)
+        _line.scene = before
+        if not before and _line.clock is not None:
+            struct.pack_into("d", _line.clock, 0, 0.0)
         tell("scene", before)
 
 
 def mark_step() -> None:
     """Record a physics step."""
-    if _LINE.clock is not None and _LINE.scene:
-        struct.pack_into("d", _LINE.clock, 0, time.monotonic())
+    if _line.clock is not None and _line.scene:
+        struct.pack_into("d", _line.clock, 0, time.monotonic())
 
 
 def scene_line(frame: FrameType | None) -> tuple[str, int]:
     """Return the name of the scene that runs and the line of it that a frame comes from, 0: none."""
-    while frame is not None and frame.f_code.co_filename != _LINE.scene:
+    while frame is not None and frame.f_code.co_filename != _line.scene:
         frame = frame.f_back
-    return Path(_LINE.scene).name, 0 if frame is None else frame.f_lineno
+    return Path(_line.scene).name, 0 if frame is None else frame.f_lineno
 
 
 def end_with(parent: int) -> None:

@@ -23,7 +23,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from sonic_bullet.machine.vector import BITS, F64, I32, I64, LANES, VEC, Emit, Value, constant
+from sonic_bullet.machine.vector import LANES, Emit, Value, constant, f64, f64x8, i1x8, i32, i64
 from sonic_bullet.records import Array
 
 TAPS = 24
@@ -103,7 +103,7 @@ def greatest(typingctx, source, source_at, dipole, dipole_at, stride, count):
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         e = Emit(context, builder, signature, args)
         source, source_at, dipole, dipole_at, stride, count = e.args
-        integers = ir.VectorType(I64, LANES)
+        integers = ir.VectorType(i64, LANES)
         whole = builder.and_(count, e.index(-LANES))
 
         def more(bits: Value, kind: Any, most: Value) -> Value:
@@ -123,12 +123,12 @@ def greatest(typingctx, source, source_at, dipole, dipole_at, stride, count):
                 builder.sub(count, whole),
                 1,
                 [carried[1]],
-                lambda k, now: [more(builder.load(builder.gep(values, [builder.add(whole, k)])), I64, now[0])],
+                lambda k, now: [more(builder.load(builder.gep(values, [builder.add(whole, k)])), i64, now[0])],
             )
             return [groups[0], single[0]]
 
         most, single = e.loop(e.index(4), 1, [ir.Constant(integers, [0] * LANES), e.index(0)], row)
-        lanes = _called(e, "llvm.vector.reduce.smax.v8i64", I64, most)
+        lanes = _called(e, "llvm.vector.reduce.smax.v8i64", i64, most)
         return builder.select(builder.icmp_signed(">", lanes, single), lanes, single)
 
     return types.int64(source, source_at, dipole, dipole_at, stride, count), codegen
@@ -161,7 +161,7 @@ def _each(e: Emit, count: Value, body: Any) -> None:
             b.add(whole, k),
             lambda array, at: b.load(b.gep(array, [at])),
             lambda value, array, at: b.store(value, b.gep(array, [at])),
-            lambda value: ir.Constant(F64, value),
+            lambda value: ir.Constant(f64, value),
         )
         return []
 
@@ -241,22 +241,22 @@ def emit(typingctx, arrays, stride, tail, count, geometry, emitted, delay):
             for axis in (1, 2):
                 square = e.fma(from_here[axis], from_here[axis], square)
                 dot = e.fma(from_here[axis], along[axis], dot)
-            r = _called(e, "llvm.sqrt.v8f64", VEC, square)
+            r = _called(e, "llvm.sqrt.v8f64", f64x8, square)
             inverse = builder.fdiv(constant(1.0), _greater(e, r, constant(1e-12)))
             spread = builder.select(builder.fcmp_ordered("<", inverse, known[7]), inverse, known[7])
             value = builder.fmul(e.fma(dot, inverse, given(0, source, source_at)), spread)
-            audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", VEC, value), constant(LEAST_PA))
+            audible = builder.fcmp_ordered(">=", _called(e, "llvm.fabs.v8f64", f64x8, value), constant(LEAST_PA))
             e.store(builder.select(audible, value, constant(0.0)), emitted, k)
             late = _greater(e, builder.fmul(r, known[6]), constant(LEAST_DELAY))
             e.store(late, delay, k)
-            shifted = ir.Constant(ir.VectorType(I32, LANES), list(range(LANES - 1, 2 * LANES - 1)))
+            shifted = ir.Constant(ir.VectorType(i32, LANES), list(range(LANES - 1, 2 * LANES - 1)))
             previous = builder.shuffle_vector(carried[0], late, shifted)
             falls = builder.fcmp_ordered("<", late, builder.fsub(previous, constant(MOST_FALL)))
             return [late, builder.or_(carried[1], falls)]
 
-        none = ir.Constant(BITS, [False] * LANES)
+        none = ir.Constant(i1x8, [False] * LANES)
         falls = e.loop(count, LANES, [constant(-np.inf), none], body)[1]
-        return builder.zext(builder.bitcast(falls, ir.IntType(LANES)), I64)
+        return builder.zext(builder.bitcast(falls, ir.IntType(LANES)), i64)
 
     return types.int64(arrays, stride, tail, count, geometry, emitted, delay), codegen
 
@@ -272,12 +272,12 @@ def leading(typingctx, memory, late_at, gone):
         e = Emit(context, builder, signature, args)
         memory, late_at, gone = e.args
         after = builder.add(gone, e.index(1))
-        here = builder.fadd(e.spread(builder.sitofp(gone, F64)), e.load(memory, late_at))
-        there = builder.fadd(e.spread(builder.sitofp(after, F64)), e.load(memory, e.shifted(late_at, 1)))
+        here = builder.fadd(e.spread(builder.sitofp(gone, f64)), e.load(memory, late_at))
+        there = builder.fadd(e.spread(builder.sitofp(after, f64)), e.load(memory, e.shifted(late_at, 1)))
         arrived = builder.fcmp_ordered("<=", here, constant(0.0))
         newest = builder.fcmp_ordered(">", there, constant(0.0))
         bits = builder.bitcast(builder.and_(arrived, newest), ir.IntType(LANES))
-        others = builder.xor(builder.zext(bits, I64), ir.Constant(I64, 2 ** (LANES + 1) - 1))
+        others = builder.xor(builder.zext(bits, i64), ir.Constant(i64, 2 ** (LANES + 1) - 1))
         return builder.cttz(others, ir.Constant(ir.IntType(1), 1))
 
     return types.int64(memory, late_at, gone), codegen
@@ -294,7 +294,7 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed):
         e = Emit(context, builder, signature, args)
         memory, ring_at, late_at, gone, taps, kept, observed, at = e.args
         here, there = e.load(memory, late_at), e.load(memory, e.shifted(late_at, 1))
-        since = builder.fsub(e.spread(builder.sitofp(builder.sub(e.index(0), gone), F64)), here)
+        since = builder.fsub(e.spread(builder.sitofp(builder.sub(e.index(0), gone), f64)), here)
         fraction = builder.fdiv(since, builder.fsub(builder.fadd(constant(1.0), there), here))
         t = builder.fsub(fraction, constant(0.5))
         first, last = range(AHEAD), [TAPS - 1 - k for k in range(AHEAD)]
@@ -332,7 +332,7 @@ def read(typingctx, memory, ring_at, late_at, gone, taps, kept, observed):
                 e.store(summed(lambda tap: e.load(kept, e.index(tap * LANES))), observed, at)
             with otherwise:
                 e.store(summed(made), observed, at)
-                one = e.spread(builder.extract_element(t, ir.Constant(I32, 0)))
+                one = e.spread(builder.extract_element(t, ir.Constant(i32, 0)))
                 with builder.if_then(_all(e, builder.fcmp_ordered("==", t, one))):
                     for tap in range(TAPS):
                         e.store(weight[tap], kept, e.index(tap * LANES))

@@ -26,9 +26,9 @@ Kind = TypeVar("Kind")
 Call = TypeVar("Call", bound=Callable[..., Any])
 Error = type[SonicBulletError]
 
-_SHORT = reprlib.Repr()
-_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60
-_SHORT.maxlevel = 3
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = _short.maxlong = 60
+_short.maxlevel = 3
 LISTED = 8
 """Most names that a message lists."""
 
@@ -38,7 +38,7 @@ def quote(value: object) -> str:
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of shape {value.shape}"
     try:
-        text = _SHORT.repr(value)
+        text = _short.repr(value)
     except Exception:  # a foreign object's own repr may raise anything, and an int of 5000 digits has none
         text = f"a {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:77]}..."

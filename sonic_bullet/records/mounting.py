@@ -16,20 +16,19 @@ from __future__ import annotations
 from sonic_bullet.records.coerce import as_number, quote
 from sonic_bullet.records.errors import RecordError, SonicBulletError
 
-MOST_LOSS = 1.0
-"""Largest loss factor of a mode."""
 Mounting = str | float
 
 
 def as_mounting(value: object, name: str = "mounting", error: type[SonicBulletError] = RecordError) -> Mounting:
     """Return one of mountings, or a loss factor, or raise ``error``."""
-    mounting_remedy = f"give 'free', 'placed', 'on floor' or a loss factor, 0 … {MOST_LOSS:g}"
+    most_loss = 1.0  # largest loss factor of a mode
+    mounting_remedy = f"give 'free', 'placed', 'on floor' or a loss factor, 0 … {most_loss:g}"
     mountings = ("free", "placed", "on floor")
     if isinstance(value, str):
         if value not in mountings:
             raise error(f"{name} is {quote(value)}", mounting_remedy)
         return value
-    return as_number(value, name, mounting_remedy, least=0, most=MOST_LOSS, error=error)
+    return as_number(value, name, mounting_remedy, least=0, most=most_loss, error=error)
 
 
 def usual_mounting(mass_kg: float) -> Mounting:

@@ -24,7 +24,7 @@ import msgspec
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import FileError, LogError
 from sonic_bullet.storage.container import read_container, write_container
-from sonic_bullet.storage.user_folder import START_FOLDER, cache_folder
+from sonic_bullet.storage.user_folder import cache_folder, start_folder
 
 Place = Path | Literal["default"] | None
 CACHE_FORMAT = "sonic-bullet-cache/2"
@@ -48,7 +48,7 @@ def folder(place: Place) -> Path | None:
     if place != "default":
         return Path(place)
     given = os.environ.get("SONIC_BULLET_CACHE")
-    return START_FOLDER / given if given else cache_folder("modal")
+    return start_folder / given if given else cache_folder("modal")
 
 
 def holds(place: Place, name: str) -> bool:

@@ -11,17 +11,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_REPORTERS: list[Callable[[str], None]] = []
+_reporters: list[Callable[[str], None]] = []
 
 
 def report_leftovers(reporter: Callable[[str], None]) -> None:
     """Set the function that is called with each path, in place of an earlier one."""
-    _REPORTERS[:] = [reporter]
+    _reporters[:] = [reporter]
 
 
 def note_leftover(path: str | Path) -> None:
     """Register a file or folder to be removed where this process is killed, unless it has been renamed by then."""
-    for report in _REPORTERS:
+    for report in _reporters:
         report(str(path))
 
 

@@ -14,7 +14,7 @@ import os
 import stat
 from pathlib import Path
 
-NOTES: list[str] = []
+notes: list[str] = []
 """Why something cannot be cached; empty where all is well."""
 
 
@@ -25,7 +25,7 @@ def _start() -> Path:
         return Path("/")
 
 
-START_FOLDER = _start()
+start_folder = _start()
 """Working folder when this module was imported: a scene may change it, and relative paths of the environment mean this
 one."""
 
@@ -83,5 +83,5 @@ def _root() -> Path | None:
 
 
 def _note(why: str) -> None:
-    if why not in NOTES:
-        NOTES.append(why)
+    if why not in notes:
+        notes.append(why)

@@ -32,7 +32,7 @@ def test_commands_run_as_another_user_without_a_home_on_a_read_only_install() ->
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("SONIC_BULLET_CACHE", raising=False)
-    monkeypatch.setattr(user_folder, "NOTES", [])
+    monkeypatch.setattr(user_folder, "notes", [])
     return tmp_path
 
 
@@ -43,7 +43,7 @@ def test_the_folder_of_models_is_private_and_made_so(home: Path) -> None:
     assert [stat.S_IMODE(path.stat().st_mode) for path in (home / "sonic_bullet", home / "sonic_bullet" / "modal")] == [
         0o700
     ] * 2
-    assert user_folder.NOTES == []
+    assert user_folder.notes == []
 
 
 def test_another_users_folder_is_not_believed(home: Path) -> None:
@@ -54,7 +54,7 @@ def test_another_users_folder_is_not_believed(home: Path) -> None:
     assert cache.load("default", "modes-0") is None
     cache.save("default", "modes-1", {"shape": np.arange(3.0)}, "")
     assert not (home / "sonic_bullet" / "modal" / "modes-1.npz").exists()
-    assert len(user_folder.NOTES) == 1  # said once
+    assert len(user_folder.notes) == 1  # said once
 
 
 @pytest.mark.parametrize("what", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
@@ -76,4 +76,4 @@ def test_a_home_that_is_missing_is_not_made(tmp_path: Path, monkeypatch: pytest.
 def test_a_relative_cache_means_the_folder_the_run_began_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SONIC_BULLET_CACHE", "models")
     monkeypatch.chdir(tmp_path)
-    assert cache.folder("default") == user_folder.START_FOLDER / "models"
+    assert cache.folder("default") == user_folder.start_folder / "models"

@@ -159,6 +159,11 @@ def test_no_constants_name_stands_in_two_packages() -> None:
     assert {name: sorted(where) for name, where in places.items() if len(where) > 1} == {}
 
 
+def test_modules_hold_few_constants() -> None:
+    """At most 500 in all: what decides stands beside its only user, or in a record."""
+    assert 100 < sum(len(list(constants(ast.parse(path.read_text())))) for path in MODULES) <= 500
+
+
 def test_no_two_public_classes_have_one_name() -> None:
     places = defaultdict(list)
     for path in MODULES:

@@ -42,7 +42,7 @@ PLACES = ("compiled.py", "whole_program_jit.py")
 @pytest.fixture(autouse=True)
 def unsaid(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is noted here about folders is not for the commands that later tests run in this process."""
-    monkeypatch.setattr(user_folder, "NOTES", [])
+    monkeypatch.setattr(user_folder, "notes", [])
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_a_folder_that_is_another_users_or_behind_anothers_link_is_not_used(tmp_
     (tmp_path / "file").touch()
     (tmp_path / "link").symlink_to(tmp_path / "folder")
     assert private_folder(tmp_path / "file") is None
-    assert len(user_folder.NOTES) == 1
+    assert len(user_folder.notes) == 1
     assert private_folder(tmp_path / "link") == tmp_path / "link"  # one's own, to another disk say
     if os.geteuid() == 0:
         os.chown(tmp_path / "link", 54321, 54321, follow_symlinks=False)

@@ -18,7 +18,6 @@ from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
 TURNS_RAD = 0.2  # of phase, that a mode must gain or lose to count as amplitude-dependent
-LACKS = 0.5  # of a decay, at most
 
 
 def turns_rad(p: Prediction, one: ObjectEvidence) -> Array:
@@ -87,4 +86,5 @@ def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
         t = t - np.average(t, weights=w)
         top, bottom = top - float((w * t * left).sum()), bottom + float((w * t * t).sum())
     lacks = top / bottom if bottom > 0 else 0.0
-    return decay_per_s + float(np.clip(lacks, -LACKS * decay_per_s, LACKS * decay_per_s))
+    most_lacking = 0.5  # of a decay, at most
+    return decay_per_s + float(np.clip(lacks, -most_lacking * decay_per_s, most_lacking * decay_per_s))

@@ -41,8 +41,6 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.storage.cache import Place
 
-BELOW, TOUCHES = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Baseline:
@@ -144,7 +142,8 @@ def _unclipped(one: Recorded, band_hz: tuple[float, float]) -> Recorded:
     """Use the lines of the strikes below a limit, at all strikes; unchanged without a limit or two such strikes."""
     if one.signals is None or not (limit := limit_of([one.signals])):
         return one
-    below = np.flatnonzero((np.abs(one.signals) > BELOW * limit).sum(axis=1) <= TOUCHES)
+    below_limit, least_touching = 0.998, 3  # of a limit, and samples that may reach it in a strike that stays below
+    below = np.flatnonzero((np.abs(one.signals) > below_limit * limit).sum(axis=1) <= least_touching)
     lines = _lines_by(one, below, band_hz) if 1 < len(below) < len(one.signals) else None
     if lines is None:
         return one

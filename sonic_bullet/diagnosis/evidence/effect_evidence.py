@@ -22,9 +22,6 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
 
-# of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
-OWN, ALIKE = 1e-4, 2.0
-
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
     """Collect all fitted objects' evidence under a hypothesis.
@@ -141,7 +138,11 @@ def named(h: Hypothesis, lines: Lines) -> Array:
     voices = [np.array(e.lines(), float) for e in h.effects if isinstance(e, RingsAlong)]
     freq, decay = np.concatenate(voices, axis=1) if voices else np.zeros((2, 0))
     off, own = np.abs(lines.freq_hz[:, None] - freq), np.maximum(np.nan_to_num(lines.decay_per_s), 0.0)[:, None]
-    alike = (off < decay / (2 * np.pi) + OWN * freq) & (np.maximum(own, decay) <= ALIKE * np.minimum(own, decay))
+    # of a frequency, beside its width; times its decay: a line so near a known residual voice is that voice's
+    own_width, alike_decays = 1e-4, 2.0
+    alike = (off < decay / (2 * np.pi) + own_width * freq) & (
+        np.maximum(own, decay) <= alike_decays * np.minimum(own, decay)
+    )
     off = np.where(alike, off, np.inf)
     return np.asarray((alike & (off == off.min(axis=0, initial=np.inf))).any(axis=1))
 

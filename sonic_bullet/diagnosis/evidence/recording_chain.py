@@ -26,8 +26,6 @@ LINKS = (
     # a chain's next line is so much shorter at least, and as near as that many times its decay;
     # whether modes are only bent
 )
-# links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
-PLAIN = 4
 
 
 def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
@@ -40,9 +38,11 @@ def unchained(lines: Lines, link: tuple[float, float, bool]) -> Lines | None:
     least_chains, least_share_of_chains = 4, 0.1
     groups = chains(lines, link)
     many = sum(len(g) > 1 for g in groups)
+    # links of the loudest line's chain, which bends most, the shorter the farther off: neighbours are two or three
+    plain_lines = 4
     if many < max(least_chains, least_share_of_chains * len(groups)):
         loudest = np.abs(lines.amplitude).max(axis=0).argmax() if len(groups) else -1
-        plain = [len(g) >= PLAIN and _one_direction(lines.freq_hz[g]) for g in groups]
+        plain = [len(g) >= plain_lines and _one_direction(lines.freq_hz[g]) for g in groups]
         if not any(p and loudest in g for p, g in zip(plain, groups, strict=True)):
             return None
         groups = [part for p, g in zip(plain, groups, strict=True) for part in ([g] if p else np.split(g, len(g)))]

@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.evidence.air_factor import air_factor
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import TURNS_RAD, fallen, turns_rad
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence, outside, paired, path_response
 from sonic_bullet.diagnosis.evidence.small_amplitude import at_rest
-from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION, can_tell, sought
+from sonic_bullet.diagnosis.evidence.unmatched_modes import UNMATCHED, can_tell, sought
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, bends, moves
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, impact_of, predict, predict_fitted, undamped
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
@@ -36,7 +36,6 @@ from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
 
 ROUGH_LINES = 0.02
-NEAR_LINES, ALIKE = 5e-3, 1.6  # of ln f and ln d: lines of one mode
 
 
 def refitted(
@@ -157,13 +156,15 @@ def corrected(h: Hypothesis, bodies: tuple[Struck, ...], *, anew: bool = False) 
         own_hz = undamped(h, body).freq_hz
         # lines of degenerate modes go to their own: half a split off, either would do
         for e in (e for e in h.effects if isinstance(e, SplitsPairs)):
-            found[body.name] = np.clip(e.observed_correction(own_hz * np.exp(h.stretch)), -CORRECTION, CORRECTION)
+            found[body.name] = np.clip(
+                e.observed_correction(own_hz * np.exp(h.stretch)), -UNMATCHED.correction, UNMATCHED.correction
+            )
         for _ in range(2):
             place, off = _off(predict(replace(h, correction=found), body), anew)
             ratio = np.array(found.get(body.name, np.zeros(len(own_hz))), float)
             step = np.zeros(len(ratio))
             step[place] = np.expm1(off)
-            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -CORRECTION, CORRECTION)
+            found[body.name] = np.clip((1 + ratio) * (1 + step) - 1, -UNMATCHED.correction, UNMATCHED.correction)
             if not moves(h) or any(isinstance(e, SplitsPairs) for e in h.effects):
                 found[body.name] = _alike(own_hz, found[body.name])
         if can_tell(body):
@@ -265,11 +266,13 @@ def whole(one: ObjectEvidence) -> Array:
     if one.dry or not len(one.foreign_hz) or not len(one.freq_hz):
         return one.amplitude  # in a room what rings close by is mostly the room
     gap = np.abs(np.log(one.foreign_hz[:, None] / one.freq_hz[None, :]))
+    near_lines, alike_decays = 5e-3, 1.6  # of ln f and ln d: lines of one mode
     # clicks are no part of a mode
     alike = (
-        np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3))) < ALIKE
+        np.abs(np.log(np.maximum(one.foreign_decay_per_s[:, None], 1e-3) / np.maximum(one.decay_per_s, 1e-3)))
+        < alike_decays
     )
-    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < NEAR_LINES) & alike
+    mine = (gap.argmin(axis=1)[:, None] == np.arange(len(one.freq_hz))) & (gap < near_lines) & alike
     return np.asarray(one.amplitude + one.foreign_amplitude @ mine)
 
 

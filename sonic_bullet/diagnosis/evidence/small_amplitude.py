@@ -15,16 +15,13 @@ import numpy as np
 
 from sonic_bullet.diagnosis.evidence.amplitude_dependence import amplitude_dependent
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
-from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
+from sonic_bullet.diagnosis.evidence.unmatched_modes import UNMATCHED
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.common.envelope import Envelopes, alone, shifted
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
-
-DELTA_STEP = 0.1  # of 1/duration: steps of δ
-AGREE = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
 
 
 def at_rest(
@@ -73,10 +70,10 @@ def _rested(p: Prediction, strike: tuple[int, ...], every: bool) -> Array:
         # or it would be taken for its neighbour
         next_hz = np.abs(np.delete(modes.freq_hz, one.mode[k]) - modes.freq_hz[one.mode[k]]).min(initial=np.inf)
         ratio = 1 + _off_hz(
-            recorded, model, q, min(CORRECTION * float(one.freq_hz[k]), halfway * float(next_hz))
+            recorded, model, q, min(UNMATCHED.correction * float(one.freq_hz[k]), halfway * float(next_hz))
         ) / float(one.freq_hz[k])
         who = p.order[one.mode[k]]
-        correction[who] = np.clip((1 + correction[who]) * ratio - 1, -CORRECTION, CORRECTION)
+        correction[who] = np.clip((1 + correction[who]) * ratio - 1, -UNMATCHED.correction, UNMATCHED.correction)
     return correction
 
 
@@ -94,7 +91,8 @@ def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> fl
         return 0.0
     longest = max(float(np.ptp(t)) for t, _ in rows)
     frame = min(float(np.median(np.diff(t))) for t, _ in rows)
-    step, reach = DELTA_STEP / longest, min(most_hz, 0.4 / frame)
+    delta_step = 0.1  # of 1/duration: steps of δ
+    step, reach = delta_step / longest, min(most_hz, 0.4 / frame)
 
     def agree(delta: Array) -> Array:
         return np.asarray(np.sum([np.abs(u @ np.exp(-2j * np.pi * np.outer(t, delta))) for t, u in rows], axis=0))
@@ -102,7 +100,8 @@ def _off_hz(recorded: Envelopes, model: Envelopes, q: int, most_hz: float) -> fl
     coarse = step * np.arange(-int(reach / step), int(reach / step) + 1)
     score = agree(coarse)
     best = int(score.argmax())
-    if best in (0, len(coarse) - 1) or score[best] < AGREE * sum(float(np.abs(u).sum()) for _, u in rows):
+    agreeing = 0.5  # of all frames' worth, once shifted: what is played is what was recorded
+    if best in (0, len(coarse) - 1) or score[best] < agreeing * sum(float(np.abs(u).sum()) for _, u in rows):
         return 0.0  # its best is elsewhere, or nowhere
     fine = coarse[best] + step * np.linspace(-1, 1, 41)
     return float(fine[int(agree(fine).argmax())])

@@ -24,8 +24,6 @@ from sonic_bullet.modal.tensor import TensorFamily, tensor_family
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.storage.cache import Place
 
-MODES = (30, 160)
-
 
 def with_elastic(
     found: CaseFit,
@@ -111,12 +109,14 @@ def elastic_of(
     kept = 12  # solved tensors
     thing = case.objects[name]
 
+    modes = (30, 160)
+
     @lru_cache(maxsize=1)
     def family() -> TensorFamily:
         return tensor_family(
             read_mesh(thing.mesh or "", thing.scale),
             poisson=guess_of(thing).poisson,
-            count=int(np.clip(count, *MODES)),
+            count=int(np.clip(count, *modes)),
             fixed=thing.fixed,
             cache=cache,
             progress=say,

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from sonic_bullet.effects.protocol import CARRIES, Effect, Mixing, Owner, Stage
 from sonic_bullet.records import Array
 
-OWNER_ORDER = tuple(Owner)  # material, object, fixture, striker, room, chain: a sound's
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
@@ -46,7 +44,7 @@ class Hypothesis:
     def at(self, stage: Stage, *, fitted: bool = True) -> tuple[Effect, ...]:
         """Return the effects of a stage; for an object that was not fitted only those that carry over."""
         mine = (e for e in self.effects if e.stage is stage and (fitted or carries(e)))
-        return tuple(sorted(mine, key=lambda e: OWNER_ORDER.index(e.owner)) if stage is Stage.SOUND else mine)
+        return tuple(sorted(mine, key=lambda e: tuple(Owner).index(e.owner)) if stage is Stage.SOUND else mine)
 
 
 def carries(effect: Effect) -> bool:

@@ -10,6 +10,7 @@ hold for it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,15 +20,14 @@ from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.estimator.lines.line_values import lines_at
 from sonic_bullet.records import Array
 
-FOLDS = 4
 CAP = 0.03
-MESH = 1e-3  # of a frequency: what a good mesh gets wrong
-DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineObservation:
     """Some lines (k,) of a body, by index, to be compared with a hypothesis; the others are for learning."""
+
+    folds: ClassVar[int] = 4
 
     body: Struck
     line: Array
@@ -41,7 +41,8 @@ class LineObservation:
         """Return the reason why they have no distance from a prediction; empty where they have one."""
         assert self.body.recorded is not None
         count = len(self.body.recorded.lines.freq_hz)
-        return "" if count >= 2 * FOLDS else f"holds {count}, and {2 * FOLDS} are needed to leave some out in turn"
+        least = 2 * self.folds
+        return "" if count >= least else f"holds {count}, and {least} are needed to leave some out in turn"
 
     def distance(self, p: Prediction) -> float:
         """Compute D in dB."""
@@ -72,11 +73,12 @@ class LineObservation:
 
 
 def listed(bodies: tuple[Struck, ...]) -> tuple[LineObservation, ...]:
-    """Divide every body's lines into parts that are left out in turn; too few stay together (`Listed.hindrance`)."""
+    """Divide every body's lines into parts that are left out in turn; too few stay together (`hindrance`)."""
     made = []
     for body in (b for b in bodies if b.recorded is not None):
         count = len(body.recorded.lines.freq_hz) if body.recorded is not None else 0
-        made += [LineObservation(body, np.arange(i, count, FOLDS)) for i in range(FOLDS if count >= 2 * FOLDS else 1)]
+        folds = LineObservation.folds
+        made += [LineObservation(body, np.arange(i, count, folds)) for i in range(folds if count >= 2 * folds else 1)]
     return tuple(made)
 
 
@@ -103,9 +105,11 @@ def distance_db(off: Array, lost: Array) -> float:
     """Compute D of |ln f/f_j| (k,) and |ln d/d_j| (k,)."""
     if not len(off):
         return float("nan")
-    found = [20 * np.log10(1 + np.sqrt((off**2).mean()) / MESH)]
+    mesh = 1e-3  # of a frequency: what a good mesh gets wrong
+    found = [20 * np.log10(1 + np.sqrt((off**2).mean()) / mesh)]
+    db = 20 / np.log(10)
     if np.isfinite(lost).any():
-        found.append(DB * np.sqrt(np.nanmean(np.minimum(lost, 3.0) ** 2)))
+        found.append(db * np.sqrt(np.nanmean(np.minimum(lost, 3.0) ** 2)))
     return float(np.mean(found))
 
 

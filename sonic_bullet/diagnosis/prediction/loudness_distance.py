@@ -16,25 +16,24 @@ from sonic_bullet.estimator.perceptual.image import loudness_levels
 from sonic_bullet.records.errors import RecordError
 from sonic_bullet.signal.log_spectral import with_noise
 
-FULL_SCALE = 90.0
-OBSERVED = 0.05  # sone
-
 
 def sone_distance(takes: Comparable, made: Predictions) -> float | None:
     """Compute the mean distance of the takes from a prediction in sone; None where none is audible."""
     levels = 2
     found = []
+    full_scale = 90.0
+    observed_sone = 0.05  # sone
     for take in (t for t in takes if isinstance(t, AudioObservation)):
         played = with_noise(take.played(made[take.body]), take.floor, take.strike)
         try:
             a, b = (
-                loudness_levels(x, take.sr, 0.0, FULL_SCALE, levels=levels, bark_step=1.0)
+                loudness_levels(x, take.sr, 0.0, full_scale, levels=levels, bark_step=1.0)
                 for x in (take.sample, played)
             )
         except RecordError:
             continue
         for one, two in zip(a, b, strict=False):
-            observed = one.loud.sum(axis=1) > OBSERVED
+            observed = one.loud.sum(axis=1) > observed_sone
             if observed.any():
                 found.append(float(np.abs(one.loud - two.loud).sum(axis=1)[observed].mean()))
     return float(np.mean(found)) if found else None

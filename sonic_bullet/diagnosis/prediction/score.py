@@ -30,7 +30,6 @@ from sonic_bullet.signal.log_spectral import SPECTRAL, Floor, floor_between, pow
 
 # rms of a noisy take of a cell with power over noise ABOVE
 EDGE_DB = float(20 / np.log(10) / np.sqrt(2 * SPECTRAL.above_noise))
-KEPT_SPECTRA = 24  # takes whose spectra are kept
 
 
 class ScoredObservation(Protocol):
@@ -227,7 +226,7 @@ class AudioObservation:
         return _stated(distance_at(again, power, _spectra(self)[1], gain))
 
 
-@lru_cache(maxsize=KEPT_SPECTRA)
+@lru_cache(maxsize=24)  # takes whose spectra are kept
 def _spectra(take: AudioObservation) -> tuple[tuple[Array, ...], Floor]:
     """Compute the powers of a take, and its noise in the band that is recorded."""
     return power_spectra(take.sample), take.floor.within(take.sr, take.body.band_hz)

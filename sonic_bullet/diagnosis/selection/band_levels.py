@@ -5,10 +5,10 @@
     off:  |mean_s d| > band_apart_db, and strong_evidence that it is not 0,
         over the strikes s in which either is ABOVE over the noise N
 
-A correction may put a mode CORRECTION away, over a band's edge, and a window spreads it over LOBE cells to each
-side: recorded is more only where it is more than what is played so much beyond the band, too, and the other way round.
-Each band has the shortest window of which it holds a main lobe. No effect is looked for here: it can only revoke
-a verdict `none`.
+A correction may put a mode UNMATCHED.correction away, over a band's edge, and a window spreads it over two cells to
+each side: recorded is more only where it is more than what is played so much beyond the band, too, and the other way
+round. Each band has the shortest window of which it holds a main lobe. No effect is looked for here: it can only
+revoke a verdict `none`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sonic_bullet.diagnosis.evidence.unmatched_modes import CORRECTION
+from sonic_bullet.diagnosis.evidence.unmatched_modes import UNMATCHED
 from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
 from sonic_bullet.diagnosis.selection.acceptance import evidence
@@ -29,8 +29,6 @@ from sonic_bullet.signal.log_spectral import SPECTRAL, Floor
 
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF_BAND = 2 ** (1 / 6)  # of a third octave, to each side
-SHOWN = 4  # in words
-LOBE = 2  # cells from the middle of a Hann window's main lobe to its first zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +110,12 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     low, high = CENTRE_HZ / HALF_BAND, CENTRE_HZ * HALF_BAND
     inside = (low >= band_hz[0]) & (high <= min(band_hz[1], sr / 2))
     fits = [w for w in windows if w <= len(recorded)]
-    window = np.array([next((w for w in fits if 2 * LOBE * sr / w <= wide), 0) for wide in high - low])
+    lobe = 2  # cells from the middle of a Hann window's main lobe to its first zeros
+    window = np.array([next((w for w in fits if 2 * lobe * sr / w <= wide), 0) for wide in high - low])
     for w in np.unique(window[inside & (window > 0)]):
         who = np.flatnonzero(inside & (window == w))
         cell, mine = sr / w, (low[who], high[who])
-        edge = np.maximum(LOBE * cell, CORRECTION * CENTRE_HZ[who])
+        edge = np.maximum(lobe * cell, UNMATCHED.correction * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
         (a, near_a), (b, near_b) = (
             (_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w))
@@ -187,7 +186,7 @@ def _scatter_db(over: Array) -> float:
 
 
 def in_words(bands: Sequence[BandOff]) -> str:
-    """Describe the SHOWN bands that are farthest off; bands that overlap as one, with the largest value."""
+    """Describe the shown bands that are farthest off; bands that overlap as one, with the largest value."""
     runs: list[list[BandOff]] = []
     for band in bands:
         last = runs[-1][-1] if runs else None
@@ -199,8 +198,9 @@ def in_words(bands: Sequence[BandOff]) -> str:
         )
         runs = [*runs[:-1], [*runs[-1], band]] if one else [*runs, [band]]
     runs = sorted(runs, key=lambda run: -max(abs(band.recorded_over_played_db) for band in run))
-    said = [_said(run) for run in runs[:SHOWN]]
-    return "; ".join(said) + (f"; and {len(runs) - SHOWN} more" if len(runs) > SHOWN else "")
+    shown = 4  # in words
+    said = [_said(run) for run in runs[:shown]]
+    return "; ".join(said) + (f"; and {len(runs) - shown} more" if len(runs) > shown else "")
 
 
 def _said(run: Sequence[BandOff]) -> str:

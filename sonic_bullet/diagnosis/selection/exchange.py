@@ -31,8 +31,6 @@ from sonic_bullet.effects.protocol import Dereverberates, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
-EXCHANGE_TURNS = 2
-
 Less = Callable[[Evidence], Evidence]
 
 
@@ -41,9 +39,7 @@ def rivals(found: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]
     return tuple(c for c in found if c is not best and c.mean_db > RULES.most_share * best.mean_db)
 
 
-def together(
-    h: Hypothesis, problem: DiagnosisProblem, *, turns: int = EXCHANGE_TURNS, less: Less = lambda e: e
-) -> Hypothesis:
+def together(h: Hypothesis, problem: DiagnosisProblem, *, turns: int = 2, less: Less = lambda e: e) -> Hypothesis:
     """Fit each effect again with the others.
 
     Parameters

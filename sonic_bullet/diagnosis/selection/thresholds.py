@@ -17,9 +17,6 @@ def _rule(value: float, unit: str, reason: str, provenance: str) -> Any:
     return field(default=value, metadata={"unit": unit, "reason": reason, "provenance": provenance})
 
 
-WORDS = ("unit", "reason", "provenance")
-
-
 @dataclass(frozen=True, slots=True)
 class Thresholds:
     """All of them. Raises ValueError where one is out of its range, or has no unit, reason or provenance."""
@@ -92,7 +89,8 @@ class Thresholds:
 def rows(rules: Thresholds) -> list[tuple[str, float, str, str, str]]:
     """Return every name with its number, unit, reason and provenance, in their order."""
     every = zip(fields(rules), astuple(rules), strict=True)
-    return [(f.name, value, *(f.metadata[k] for k in WORDS)) for f, value in every]
+    words = ("unit", "reason", "provenance")
+    return [(f.name, value, *(f.metadata[k] for k in words)) for f, value in every]
 
 
 def table(rules: Thresholds) -> str:

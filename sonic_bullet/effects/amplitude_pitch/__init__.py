@@ -11,7 +11,7 @@ about their own axes (degenerate_pitch.py).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -31,9 +31,17 @@ from sonic_bullet.effects.protocol import (
 from sonic_bullet.records import Array
 
 MEASURES = ("impulse", "velocity", "displacement")
-# times the bend that degenerate modes were identified with as if each pair were one mode
-FAR = np.geomspace(0.6, 1.7, 12)
-NEAR = np.geomspace(0.93, 1.07, 5)  # about what that leads to
+
+
+class _GrowthsTried(NamedTuple):
+    """Factors by which a growth is searched."""
+
+    # times the bend that degenerate modes were identified with as if each pair were one mode
+    far: Array = np.geomspace(0.6, 1.7, 12)
+    near: Array = np.geomspace(0.93, 1.07, 5)  # about what that leads to
+
+
+GROWTHS_TRIED = _GrowthsTried()
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +113,8 @@ class AmplitudePitch(TurnsPairs):
             return cls(b.bend, measure)
         bend = b.bend
         if not b.single:
-            bend = known.bend if known is not None else bend_with_axes(e, h, measure, bend, FAR)
-            bend = bend_with_axes(e, h, measure, bend, NEAR)
+            bend = known.bend if known is not None else bend_with_axes(e, h, measure, bend, GROWTHS_TRIED.far)
+            bend = bend_with_axes(e, h, measure, bend, GROWTHS_TRIED.near)
         if held and known is not None:
             return cls(bend, measure, known.freq_hz, known.turn_rad)
         return cls(bend, measure, *axes_of(e, h, measure, bend))

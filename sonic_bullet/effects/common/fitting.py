@@ -16,7 +16,7 @@ import numpy as np
 from sonic_bullet.effects.common.declared_numbers import signed_fields
 from sonic_bullet.records import Array
 
-E = TypeVar("E", bound=Any)  # a dataclass
+Fitted = TypeVar("Fitted", bound=Any)  # a dataclass
 
 
 def bracket(cost: Callable[[float], float], grid: Array) -> tuple[float, float]:
@@ -40,7 +40,7 @@ def nearby(cost: Callable[[Array], float], start: Array, step: Array, most: int 
     return float(found.fun), found.x
 
 
-def fitted(start: E, free: Sequence[str], residual: Callable[[E], Array]) -> tuple[float, E]:
+def fitted(start: Fitted, free: Sequence[str], residual: Callable[[Fitted], Array]) -> tuple[float, Fitted]:
     """Fit fields of an effect: (twice the cost, effect).
 
     Parameters
@@ -57,7 +57,7 @@ def fitted(start: E, free: Sequence[str], residual: Callable[[E], Array]) -> tup
     signed = np.isin(free, list(signed_fields(start.__class__)))
     first = np.array([vars(start)[name] for name in free])
 
-    def made(x: Array) -> E:
+    def made(x: Array) -> Fitted:
         values: dict[str, Any] = dict(zip(free, np.where(signed, x, np.exp(x)).tolist(), strict=True))
         return replace(start, **values)
 

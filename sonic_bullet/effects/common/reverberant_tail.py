@@ -24,11 +24,8 @@ from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
 from sonic_bullet.records import Array
 
 FRAME_S = 0.012
-DENSE, FRAMES = 24, 56  # frames one after another, then ever farther apart
 LEAST = 4  # frames: in less no tail shows
 FASTEST = 300.0  # 1/s: what dies sooner is gone within a frame or two, and how soon is not identifiable
-# squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
-LIKE = 0.7
 STANDARD_ERRORS = 0.1  # of a decay and of an amplitude: the tail's early echoes are no noise
 
 
@@ -138,7 +135,9 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     like = np.abs((np.conj(own) * h.amplitude).sum(axis=0)) ** 2 / np.maximum(
         (np.abs(own) ** 2).sum(axis=0) * (np.abs(h.amplitude) ** 2).sum(axis=0), 1e-300
     )
-    ln_sd = np.where((decay > FASTEST) | (like < LIKE), np.inf, np.hypot(r.ln_sd[0], STANDARD_ERRORS))
+    # squared cosine of amplitudes over the strikes and what the model says: a line less like its mode is the room's own
+    like_tail = 0.7
+    ln_sd = np.where((decay > FASTEST) | (like < like_tail), np.inf, np.hypot(r.ln_sd[0], STANDARD_ERRORS))
     dry = replace(
         h,
         freq_hz=h.freq_hz + r.shift_hz[0],
@@ -202,8 +201,13 @@ def _frames(h: ObjectEvidence) -> tuple[Array, Array]:
     window = np.hanning(round(FRAME_S * h.sr) + 2)[1:-1]
     hop = len(window) // 2
     last = max((h.signal.shape[1] - len(window)) // hop, 1)
-    dense = np.arange(min(DENSE, last))
-    sparse = np.geomspace(DENSE, last, FRAMES - DENSE).round().astype(int) if last > DENSE else dense[:0]
+    dense_frames, frame_count = 24, 56  # frames one after another, then ever farther apart
+    dense = np.arange(min(dense_frames, last))
+    sparse = (
+        np.geomspace(dense_frames, last, frame_count - dense_frames).round().astype(int)
+        if last > dense_frames
+        else dense[:0]
+    )
     return hop * np.unique(np.concatenate([dense, sparse])), window / window.sum()
 
 

@@ -23,7 +23,6 @@ from sonic_bullet.effects.common.fitting import fitted
 from sonic_bullet.effects.protocol import Effect, Evidence, Number, Owner, Stage, Traits, ascending
 from sonic_bullet.records import Array, Material, ModalModel
 
-LAWS = ("constant-loss", "power", "relaxation")
 OMEGA_1 = 2000 * np.pi
 
 
@@ -48,7 +47,7 @@ class DampingLaw(Effect):
     reference: ClassVar[str] = "Cremer, Heckl, Petersson 2005, ch. 3; Nowick & Berry 1972, ch. 3"
     traits: ClassVar[Traits] = Traits(replaces_rayleigh=True)
 
-    law: Annotated[str, Number("which", known=LAWS)]
+    law: Annotated[str, Number("which", known=("constant-loss", "power", "relaxation"))]
     eta: Annotated[float, Number("loss factor η (at 1 kHz for a power)", least=0.0, free=1)]
     exponent: Annotated[float, Number("p, of the decay as a power of ω", free=1, of="exponent")] = 1.0
     strength: Annotated[float, Number("Δ of the relaxation", least=0.0, free=1, of="strength")] = 0.0

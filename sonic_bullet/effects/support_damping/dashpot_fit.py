@@ -5,7 +5,7 @@
     d_k = Δ_k(dashpots) + law(ω_k),
         law = ½[a + bω + cω² + Σ_j e_j (ωτ_j)²/(1 + (ωτ_j)²)] or as it is, a, b, c, e >= 0, refitted beside every trial
         by Huber's loss: a discrete spectrum of relaxations, as of a passive solid [Nowick & Berry 1972, ch. 3]
-    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (SCATTER Δ_k)² + (LAW d_k)²)) + (1 − C_k²)/ROUGH² + ρ(l_k/LEVEL)],
+    left = Σ_k worth_k [ρ((d_k − Δ_k − law)/√(sd_k² + (scatter Δ_k)² + (law d_k)²)) + (1 − C_k²)/rough² + ρ(l_k/level)],
         each bounded, ρ Cauchy's;
         lines that no mode explains count as outliers, and so do modes that would be observable and have no line
 
@@ -27,19 +27,9 @@ from sonic_bullet.effects.common.dashpots import apart, coupled
 from sonic_bullet.effects.common.pairs import every_line
 from sonic_bullet.effects.common.points import solved, vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
+from sonic_bullet.effects.support_damping.dashpot_numbers import DASHPOTS
 from sonic_bullet.effects.support_damping.smooth_law import least_law, smooth_columns
 from sonic_bullet.records import Array, ModalModel
-
-# of what dashpots add to a decay, of the decay, and of a pattern, relative: shapes err, and laws
-SCATTER, LAW, ROUGH = 0.05, 0.02, 0.15
-WIDTH, DECADE, LEVEL = 0.004, 0.4, 0.3  # of ln f and ln d, of a pair; of ln of a line's level
-# squared spreads from where on a decay's misfit costs less, and that a pattern costs which nothing explains
-MISSED = 9.0
-GROSS = 4 * MISSED  # that a decay costs at most: a few spreads may be a shape's error, half or twice is none
-LOST = 2 * GROSS + MISSED  # that a line costs at most
-MUTE = MISSED  # that a mode costs that no line shows: a mesh may have it elsewhere
-# modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with the cube
-RUN, WIDE = 10, 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +115,7 @@ class DashpotFit:
         good = np.isfinite(decay) & (decay > 0)
         freq, size, decay, index = freq[good], size[:, good], decay[good], index[good]
         is_mode = index < len(h.freq_hz)
-        at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < WIDTH
+        at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < DASHPOTS.width
         strength = np.nan_to_num(size).max(axis=0)
         worth = np.clip(
             1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1
@@ -137,10 +127,13 @@ class DashpotFit:
         known = into.any(axis=1)  # strikes of unknown place tell decays, no pattern
         amplitude, into = (amplitude[known], into[known]) if known.any() else (amplitude, into)
         through = np.nan_to_num(np.abs(h.push).max(axis=0) / np.maximum(np.abs(into * out).max(axis=0), 1e-300))
+        # modes whose coupling is reckoned with in a first look, and in a closer one: what eigenvalues cost goes with
+        # the cube
+        run, wide = 10, 20
         return cls(
             freq,
             decay,
-            np.hypot(np.nan_to_num(sd[index], posinf=1e9), LAW * decay) + 1e-3,
+            np.hypot(np.nan_to_num(sd[index], posinf=1e9), DASHPOTS.law * decay) + 1e-3,
             amplitude,
             worth,
             every,
@@ -152,8 +145,8 @@ class DashpotFit:
             np.unique(x.face),
             into,
             out,
-            tuple(apart(x.freq_hz, RUN)),
-            tuple(apart(x.freq_hz, WIDE)),
+            tuple(apart(x.freq_hz, run)),
+            tuple(apart(x.freq_hz, wide)),
             least_law(h.omega, h.decay_per_s),
         )
 
@@ -222,7 +215,7 @@ class DashpotFit:
 
     def _by_law(self, law: Array, omega: Array, extra: Array, column: Array, push: Array, turns: int) -> float:
         """Compute the misfit where lines and modes are paired by a law (m,), then by the law fitted to the pairs."""
-        nothing = LOST * float(self.worth.sum())
+        nothing = DASHPOTS.lost * float(self.worth.sum())
         for _ in range(turns):
             alike = self._alike(omega, extra + law, push)
             line, mode, _ = self._pairs(omega, extra + law, alike)
@@ -230,21 +223,21 @@ class DashpotFit:
                 return 2 * nothing  # nor is any mode observed
             worth, sd = (
                 self.worth[line],
-                np.hypot(self.sd[line], SCATTER * np.minimum(extra[mode], self.decay_per_s[line])),
+                np.hypot(self.sd[line], DASHPOTS.scatter * np.minimum(extra[mode], self.decay_per_s[line])),
             )
             law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
-        decays = np.minimum(MISSED * np.log1p(off**2 / MISSED), GROSS)
+        decays = np.minimum(DASHPOTS.missed * np.log1p(off**2 / DASHPOTS.missed), DASHPOTS.gross)
         observed, modelled = (
             self._seen(self.size),
             self._seen(self._amplitudes_at_lines(line, omega[mode], omega, extra + law, push)),
         )
-        patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / ROUGH**2, MISSED)
-        level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / LEVEL
-        levels = np.minimum(MISSED * np.log1p(level**2 / MISSED), GROSS)
+        patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / DASHPOTS.rough**2, DASHPOTS.missed)
+        level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / DASHPOTS.level
+        levels = np.minimum(DASHPOTS.missed * np.log1p(level**2 / DASHPOTS.missed), DASHPOTS.gross)
         return (
             nothing
-            + float((worth * (decays + patterns + levels - LOST)).sum())
+            + float((worth * (decays + patterns + levels - DASHPOTS.lost)).sum())
             + self._unobserved(mode, omega, extra + law, push)
         )
 
@@ -267,11 +260,11 @@ class DashpotFit:
             & (freq > freq[paired].min())
             & (freq < freq[paired].max())
         )
-        near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * WIDTH
+        near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * DASHPOTS.width
         # a line of unknown decay may be any
         hidden = (near & ~(self.rings_per_s[:, None] > longer * decay[loud])).any(axis=0)
         worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[paired].max(), 1e-300), 1e-6)), 0.1, 1)
-        return float(MUTE * worth[~hidden].sum())
+        return float(DASHPOTS.mute * worth[~hidden].sum())
 
     def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
         """Compute amplitudes (s, k) at the lines' poles that fit all modes: Σ_l <e_k, e_l> A_l = Σ_i <e_k, e_i> a_i.
@@ -308,7 +301,9 @@ class DashpotFit:
 
         off = np.log(2 * np.pi * self.freq_hz)[:, None] - np.log(omega)[None, :]
         worse = np.log(self.decay_per_s)[:, None] - np.log(np.maximum(decay, 1e-3))[None, :]
-        price = np.minimum((off / WIDTH) ** 2 / 18 + (worse / DECADE) ** 2 / 18 + 1 - alike, 1.0) - 1.0
+        price = (
+            np.minimum((off / DASHPOTS.width) ** 2 / 18 + (worse / DASHPOTS.decade) ** 2 / 18 + 1 - alike, 1.0) - 1.0
+        )
         row, column = linear_sum_assignment(price * self.worth[:, None])
         good = price[row, column] < 0
         row, column = row[good], column[good]

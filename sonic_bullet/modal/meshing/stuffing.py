@@ -11,6 +11,7 @@ Elements are all of one size and well shaped. The price: creases of the surface 
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,16 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
 
-GROUP = 8  # faces that are one dipole from afar
-GROUPS = 8  # groups that are one larger group
+
+class _Dipoles(NamedTuple):
+    """Faces and groups that are one from afar."""
+
+    group: int = 8  # faces that are one dipole from afar
+    groups: int = 8  # groups that are one larger group
+
+
+DIPOLES = _Dipoles()
+
 EDGE_PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # A wedge 012 345 turned so that its vertex k comes first [Dompierre et al. 1999, table 1]
 TURNED_WEDGES = np.array(
@@ -99,7 +108,7 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
     corner_m = np.ascontiguousarray(corner_m, float)
     vector = np.cross(corner_m[:, 1] - corner_m[:, 0], corner_m[:, 2] - corner_m[:, 0]) / 2
     area = np.linalg.norm(vector, axis=1)
-    levels, members = [], GROUP
+    levels, members = [], DIPOLES.group
     while True:  # groups of faces, groups of groups, until they are few
         start = np.arange(0, len(corner_m), members)
         total = np.add.reduceat(area, start)
@@ -107,9 +116,9 @@ def winding_number(corner_m: Array, point_m: Array) -> Array:
         here = middle[np.arange(len(corner_m)) // members]
         reach = np.maximum.reduceat(np.linalg.norm(corner_m - here[:, None], axis=2).max(axis=1), start)
         levels.append(np.column_stack([middle, np.add.reduceat(vector, start), far * reach]))
-        if len(start) <= GROUPS:
+        if len(start) <= DIPOLES.groups:
             break
-        members *= GROUPS
+        members *= DIPOLES.groups
     first = np.cumsum([0, *(len(level) for level in levels)])
     return np.asarray(_winding(corner_m, np.concatenate(levels), first, np.ascontiguousarray(point_m, float)))
 
@@ -122,7 +131,7 @@ def _winding(corner, group, first, point):
     1,).
     """
     total = np.empty(len(point))
-    waits = np.empty((len(first) * GROUPS, 2), np.int64)
+    waits = np.empty((len(first) * DIPOLES.groups, 2), np.int64)
     for k in range(len(point)):
         x, y, z = point[k]
         top = len(first) - 2
@@ -139,12 +148,12 @@ def _winding(corner, group, first, point):
             if away > g[6]:
                 angle += (a * g[3] + b * g[4] + c * g[5]) / away**3
             elif level:
-                end = min((which + 1) * GROUPS, first[level] - first[level - 1])
-                for child in range(end - 1, which * GROUPS - 1, -1):
+                end = min((which + 1) * DIPOLES.groups, first[level] - first[level - 1])
+                for child in range(end - 1, which * DIPOLES.groups - 1, -1):
                     waits[count, 0], waits[count, 1] = level - 1, child
                     count += 1
             else:
-                for f in range(which * GROUP, min((which + 1) * GROUP, len(corner))):
+                for f in range(which * DIPOLES.group, min((which + 1) * DIPOLES.group, len(corner))):
                     angle += _solid_angle(corner[f], x, y, z)
         total[k] = angle / (4 * np.pi)
     return total

@@ -13,9 +13,6 @@ import numpy as np
 
 from sonic_bullet.records import Array
 
-NEARER, PASSES = 0.5, 6
-"""Frequencies err as h^4μ/2 >= h, μ >= 1/2 [Williams 1952]: by a 64th of what they did."""
-
 
 class Triangulated(NamedTuple):
     """Triangles of a section.
@@ -37,12 +34,13 @@ def graded(made: Triangulated, corner: Array) -> Triangulated:
     """Grade triangles towards points of the outline, corner (k,)."""
     point, triangle = [*made.point], [tuple(three) for three in made.triangle.tolist()]
     ring, middle, owner = list(range(len(made.middle))), [*made.middle], made.owner.tolist()
+    nearer, passes = 0.5, 6  # frequencies err as h^4μ/2 >= h, μ >= 1/2 [Williams 1952]: by a 64th of what they did
     for one in corner.tolist():
-        for _ in range(PASSES):
+        for _ in range(passes):
             place = ring.index(one)
             before, after = ring[place - 1], ring[(place + 1) % len(ring)]
-            cut = {after: _cut_side(point, ring, middle, owner, place, NEARER)}
-            cut[before] = _cut_side(point, ring, middle, owner, ring.index(before), 1 - NEARER)
+            cut = {after: _cut_side(point, ring, middle, owner, place, nearer)}
+            cut[before] = _cut_side(point, ring, middle, owner, ring.index(before), 1 - nearer)
             near = [three for three in triangle if one in three]
             triangle = [three for three in triangle if one not in three]
             for three in near:
@@ -51,7 +49,7 @@ def graded(made: Triangulated, corner: Array) -> Triangulated:
                 for end in (b, c):
                     if end not in cut:
                         cut[end] = len(point)
-                        point.append(point[one] + NEARER * (point[end] - point[one]))
+                        point.append(point[one] + nearer * (point[end] - point[one]))
                 triangle += [(one, cut[b], cut[c]), (cut[b], b, c), (cut[b], c, cut[c])]
     inner = np.setdiff1d(np.arange(len(point)), ring)
     order = np.concatenate([ring, inner])

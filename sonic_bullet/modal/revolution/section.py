@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from sonic_bullet.geometry import CREASE_RAD
-from sonic_bullet.modal.meshing.prisms import SAME_VOLUME, _gap, _inside
+from sonic_bullet.modal.meshing.prisms import PRISMS, _gap, _inside
 from sonic_bullet.modal.revolution.notches import Triangulated, graded
 from sonic_bullet.modal.revolution.rings import Revolved, turns
 from sonic_bullet.records import Array
 
-WALL, LONG_SIDE = 0.5, 3.0  # a triangle's side over the wall's thickness, at a corner and far from all
+WALL = 0.5  # a triangle's side over the wall's thickness at a corner
 WAVE = 0.25  # a triangle's side over the shortest wave
 BENT = 0.3  # radians that a side may turn
 GROWTH = 0.5  # of size over distance
@@ -125,7 +125,7 @@ def _measured(body: Revolved, wave_number: WaveNumber) -> _Outline:
     middle = (point + np.roll(point, -1, axis=0)) / 2
     away = np.linalg.norm(middle[:, None] - notch, axis=2).min(axis=1, initial=np.inf)
     wall = thickness(point)
-    size = np.minimum(np.minimum(WALL * wall + GROWTH * away, LONG_SIDE * wall), WAVE * 2 * np.pi / wave_number(wall))
+    size = np.minimum(np.minimum(WALL * wall + GROWTH * away, 3 * wall), WAVE * 2 * np.pi / wave_number(wall))
     curvature = body.curvature_per_m(owner, share + 0.5 / cuts[owner])
     return _Outline(point, (share == 0) & kept[owner], size, owner, curvature)
 
@@ -246,7 +246,7 @@ def _filled(rim: Array, size: Array) -> tuple[Array, Array] | None:
     keep = (area > 1e-9 * float(size.min()) ** 2) & _inside((a + b + c) / 3, sides)
     whole = float((rim[:, 0] * after[:, 1] - after[:, 0] * rim[:, 1]).sum()) / 2
     triangle = triangle[keep]
-    if abs(area[keep].sum() / whole - 1) > SAME_VOLUME:
+    if abs(area[keep].sum() / whole - 1) > PRISMS.same_volume:
         return None
     pair = np.sort(np.concatenate([triangle[:, [0, 1]], triangle[:, [1, 2]], triangle[:, [2, 0]]]), axis=1)
     n = len(point)
