@@ -59,9 +59,10 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
     ]
     when = [float(np.nanmean(row)) for row in whole]
     total = np.nanmean(share, axis=(1, 2))
+    struck = np.isfinite(level)  # of impulses that are not known nothing goes with strength
     slope, slope_sd = (
-        _slope(np.log(level), np.log(np.maximum(total, 1e-9)))
-        if np.ptp(np.log(level)) > 0.3 and len(total) > 2
+        _slope(np.log(level[struck]), np.log(np.maximum(total[struck], 1e-9)))
+        if struck.sum() > 2 and np.ptp(np.log(level[struck])) > 0.3
         else (None, None)
     )
     scatter = float(np.std(np.log(np.maximum(total, 1e-9))))
@@ -150,7 +151,7 @@ def _again(takes: Sequence[AudioObservation]) -> float | None:
 
 
 def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array, Array, Array]:
-    """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,)."""
+    """Compute energy left over the recording's (s, 3, f), band edges (f + 1,) in Hz, impulses (s,), NaN unknown."""
     window = 1024
     sr = takes[0].sr
     edges = 1000 * 2.0 ** (np.arange(-17, 14) / 3)
@@ -174,7 +175,7 @@ def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array
         floor = np.array([noise[bins == i].sum() for i in range(len(edges) - 1)])
         clear = own > 4 * floor
         rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))
-        level.append(float(take.body.level_n_s[take.strike]))
+        level.append(float(take.body.impulse_n_s[take.strike]))
     if not rows:
         return np.zeros((1, 3, len(edges) - 1)), edges, np.ones(1)
     return np.array(rows), edges, np.array(level)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from sonic_bullet.diagnosis.deciding_measurement import _open
+from sonic_bullet.diagnosis.prediction.score import Comparable
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.diagnosis.unexplained import describe_unexplained, indistinct_places
 from sonic_bullet.effects.contact_time import ContactTime
@@ -22,6 +25,21 @@ def test_explained_says_what_is_left_beside_the_name(left_db: float) -> None:
     assert bool(told) == (left_db > RULES.suffices_db)
     if told:
         assert told["left_db"] == pytest.approx(left_db) and told["words"].startswith("5.4 dB beside what is named")
+
+
+@pytest.mark.parametrize("known", [5, 3, 2, 0])
+def test_strength_is_spoken_of_where_impulses_are_known(known: int) -> None:
+    """A slope needs three points; levels by ear are the played sound's own, and no impulses."""
+    end = ended(ContactTime(4e-4, 0.02))
+    (body,) = {take.body for take in end.judged}
+    some = np.where(np.arange(body.strikes) < known, body.impulse_n_s, np.nan)
+    heard = replace(body, impulse_n_s=some, relative=body.impulse_n_s)
+    takes = tuple(replace(take, body=heard) for take in end.judged)
+    end = replace(end, verdict="unexplained", judged=Comparable(takes))
+    told = describe_unexplained(end, takes)  # type: ignore[arg-type]
+    assert ("with the strike" in told["words"]) == (known > 2) == (told["slope_against_impulse"] is not None)
+    measured = list(_open(end, told))
+    assert known > 2 or not any("strength" in one for one in measured)
 
 
 def test_places_that_move_alike_are_named_once() -> None:
