@@ -14,6 +14,8 @@ What `damping` may say is in effects/damping_law/damping_form.py.
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
@@ -37,7 +39,7 @@ from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
 from sonic_bullet.records import Material
 from sonic_bullet.records.coerce import as_path, nearest, quote
-from sonic_bullet.records.errors import MaterialError, RecordError
+from sonic_bullet.records.errors import MaterialError, MaterialWarning, RecordError
 from sonic_bullet.records.touching.surface_form import waves_of
 from sonic_bullet.residual.code import ResidualForm, residual_of
 from sonic_bullet.storage.json_text import json_bytes
@@ -151,6 +153,8 @@ class Preset(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 def load_material(name: str | os.PathLike[str]) -> Material:
     """Load the material of that name (`list_materials`), or of a preset file where ``name`` is a path or ends in .json.
 
+    Warns (`errors.MaterialWarning`) of numbers that no solid has.
+
     Raises
     ------
     MaterialError
@@ -164,7 +168,39 @@ def load_material(name: str | os.PathLike[str]) -> Material:
         if filed
         else nullcontext()
     ):
-        return material_of(preset, text if filed else "")
+        made = material_of(preset, text if filed else "")
+    warn_of_units(made)
+    return made
+
+
+def warn_of_units(material: Material) -> None:
+    """Warn of a modulus or density that no solid has, naming the unit that was likely meant (`MaterialWarning`)."""
+    for line in _wrong_units(material.youngs_pa, material.density_kg_m3):
+        warnings.warn(f"material {quote(material.name)}: {line}", MaterialWarning, stacklevel=3)
+
+
+def _wrong_units(youngs_pa: float, density_kg_m3: float) -> Iterator[str]:
+    """Yield a line for each number that no solid has.
+
+    Sound runs in no solid faster than 36 km/s [Trachenko et al. 2020, eq. 1].
+    """
+    solid_pa = (1e5, 1.3e12)  # soft foam, diamond
+    solid_kg_m3 = (1.0, 23_000.0)  # aerogel, osmium
+    fastest_m_s = 36_100.0
+    factors = {"GPa": 9, "MPa": 6}
+    meant = youngs_pa
+    if not solid_pa[0] <= youngs_pa <= solid_pa[1]:
+        fits = [unit for unit, power in factors.items() if solid_pa[0] <= youngs_pa * 10**power <= solid_pa[1]]
+        remedy = (
+            f"is that {fits[0]}? give {youngs_pa:g}e{factors[fits[0]]}" if fits else "give it in Pa: steel has 2e11"
+        )
+        meant = youngs_pa * 10 ** factors[fits[0]] if fits else 0.0
+        yield f"E = {youngs_pa:g} Pa: {remedy}"
+    dense = solid_kg_m3[0] <= density_kg_m3 <= solid_kg_m3[1]
+    if not dense or meant > fastest_m_s**2 * density_kg_m3:
+        gram = density_kg_m3 <= solid_kg_m3[1] / 1000
+        remedy = f"is that g/cm³? give {1000 * density_kg_m3:g}" if gram else "give it in kg/m³: steel has 7850"
+        yield f"density = {density_kg_m3:g} kg/m³: {remedy}"
 
 
 def named_preset(name: str | os.PathLike[str]) -> Preset:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -35,6 +35,7 @@ def _run(cli: click.Group) -> int:
     debug = bool(os.environ.get("SONIC_BULLET_DEBUG"))
     if not debug:
         warnings.simplefilter("ignore")  # a library's warning is not for the user
+        _show_material_warnings()
         logging.getLogger("matplotlib").setLevel(logging.ERROR)  # nor a missing folder for its fonts
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -62,6 +63,25 @@ def _run(cli: click.Group) -> int:
             raise
         code = _failed(error)
     return code
+
+
+def _show_material_warnings() -> None:
+    """Print what is warned of materials, a line each and once; other warnings stay as they are."""
+    import warnings
+
+    from sonic_bullet.records.errors import MaterialWarning
+
+    usual, shown = warnings.showwarning, set[str]()
+
+    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        if not issubclass(category, MaterialWarning):
+            usual(message, category, *where)
+        elif str(message) not in shown:
+            shown.add(str(message))
+            _say(f"warning: {message}")
+
+    warnings.simplefilter("always", MaterialWarning)
+    warnings.showwarning = show  # type: ignore[assignment]
 
 
 def _failed(error: Exception) -> int:

@@ -136,7 +136,8 @@ def as_case(source: str, one: dict[str, Any]) -> Case:
     if missing:
         raise FileError(
             f"{' and '.join(missing)} missing",
-            "give them, or make a case of the recording, which may leave them open: 'sonic-bullet case new'",
+            f"give {'it' if len(missing) == 1 else 'them'}, or make a case of the recording, "
+            "which may leave them open: 'sonic-bullet case new'",
         )
     from sonic_bullet.presets import load_material
 

@@ -106,7 +106,7 @@ def strike_options(command: Any) -> Any:
     """Add the options that describe one recorded strike, as a case does."""
     for option in reversed(
         (
-            click.option("--mesh", metavar="M", help="Mesh of what was struck."),
+            click.option("--mesh", metavar="M", help="Mesh of what was struck; needs --strike and --material."),
             click.option("--strike", type=Numbers("X,Y,Z"), help="Where it was struck, in m, mesh frame."),
             click.option(
                 "--direction", type=Numbers("X,Y,Z"), help="Direction of the impulse. [default: into the surface]"

@@ -93,7 +93,9 @@ def run_modes(
         print_report(report, say)
     if large := oversize(model.vertex_m, model.mass_kg):
         print(
-            f"sonic-bullet: warning: {mesh} {large}; give --scale 0.001 if its numbers are millimetres", file=sys.stderr
+            f"sonic-bullet: warning: {mesh} {large}; "
+            "give --scale 0.001 if its numbers are millimetres, 0.01 if they are centimetres",
+            file=sys.stderr,
         )
     write_json(json_to, report.to_json())
 
@@ -117,7 +119,7 @@ def chosen_material(
         The name is unknown, or constants are missing or unphysical.
     """
     default_material = "steel"
-    from sonic_bullet.presets import load_material
+    from sonic_bullet.presets import load_material, warn_of_units
 
     given = {"youngs_pa": youngs_pa, "poisson": poisson, "density_kg_m3": density_kg_m3}
     missing = [key for key, value in given.items() if value is None]
@@ -132,10 +134,13 @@ def chosen_material(
         return base
     rho = base.density_kg_m3 if density_kg_m3 is None else density_kg_m3
     if youngs_pa is None and poisson is None:
-        return replace(base, density_kg_m3=rho)
-    elastic = (base.youngs_pa if youngs_pa is None else youngs_pa, base.poisson if poisson is None else poisson)
-    made = Material.isotropic("constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho)
-    return made if name is None else replace(base, density_kg_m3=rho, stiffness_pa=made.stiffness_pa)
+        made = replace(base, density_kg_m3=rho)
+    else:
+        elastic = (base.youngs_pa if youngs_pa is None else youngs_pa, base.poisson if poisson is None else poisson)
+        made = Material.isotropic("constants", youngs_pa=elastic[0], poisson=elastic[1], density_kg_m3=rho)
+        made = made if name is None else replace(base, density_kg_m3=rho, stiffness_pa=made.stiffness_pa)
+    warn_of_units(made)
+    return made
 
 
 def run_materials(json_to: str | None) -> None:

@@ -77,6 +77,8 @@ def _read(path: str | os.PathLike[str], what: Callable[[Any, int], Given]) -> tu
     with reading(path, "audio file", FileError, UNBROKEN):
         if not Path(path).is_file():
             raise FileError(f"cannot read {path}: no such file", "check the path")
+        if not os.path.getsize(path):
+            raise FileError(f"cannot read {path}: it is empty", UNBROKEN)
     with reading(path, "audio file", FileError, UNBROKEN), open(path, "rb") as file:
         # by its descriptor: its bytes determine the format; for a name that ends in .raw libsndfile would guess
         try:

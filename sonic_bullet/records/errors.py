@@ -93,6 +93,10 @@ class PlaybackWarning(UserWarning):
     """The sound card is gone: physics and log go on without playback; issued once."""
 
 
+class MaterialWarning(UserWarning):
+    """A material's numbers are those of no solid: another unit, most likely."""
+
+
 class SizeWarning(UserWarning):
     """A body is larger than anything that is struck to sound: a mesh in millimetres, most likely."""
 

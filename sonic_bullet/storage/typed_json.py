@@ -8,6 +8,7 @@ msgspec checks the types. Its messages hold a path and the wanted type; the valu
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterator
 from typing import Any, TypeVar
@@ -82,7 +83,7 @@ def _misfit(tree: Any, form: Any, message: str) -> str:
     key = "".join(f": {shorten(k)}" if isinstance(k, str) else f" {k + 1}" for k in keys)
     kinds = list(_forms_at(msgspec.inspect.type_info(form), keys))
     if found := re.fullmatch("Object missing required field `(.*)`", text):
-        return f"{key}: field '{found[1]}' is missing"
+        return f"{key}: field '{found[1]}' is missing{_mistyped(tree, keys, kinds, found[1])}"
     if found := re.fullmatch("Object contains unknown field `(.*)`", text):
         known = [f.encode_name for kind in kinds if isinstance(kind, msgspec.inspect.StructType) for f in kind.fields]
         return f"{key}: field '{shorten(found[1])}' is not known{nearest_field(found[1], tuple(known))}"
@@ -92,6 +93,15 @@ def _misfit(tree: Any, form: Any, message: str) -> str:
     if found := re.fullmatch("Expected (.*?)(, got .*)?", text):
         return f"{key or ': the whole'} is {there}, wanted {_wanted(found[1])}"
     return f"{key}: {text[:1].lower()}{text[1:]}"
+
+
+def _mistyped(tree: Any, keys: list[Key], kinds: list[Any], missing: str) -> str:
+    """Name the field there that no form has and that was likely meant."""
+    value = _value(tree, keys) if tree is not None else None
+    known = {f.encode_name for kind in kinds if isinstance(kind, msgspec.inspect.StructType) for f in kind.fields}
+    spare = [name for name in value if name not in known] if isinstance(value, dict) else []
+    near = difflib.get_close_matches(missing, spare, n=1, cutoff=0.6)
+    return f", and '{shorten(near[0])}' is not known: did you mean '{missing}'?" if near else ""
 
 
 def _steps(path: str) -> Iterator[tuple[str, str]]:

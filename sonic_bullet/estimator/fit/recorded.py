@@ -66,8 +66,16 @@ class Sounds(NamedTuple):
 def guess_of(thing: CaseObject) -> Material:
     """Return the object's guessed material: the declared constants, the named preset's for what is not declared.
 
-    Raises MaterialError, FileError.
+    Warns as `load_material` does. Raises MaterialError, FileError.
     """
+    from sonic_bullet.presets import warn_of_units
+
+    made = _guess(thing)
+    warn_of_units(made)
+    return made
+
+
+def _guess(thing: CaseObject) -> Material:
     from sonic_bullet.presets import load_material, material_names
 
     given = (thing.youngs_pa, thing.poisson, thing.density_kg_m3)
@@ -173,7 +181,7 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
     if not mesh_m[0] < across < mesh_m[1]:
         raise MeshError(
             f"object '{thing.name}' is {across:.3g} m across",
-            "give the mesh in metres, or say its unit (units: mm in a case, --scale 0.001)"
+            "give the mesh in metres, or say its unit (units: mm or cm in a case, --scale 0.001 or 0.01)"
             if thing.scale == 1
             else f"its mesh is scaled by {thing.scale:g}: leave --scale or units out where it is in metres",
         )

@@ -1,0 +1,52 @@
+"""What a user gets wrong most: another unit, an empty file, a mistyped name; each told in one line with its remedy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sonic_bullet.presets import FOLDERS
+from tests.cli.called_here import call_here
+from tests.made.case import write_box
+
+GIGA = "E = 214.6 Pa: is that GPa? give 214.6e9"
+GRAM = "density = 7.85 kg/m³: is that g/cm³? give 7850"
+TAP = "--strike 0,0,0.003"
+BARE = ("--young", "214.6", "--poisson", "0.3", "--density")
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A folder with a bar of 120 mm, the same in centimetres, a preset in GPa and an empty recording."""
+    write_box(tmp_path / "bar.obj", (0.12, 0.025, 0.006))
+    write_box(tmp_path / "cm.obj", (12, 2.5, 0.6))
+    (tmp_path / "zero.wav").touch()
+    preset = json.loads((FOLDERS.tables / "steel.json").read_text())
+    preset["elasticity"] |= {"youngs_pa": 214.6}
+    (tmp_path / "pre.json").write_text(json.dumps(preset))
+    (tmp_path / "mistyped").mkdir()
+    (tmp_path / "mistyped" / "case.json").write_text('{"format": "sonic-bullet-case/1", "recodings": []}')
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        ("modes bar.obj --count 3 --material pre.json", 0, [GIGA]),
+        (f"modes bar.obj --count 3 {' '.join(BARE)} 7.85", 0, [GIGA, GRAM]),
+        ("modes bar.obj --count 3 --material steel", 0, []),
+        ("modes cm.obj --count 3 --material steel", 0, ["--scale 0.001", "0.01 if they are centimetres"]),
+        ("fit bar.obj -o p.json --mesh bar.obj --material pre.json", 2, ["--strike missing; give it,"]),
+        (f"fit zero.wav -o p.json --mesh bar.obj --material pre.json {TAP}", 2, [GIGA, "zero.wav: it is empty"]),
+        ("case check mistyped", 2, ["'recodings' is not known: did you mean 'recordings'?"]),
+        ("features zero.wav", 2, ["zero.wav: it is empty"]),
+    ],
+)
+def test_it_is_told_in_one_line(place: Path, words: str, code: int, told: list[str]) -> None:
+    ended = call_here(place, *words.split())
+    assert ended.returncode == code, ended.stderr
+    for one in told:
+        assert sum(one in line for line in ended.stderr.splitlines()) == 1, ended.stderr
+    assert ("warning" in ended.stderr) == any(one in (GIGA, GRAM) or "scale" in one for one in told)
