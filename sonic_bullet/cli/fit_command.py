@@ -254,6 +254,12 @@ class FitReport:
                 f"spread of E: lines {own:.2g}, dimensions {GAMMA_PER_SCALE * tolerance:.2g} of it, "
                 f"as they are known to {tolerance:.2%} (--dimension-tolerance)"
             )
+            if np.isfinite(sd[4]):
+                known, every = self.found.poisson_sd_of_dimensions, sd[4]
+                text.append(
+                    f"spread of Poisson's ratio: lines {np.sqrt(max(every**2 - known**2, 0.0)):.2g}, each dimension "
+                    f"wrong on its own {known:.2g}"
+                )
         if not self.found.has_material:
             text.append(
                 "the preset plays the observed lines; all else in it is steel's, as nobody says what was struck"

@@ -3,10 +3,19 @@
 K(E, ν) = E [ l(ν) K_l + s(ν) K_s ],   l = ν/((1+ν)(1−2ν)),  s = 1/(2(1+ν))
     [Hughes 1987, ch. 2.7]
 (l VᵀK_lV + s VᵀK_sV) q = θ q,  λ = γ θ/L²,  γ = E/ρ, lengths by the body's diagonal L
+
+How modes move when the body is longer along one of its axes, from the modes on its surface alone:
+x -> x + ε a (a·x), u of unit mass, free surface:
+    dλ/dε = ∮ (σ:ε − λρ|u|²) (a·n)(a·x) dS     [Hadamard's formula: Haug, Choi & Komkov 1986, ch. 3.3]
+    σ:ε = E/(1−ν²) [e₁² + e₂² + 2ν e₁e₂ + ½(1−ν) g²]   of the strains in the surface, as no stress leaves it
+
+Over three axes ∂ ln λ/∂ε sums to −2, as λ ∝ 1/L²: each mode's values are scaled to it, which takes most of the error of
+the surface's elements. Clamps are taken to be small.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -100,3 +109,48 @@ def _quadratic(quarters: Array, which: int, weight: Array) -> tuple[Array, Array
 def mixed(poisson: float, lame: Any, shear: Any) -> Any:
     """Combine the stiffness at E = 1 from its two parts, dense or sparse."""
     return poisson / ((1 + poisson) * (1 - 2 * poisson)) * lame + shear / (2 * (1 + poisson))
+
+
+def stretch_slopes(family: Family, poisson: float) -> Array:
+    """Compute ∂ ln λ/∂ ln length (m, 3) of a family's modes at ν along the body's axes, shortest first.
+
+    They are the principal axes of its surface's vertices.
+    """
+    value, vector = family.modes(family.length_m**2, poisson)
+    shown = np.einsum("vxb,bm->vxm", family.skin.astype(float), vector)
+    quarter = family.face.reshape(-1, 4, 3)  # of each element's face, see Family.points
+    node = np.concatenate([quarter[:, [0, 1, 2], [0, 1, 2]], quarter[:, 3]], axis=1)
+    at = family.vertex_m - family.vertex_m.mean(axis=0)
+    axis = np.linalg.eigh(at.T @ at)[1]
+    made = np.zeros((3, len(value)))
+    outward = 0.0
+    for weight, share, slope in _points():
+        place, tangent = share @ at[node], np.einsum("kn,fnx->kfx", slope, at[node])
+        normal = np.cross(tangent[0], tangent[1])  # as long as dS over the reference triangle's
+        along = weight / 2 * (normal @ axis) * (place @ axis)  # (f, 3): (a·n)(a·x) dS
+        outward += along.sum()
+        metric = np.einsum("kfx,lfx->fkl", tangent, tangent)
+        inverse = np.linalg.inv(metric)
+        u, by = np.einsum("n,fnxm->fxm", share, shown[node]), np.einsum("kn,fnxm->kfxm", slope, shown[node])
+        strain = np.einsum("kfxm,lfx->fklm", by, tangent)
+        strain = np.einsum("fjk,fklm->fjlm", inverse, (strain + strain.transpose(0, 2, 1, 3)) / 2)  # one index raised
+        total = np.einsum("fjjm->fm", strain)
+        both = np.einsum("fjkm,fkjm->fm", strain, strain)
+        energy = (poisson * total**2 + (1 - poisson) * both) / (1 - poisson**2)
+        made += along.T @ (energy * family.length_m**2 / value - (u**2).sum(axis=1))
+    made *= np.sign(outward) / family.length_m**3
+    return np.asarray((made * (-2 / made.sum(axis=0))).T)
+
+
+def _points() -> Iterator[tuple[float, Array, Array]]:
+    """Yield weights, quadratic shape functions (6,) and their slopes (2, 6) at six points of a triangle.
+
+    Exact to the fourth degree.                                                        [Dunavant 1985, table II, p = 4]
+    """
+    for weight, b in ((0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)):
+        for x, y in ((b, b), (1 - 2 * b, b), (b, 1 - 2 * b)):
+            z = 1 - x - y
+            share = [z * (2 * z - 1), x * (2 * x - 1), y * (2 * y - 1), 4 * z * x, 4 * x * y, 4 * y * z]
+            by_x = [1 - 4 * z, 4 * x - 1, 0, 4 * (z - x), 4 * y, -4 * y]
+            by_y = [1 - 4 * z, 0, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y)]
+            yield weight, np.array(share), np.array([by_x, by_y])

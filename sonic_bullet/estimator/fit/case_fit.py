@@ -89,6 +89,7 @@ class CaseFit:
     strikes; -1 where there is nothing to compare. radiation: what α and β are without, or with. evidence: what was
     recorded of each object, those without a mesh included. takes: how far the prediction of each take is, of those held
     out where there are any. dimension_tolerance: of the shapes, relative, in γ's variance.
+    poisson_sd_of_dimensions: what it brings to ν's.
     """
 
     case: Case
@@ -108,6 +109,7 @@ class CaseFit:
     evidence: tuple[RecordedObject, ...] = ()
     takes: tuple[TakeDistance, ...] = ()
     dimension_tolerance: float = 0.0
+    poisson_sd_of_dimensions: float = 0.0
 
     @property
     def has_material(self) -> bool:

@@ -32,8 +32,12 @@ def finished(
     *,
     radiation: RadiationIn,
     by_chance: bool,
+    poisson_sd: float,
 ) -> CaseFit:
-    """Return the CaseFit of all that was found. by_chance: lines would find as many modes of the meshes by chance."""
+    """Return the CaseFit of all that was found.
+
+    by_chance: lines would find as many modes of the meshes by chance. poisson_sd: what dimensions bring to ν's spread.
+    """
     log_gamma, poisson, information, scatter = elastic
     guess = evidence[0].guess
     covariance = np.full((5, 5), np.nan)
@@ -43,7 +47,7 @@ def finished(
     covariance[:2, :2] = damping.covariance
     _elastic(covariance, information, unsaid, bool(objects))
     tolerance = scale_tolerance(objects)
-    add_dimension_tolerance(covariance, tolerance)
+    add_dimension_tolerance(covariance, tolerance, poisson_sd)
     if np.isfinite(gain[0]):
         covariance[3, 3] = (gain[1] / gain[0]) ** 2
         if not any(e.seen is not None and (e.seen.level & e.seen.known).any() for e in evidence):
@@ -77,7 +81,9 @@ def finished(
     if not objects:
         assumed.append("gamma (from the guess: no mesh)")
     elif tolerance and np.isfinite(covariance[2, 2]):
-        assumed.append(f"dimensions (known to {tolerance:.2%}: they are in the spread of gamma)")
+        assumed.append(
+            f"dimensions (known to {tolerance:.2%}: they are in the spreads of gamma and of Poisson's ratio)"
+        )
     warnings = [note for e in evidence for note in e.notes]
     if objects and objects[0].evidence.family is not None and not np.isnan(covariance[2, 2]):
         warnings += _mesh_warning(objects[0].evidence.family)
@@ -97,6 +103,7 @@ def finished(
         radiation,
         evidence,
         dimension_tolerance=tolerance,
+        poisson_sd_of_dimensions=poisson_sd,
     )
 
 

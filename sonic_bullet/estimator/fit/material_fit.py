@@ -20,10 +20,20 @@ import numpy as np
 from sonic_bullet.effects.common.hum import without_hum
 from sonic_bullet.estimator.fit.case_fit import POISSON, CaseFit, ObjectFit
 from sonic_bullet.estimator.fit.chance_pairs import paired_by_chance
+from sonic_bullet.estimator.fit.dimension_tolerance import poisson_sd_of_dimensions
 from sonic_bullet.estimator.fit.fit_verdict import finished
 from sonic_bullet.estimator.fit.held_out_takes import judged_by_takes
 from sonic_bullet.estimator.fit.object_fit import fitted_object, gain_of, object_of
-from sonic_bullet.estimator.fit.pairing import PAIRING, Pairs, assign, best_pairs, grouped, paired, solve
+from sonic_bullet.estimator.fit.pairing import (
+    PAIRING,
+    Pairs,
+    assign,
+    best_pairs,
+    grouped,
+    learnt_mesh_sd,
+    paired,
+    solve,
+)
 from sonic_bullet.estimator.fit.radiation_share import Radiated, in_air, radiation_in
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
@@ -141,6 +151,7 @@ def fit_evidence(
         (gain, gain_sd, amplitude_scatter),
         radiation=radiation,
         by_chance=chance,
+        poisson_sd=poisson_sd_of_dimensions(shaped, pairs, scatter) if shaped else 0.0,
     )
 
 
@@ -201,7 +212,7 @@ def _together(
         poisson = float(np.clip(poisson + np.clip(step[1], -0.02, 0.02), -0.45, 0.48))
         pairs = [replace(p, log_gamma=log_gamma, poisson=poisson) for p in pairs]
         if turn >= 3:
-            mesh_sd = float(np.clip(scatter, 1e-7, 4 * PAIRING.mesh_sd)) if len(off) > 3 else PAIRING.mesh_sd
+            mesh_sd = learnt_mesh_sd(scatter, len(off))
             if np.abs(step).max() < 1e-9:
                 break
     return tuple(pairs), information, scatter

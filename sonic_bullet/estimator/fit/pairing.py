@@ -258,12 +258,9 @@ def solve(
 
     poisson_sd: of the guess.
     """
-    lowest = 0.2  # of that, in the lowest modes
     freq, decay = lines.freq_hz[line], lines.decay_per_s[line]
     off = np.log((2 * np.pi * freq) ** 2 + np.nan_to_num(decay) ** 2) - 2 * np.log(2 * np.pi * group.freq_hz[mode])
-    # a mesh's error grows with the modes: the low ones tell γ and ν best
-    rough = np.hypot(lowest, freq / freq.max(initial=1e-9))
-    sd = 2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd * rough)
+    sd = known_to(lines, line, mesh_sd)
     slope = np.stack([np.ones(len(line)), group.slope[mode]], axis=1)
     weight = np.ones(len(line))
     prior = np.diag([1e-12, poisson_sd**-2])
@@ -277,3 +274,17 @@ def solve(
         )
         weight = 1 / (1 + ((off - slope @ step) / sd / 2.5) ** 2)
     return step, information, weight
+
+
+def known_to(lines: Lines, line: Array, mesh_sd: float) -> Array:
+    """Return the standard errors of ln λ (p,) that lines as modes of a mesh have."""
+    lowest = 0.2  # of mesh_sd, in the lowest modes
+    freq = lines.freq_hz[line]
+    # a mesh's error grows with the modes: the low ones tell γ and ν best
+    rough = np.hypot(lowest, freq / freq.max(initial=1e-9))
+    return np.asarray(2 * np.hypot(np.nan_to_num(lines.freq_sd_hz[line]) / freq, mesh_sd * rough))
+
+
+def learnt_mesh_sd(scatter: float, count: int) -> float:
+    """Return what modes scatter: as these do, where they are enough to say."""
+    return float(np.clip(scatter, 1e-7, 4 * PAIRING.mesh_sd)) if count > 3 else PAIRING.mesh_sd
