@@ -28,7 +28,15 @@ def _open(found: CaseFit) -> Iterator[str]:
     """Say what would decide each thing that is open, the first things first."""
     recorded = [e for e in found.evidence if e.signals is not None]
     if recorded:
-        yield from _open_of_takes(max(recorded, key=lambda one: len(one.recordings)))
+        most = max(recorded, key=lambda one: len(one.recordings))
+        yield from _open_of_takes(most)
+        modes = [o.evidence.lines.freq_hz[o.line[o.line >= 0]] for o in found.objects if o.evidence is most]
+        # a nodal line is a shape's: lines that no mode of one explains have none that anybody could strike
+        if modes and (pair := _within_widths(most)) and np.isin(pair, modes[0]).all():
+            yield (
+                f"strike at another point, on a nodal line of one of the modes at {pair[0]:.1f} and {pair[1]:.1f} Hz: "
+                "they lie within each other's widths, and here both sound"
+            )
     strikes = [r for e in recorded for r in e.recordings]
     sd = np.diag(found.fit.covariance)
     if not found.objects:
@@ -54,11 +62,6 @@ def _open_of_takes(e: RecordedObject) -> Iterator[str]:
         yield (
             "record the hammer's force with the sound (case new --force-channel): most of the first "
             f"{1000 * ATTACK_S:.0f} ms is no mode, and the force tells what of it is the contact"
-        )
-    if pair := _within_widths(e):
-        yield (
-            f"strike at another point, on a nodal line of one of the modes at {pair[0]:.1f} and {pair[1]:.1f} Hz: "
-            "they lie within each other's widths, and here both sound"
         )
 
 
