@@ -247,19 +247,22 @@ def _solve(
     found = converged(method, [of.stiffness], wanted, asked.accuracy)
     shown = found.method.shown(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
+    left_open = found.method.surface_error(found.sectors, of.stiffness)
+    open_too = left_open if left_open >= LEAST_ERROR else 0.0
     if np.isfinite(found.error):
-        note += f"; error up to {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(found.error)}"
-        if found.error > asked.accuracy:
-            note += (
-                f", more than the {100 * asked.accuracy:g} % asked for: finer elements need more unknowns than allowed"
+        whole = found.error + open_too
+        note += f"; error up to {np.sqrt(found.value[-1] * of.per_s2) / (2 * np.pi):.0f} Hz {_percent(whole)}"
+        if whole > asked.accuracy:
+            remedy = (
+                "finer elements need more unknowns than allowed"
+                if found.error > asked.accuracy
+                else "give a mesh of finer facets"
             )
+            note += f", more than the {100 * asked.accuracy:g} % asked for: {remedy}"
     elif found.method.meshed and len(found.value):
         note += "; error not known: the size of its elements was given"
-    left_open = found.method.surface_error(found.sectors, of.stiffness)
-    if left_open >= LEAST_ERROR:
-        note += (
-            f"; arcs in place of its facets change frequencies by up to {_percent(left_open).removeprefix('about ')}"
-        )
+    if open_too:
+        note += f"; arcs in place of its facets change frequencies by up to {_percent(open_too).removeprefix('about ')}"
     return _Unit(
         found.value,
         np.ascontiguousarray(shown.shape[:, :, found.order]),

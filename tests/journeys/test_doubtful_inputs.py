@@ -12,6 +12,7 @@ from tests.cli.called_here import call_here
 from tests.made.case import write_box
 
 GIGA = "E = 214.6 Pa: is that GPa? give 214.6e9"
+SHELL = "open surface: a wall of"
 GRAM = "density = 7.85 kg/m³: is that g/cm³? give 7850"
 TAP = "--strike 0,0,0.003"
 BARE = ("--young", "214.6", "--poisson", "0.3", "--density")
@@ -22,6 +23,8 @@ def place(tmp_path: Path) -> Path:
     """A folder with a bar of 120 mm, the same in centimetres, a preset in GPa and an empty recording."""
     write_box(tmp_path / "bar.obj", (0.12, 0.025, 0.006))
     write_box(tmp_path / "cm.obj", (12, 2.5, 0.6))
+    lines = (tmp_path / "bar.obj").read_text().splitlines()
+    (tmp_path / "open.obj").write_text("\n".join(lines[:-2]) + "\n")
     (tmp_path / "zero.wav").touch()
     preset = json.loads((FOLDERS.tables / "steel.json").read_text())
     preset["elasticity"] |= {"youngs_pa": 214.6}
@@ -40,6 +43,8 @@ def place(tmp_path: Path) -> Path:
         ("modes cm.obj --count 3 --material steel", 0, ["--scale 0.001", "0.01 if they are centimetres"]),
         ("fit bar.obj -o p.json --mesh bar.obj --material pre.json", 2, ["--strike missing; give it,"]),
         (f"fit zero.wav -o p.json --mesh bar.obj --material pre.json {TAP}", 2, [GIGA, "zero.wav: it is empty"]),
+        ("modes open.obj --count 3 --material steel", 0, [SHELL]),
+        ("modes open.obj --material steel --thickness 3", 2, ["wall of 3 m on a body of", "give metres: 0.003?"]),
         ("case check mistyped", 2, ["'recodings' is not known: did you mean 'recordings'?"]),
         ("features zero.wav", 2, ["zero.wav: it is empty"]),
     ],
@@ -49,4 +54,4 @@ def test_it_is_told_in_one_line(place: Path, words: str, code: int, told: list[s
     assert ended.returncode == code, ended.stderr
     for one in told:
         assert sum(one in line for line in ended.stderr.splitlines()) == 1, ended.stderr
-    assert ("warning" in ended.stderr) == any(one in (GIGA, GRAM) or "scale" in one for one in told)
+    assert ("warning" in ended.stderr) == any(one in (GIGA, GRAM, SHELL) or "scale" in one for one in told)

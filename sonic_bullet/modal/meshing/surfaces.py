@@ -173,6 +173,18 @@ def _openness(vertex_m: Array, face: Array) -> float:
     return float(np.average(np.abs(winding_number(vertex_m[face[near]], outside)), weights=area))
 
 
+def _check_wall(thickness_m: float | None, diagonal_m: float) -> None:
+    """Raise MeshError for a wall that is none, or larger than its body."""
+    if thickness_m is None:
+        return
+    if not (np.isfinite(thickness_m) and thickness_m > 0):
+        raise MeshError(f"thickness_m is {thickness_m}", "give a wall thickness above zero")
+    if thickness_m > diagonal_m:
+        raise MeshError(
+            f"wall of {thickness_m:g} m on a body of {diagonal_m:.3g} m", f"give metres: {thickness_m / 1000:g}?"
+        )
+
+
 def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     """Prepare the surface that is to be filled.
 
@@ -180,8 +192,6 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     """
     if not np.isfinite(vertex_m[face]).all():
         raise MeshError("mesh holds NaN or infinite vertices", "repair the mesh file")
-    if thickness_m is not None and not (np.isfinite(thickness_m) and thickness_m > 0):
-        raise MeshError(f"thickness_m is {thickness_m}", "give a wall thickness above zero")
     used, face = np.unique(face, return_inverse=True)
     vertex_m, face = geometry.welded(vertex_m[used], face.reshape(-1, 3))
     if len(face) == 0:
@@ -189,6 +199,7 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     diagonal_m = float(np.linalg.norm(np.ptp(vertex_m, axis=0)))
     if not BODY_SIZE_M[0] < diagonal_m < BODY_SIZE_M[1]:
         raise MeshError(f"mesh is {diagonal_m:.3g} m across", "check its unit and scale: metres are expected")
+    _check_wall(thickness_m, diagonal_m)
     area = geometry.face_areas_m2(vertex_m, face)
     face = face[area > 1e-14 * diagonal_m**2]
     if len(face) == 0:

@@ -36,7 +36,11 @@ def test_a_ring_of_a_wire_with_flats_tells_what_they_take(sides: int) -> None:
     angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
     wire = np.stack([0.05 + 0.003 * np.cos(angle), 0.003 * np.sin(angle)], axis=1)
     model = analyse((turned(wire),), STEEL, count=4, cache=None)
-    assert told(model.note) == pytest.approx(1 - np.sqrt((2 + np.cos(2 * np.pi / sides)) / 3), rel=0.05)
+    flats = 1 - np.sqrt((2 + np.cos(2 * np.pi / sides)) / 3)
+    assert told(model.note) == pytest.approx(flats, rel=0.05)
+    stated = re.search(r"error up to \d+ Hz about ([\d.]+) %", model.note)
+    assert stated is not None and float(stated[1]) / 100 >= 0.95 * flats  # the elements' and the facets' together
+    assert ("more than the 1 % asked for: give a mesh of finer facets" in model.note) == (flats > 0.01)
 
 
 def test_a_ball_of_flats_tells_how_much_too_small_it_is() -> None:
