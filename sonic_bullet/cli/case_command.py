@@ -320,11 +320,14 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
     from sonic_bullet.presets import load_material, material_names
 
     thing = case.objects[name]
-    size = "-"
+    size, mine = "-", [r.position_m for r in case.recordings if r.object == name]
     if thing.mesh is not None:
+        from sonic_bullet.estimator.fit.observation import check_strikes
         from sonic_bullet.modal import read_mesh
 
-        vertex = read_mesh(thing.mesh, thing.scale).vertex_m
+        shape = read_mesh(thing.mesh, thing.scale)
+        check_strikes(shape, mine)
+        vertex = shape.vertex_m
         size = " × ".join(f"{1000 * side:.4g}" for side in vertex.max(axis=0) - vertex.min(axis=0))
     whole = None not in (thing.youngs_pa, thing.density_kg_m3, thing.poisson)
     if thing.material is not None and not (whole and thing.material.lower() not in material_names()):
@@ -334,15 +337,8 @@ def _object_row(case: Case, name: str) -> tuple[str, str, str, str, str]:
             f"object '{name}' has neither a material nor all of elastic_guess",
             "name a guess; 'sonic-bullet materials' lists all",
         )
-    mine = [r for r in case.recordings if r.object == name]
-    placed = sum(r.position_m is not None for r in mine)
-    return (
-        name,
-        "-" if thing.mesh is None else thing.mesh.name,
-        size,
-        thing.material or "elastic_guess",
-        f"{placed} of {len(mine)}",
-    )
+    placed = f"{len(mine) - mine.count(None)} of {len(mine)}"
+    return name, "-" if thing.mesh is None else thing.mesh.name, size, thing.material or "elastic_guess", placed
 
 
 def run_case_schema() -> None:

@@ -31,6 +31,11 @@ def place(tmp_path: Path) -> Path:
     (tmp_path / "pre.json").write_text(json.dumps(preset))
     (tmp_path / "mistyped").mkdir()
     (tmp_path / "mistyped" / "case.json").write_text('{"format": "sonic-bullet-case/1", "recodings": []}')
+    (tmp_path / "far").mkdir()
+    write_box(tmp_path / "far" / "bar.obj", (0.12, 0.025, 0.006))
+    far = {"file": "a.wav", "strike": {"position": [60, 0, 3]}}
+    case = {"format": "sonic-bullet-case/1", "objects": {"bar": {"mesh": "bar.obj", "material": "steel"}}}
+    (tmp_path / "far" / "case.json").write_text(json.dumps(case | {"recordings": [far | {"split": "holdout"}]}))
     return tmp_path
 
 
@@ -45,6 +50,7 @@ def place(tmp_path: Path) -> Path:
         (f"fit zero.wav -o p.json --mesh bar.obj --material pre.json {TAP}", 2, [GIGA, "zero.wav: it is empty"]),
         ("modes open.obj --count 3 --material steel", 0, [SHELL]),
         ("modes open.obj --material steel --thickness 3", 2, ["wall of 3 m on a body of", "give metres: 0.003?"]),
+        ("case check far", 2, ["strike 1 at (60, 0, 3) m lies 60 m off the surface"]),
         ("case check mistyped", 2, ["'recodings' is not known: did you mean 'recordings'?"]),
         ("features zero.wav", 2, ["zero.wav: it is empty"]),
     ],

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.modal.isotropic_family import Family
-from sonic_bullet.records import Array
+from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import MeshError
 
 
@@ -87,15 +87,33 @@ def observation(
 
 
 def _row(family: Family, position: tuple[float, float, float], direction: Array, what: str) -> Array:
-    off_surface = 0.02  # of the body's diagonal: farther from the surface a point is not on it
     rows, distance = family.points(np.array([position]), direction[None, :])
-    if not distance[0] <= off_surface * family.length_m:
+    _check_near(distance[0], family.length_m, position, what)
+    return np.asarray(rows[0])
+
+
+def _check_near(distance_m: float, length_m: float, position: tuple[float, float, float], what: str) -> None:
+    """Raise MeshError for a point off the surface of a body of a diagonal length_m."""
+    off_surface = 0.02  # of the body's diagonal: farther from the surface a point is not on it
+    if not distance_m <= off_surface * length_m:
         place = ", ".join(f"{x:g}" for x in position)
         raise MeshError(
-            f"{what} at ({place}) m lies {distance[0]:.3g} m off the surface",
+            f"{what} at ({place}) m lies {distance_m:.3g} m off the surface",
             "give its place in the mesh's frame, in metres; check the mesh's unit",
         )
-    return np.asarray(rows[0])
+
+
+def check_strikes(shape: Shape, positions_m: list[tuple[float, float, float] | None]) -> int:
+    """Return how many strikes have a place; raise MeshError where one lies off a mesh's surface, as a fit would."""
+    from sonic_bullet.geometry.nearest_point import closest_point
+
+    known = [(i, position) for i, position in enumerate(positions_m, 1) if position is not None]
+    length_m = float(np.linalg.norm(np.ptp(shape.vertex_m[np.unique(shape.face)], axis=0)))
+    if known:
+        _, _, distance = closest_point(shape.vertex_m, shape.face, np.array([position for _, position in known]))
+        for (i, position), off_m in zip(known, distance, strict=True):
+            _check_near(float(off_m), length_m, position, f"strike {i}")
+    return len(known)
 
 
 def _normal(family: Family, position: tuple[float, float, float]) -> Array:
