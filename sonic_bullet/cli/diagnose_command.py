@@ -155,7 +155,7 @@ class DiagnosisReport:
         if said := next_measurement(self.found.found, self.found.closed, self.found.unexplained):
             text.append(f"next: {said}")
         if self.proposed:
-            text.append(f"next strike: {self.strike or 'no two models to separate, or no recordings'}")
+            text.append(f"next strike: {self.strike or 'no two models that these strikes leave open'}")
         if self.predicted:
             text.append(self.predicted)
         return text

@@ -2,7 +2,8 @@
 
     two models A, B -> a take of A with the recordings' noise -> D(take, B) − D(take, A) -> max over places and impulses
 
-D: prediction/score.py. A and B are the two best of the table: what is named, or the baseline, and the best of the rest.
+D: prediction/score.py. A is what is named, or the baseline; B the best of the rest that the evidence leaves open:
+strikes left out say less than strong_evidence between them, and those made lie no farther apart than A from them.
 What separates them is what they predict of a take that nobody has made, so it is a test of both [Box & Hill 1967].
 """
 
@@ -16,11 +17,20 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.score import AudioObservation, ScoredObservation
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, evidence
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
+from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.signal.log_spectral import with_noise
 
-TIMES = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
-"""Impulses over the middle one so far: as far as a hand goes with one hammer."""
+TIMES = {
+    0.125: "an eighth as hard",
+    0.25: "a quarter as hard",
+    0.5: "half as hard",
+    1.0: "as hard",
+    2.0: "twice as hard",
+    4.0: "four times as hard",
+}
+"""Impulses over the middle one so far: as far as a hand goes with one hammer; in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,36 +68,49 @@ class SeparatingStrike:
 
     def __str__(self) -> str:
         """Format it as a sentence."""
-        where = "" if self.position_m is None else f" at ({', '.join(f'{x:g}' for x in self.position_m)}) m"
-        hard = f" with {self.impulse_n_s:.2g} N·s," if np.isfinite(self.impulse_n_s) else ""
+        where = "the same place" if self.position_m is None else f"({', '.join(f'{x:g}' for x in self.position_m)}) m"
+        hard = f" ({self.impulse_n_s:.2g} N·s)" if np.isfinite(self.impulse_n_s) else ""
         spread = f" ± {self.apart_sd_db:.1f}" if np.isfinite(self.apart_sd_db) else ""
         return (
-            f"{self.body}{where}{hard} {self.times:g} times the middle strike: {self.models[0]} and "
+            f"strike `{self.body}` at {where}, {TIMES[self.times]} as the middle strike{hard}: {self.models[0]} and "
             f"{self.models[1]} lie {self.apart_db:.1f}{spread} dB apart there, {self.apart_so_far_db:.1f} dB so far"
         )
 
 
 def two_best(end: Closed | NothingCompared) -> tuple[tuple[str, Hypothesis], tuple[str, Hypothesis]] | None:
-    """Return the two best models, by name; None where no effect was tried."""
-    named = {c.id for c in end.added}
-    first = (_name(end.after), end.after)
-    rest = sorted((c for c in end.tried if c.id not in named), key=lambda c: -c.mean_db)
-    if rest and (rest[0].mean_db > 0 or not named):
-        return first, (_name(rest[0].hypothesis), rest[0].hypothesis)
-    return (first, (_name(end.before), end.before)) if named else None
+    """Return what is named, or the baseline, and the best that strikes left out do not separate from it, if any."""
+    rest = sorted((c for c in end.tried if _is_open(c, end.added)), key=lambda c: -c.mean_db)
+    return ((_name(end.after), end.after), (_name(rest[0].hypothesis), rest[0].hypothesis)) if rest else None
+
+
+def _is_open(c: Candidate, named: Sequence[Candidate]) -> bool:
+    """Decide whether strikes left out say less than strong_evidence for or against a candidate beside what is named."""
+    if c.id in {one.id for one in named}:
+        return False
+    has = {effect.id for effect in c.hypothesis.effects}
+    own = next((one for one in named if one.id not in has), None)  # that was taken in its place
+    if own is not None and len(own.drop_db) != len(c.drop_db):
+        return False  # it gained nothing on the loudest strikes
+    gain = c.drop_db if own is None else c.drop_db - own.drop_db
+    return abs(evidence(gain, c.gap_db)) <= RULES.strong_evidence
 
 
 def separating_strike(end: Closed | NothingCompared) -> SeparatingStrike | None:
-    """Find the strike that would separate the two best models most; None without two, or without recordings."""
-    models, takes = two_best(end), _one_a_place(end.judged if isinstance(end, Closed) else ())
-    if models is None or not takes:
+    """Find the strike that would separate the two best models most; None without two that are open, or recordings."""
+    models = two_best(end)
+    if models is None or not isinstance(end, Closed):
         return None
+    takes = _one_a_place(end.judged)
+    left_db = max(RULES.suffices_db, end.after_db - end.floor_db)  # what a model leaves open by itself
     found: list[SeparatingStrike] = []
     for body in dict.fromkeys(take.body for take in takes):
         one, other = (predict(h, body) for _, h in models)
         mine = [take for take in takes if take.body is body]
         middle = float(np.median(body.level_n_s[body.fitted]))
-        so_far = float(np.mean([_apart_db(t, one, other, float(body.level_n_s[t.strike])) for t in mine]))
+        there = np.array([_apart_db(t, one, other, float(body.level_n_s[t.strike])) for t in mine])
+        so_far = float(there.mean())
+        if so_far > left_db:
+            continue  # the strikes that were made separate them
         for times in TIMES:
             apart = np.array([_apart_db(take, one, other, times * middle) for take in mine])
             best = int(apart.argmax())
@@ -106,7 +129,7 @@ def separating_strike(end: Closed | NothingCompared) -> SeparatingStrike | None:
                     so_far,
                 )
             )
-    return max(found, key=lambda one: one.apart_db)
+    return max(found, key=lambda one: one.apart_db, default=None)
 
 
 def _name(h: Hypothesis) -> str:

@@ -103,11 +103,8 @@ def test_every_verdict_can_be_written(
     if page is not None:  # every strike is heard thrice, and the effect's equation and the table are read
         text = page.read_text(encoding="utf-8")
         assert text.count("<audio") == 3 * len(takes) and "d = ηω/2" in text and "named, or why not" in text
-    assert "next strike: " in said
-    assert (written["next_strike"] is not None) == bool(written["candidates"])
-    if verdict == "explained":
-        assert written["next_strike"]["models"] == ["damping-law", "no effect"]
-        assert written["next_strike"]["apart_db"] > written["next_strike"]["apart_so_far_db"] > 1.0
+    assert "next strike: no two models that these strikes leave open" in said  # what is named was told from nothing
+    assert written["next_strike"] is None
     assert written["baseline"]["gamma_m2_s2"] is None and written["errors"]["floor"] is None
     if "dB more" in words:
         assert all(isinstance(band["early"], bool) for band in written["unexplained"]["bands_off"])
