@@ -55,7 +55,7 @@ def run_diagnose(
                 from sonic_bullet.report.diagnosis_page import write_report
 
                 progress("drawing the report")
-                write_report(report, found)
+                write_report(report, found, proposal(strike) if propose else "")
         if output is not None:
             from sonic_bullet.diagnosis.preset_export import preset_of
             from sonic_bullet.presets import write_preset
@@ -155,10 +155,15 @@ class DiagnosisReport:
         if said := next_measurement(self.found.found, self.found.closed, self.found.unexplained):
             text.append(f"next: {said}")
         if self.proposed:
-            text.append(f"next strike: {self.strike or 'no two models that these strikes leave open'}")
+            text.append(f"next strike: {proposal(self.strike)}")
         if self.predicted:
             text.append(self.predicted)
         return text
+
+
+def proposal(strike: Any) -> str:
+    """Return what is proposed to strike next, or that nothing is."""
+    return str(strike or "no two models that these strikes leave open")
 
 
 def _number(value: Any) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.diagnosis.deciding_measurement import next_measurement
 from sonic_bullet.diagnosis.diagnose import Diagnosis
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.prediction.prediction import predict
@@ -33,14 +34,14 @@ img{max-width:100%}.verdict{font-size:1.4rem}figure{margin:1.5rem 0}figcaption{c
 audio{vertical-align:middle;width:16rem}"""
 
 
-def write_report(path: str, d: Diagnosis) -> None:
+def write_report(path: str, d: Diagnosis, proposal: str = "") -> None:
     """Write the page, whole or not at all. Raises FileError."""
     with replacing(path) as file:
-        file.write(page(d).encode())
+        file.write(page(d, proposal).encode())
 
 
-def page(d: Diagnosis) -> str:
-    """Render the page's text."""
+def page(d: Diagnosis, proposal: str = "") -> str:
+    """Render the page's text; proposal: the strike that would tell most, in words, where it was asked for."""
     words = {
         "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
         "explained": "The model lacks something, and what it lacks has a name."
@@ -61,6 +62,7 @@ def page(d: Diagnosis) -> str:
         _plane(d),
         _candidates(d),
         _notes(d),
+        _next_strike(d, proposal),
         "</html>",
     ]
     return "\n".join(part for part in parts if part)
@@ -177,12 +179,28 @@ def _candidates(d: Diagnosis) -> str:
 
 def _notes(d: Diagnosis) -> str:
     items = "".join(f"<li>{html.escape(w)}</li>" for w in d.warnings)
-    base = d.closed.before
-    text = (
-        f"Baseline: α = {base.alpha_per_s:.4g} 1/s, β = {base.beta_s:.4g} s, E/ρ = {d.found.fit.gamma_m2_s2:.5g} "
-        f"m²/s², ν = {d.found.fit.poisson_ratio:.3f}."
-    )
+    text = f"Baseline: {baseline_words(d)}."
     return f"<h2>Notes</h2><p>{text}</p><ul>{items}</ul>"
+
+
+def baseline_words(d: Diagnosis) -> str:
+    """Format the baseline's numbers; "not fitted" of those that have no part in it, or are the guess's."""
+    base, fit, identified = d.closed.before, d.found.fit, np.isfinite(np.diag(d.found.fit.covariance))
+    damped = any(body.own_decay_per_s is None and body.recorded is not None for body in d.bodies)
+    shaped = any(body.family is not None and body.recorded is not None for body in d.bodies)
+    numbers = (
+        ("α", f"{base.alpha_per_s:.4g} 1/s", damped and identified[0]),
+        ("β", f"{base.beta_s:.4g} s", damped and identified[1]),
+        ("E/ρ", f"{fit.gamma_m2_s2:.5g} m²/s²", shaped and identified[2]),
+        ("ν", f"{fit.poisson_ratio:.3f}", shaped and identified[4]),
+    )
+    return ", ".join(f"{name} = {text}" if fitted else f"{name} not fitted" for name, text, fitted in numbers)
+
+
+def _next_strike(d: Diagnosis, proposal: str) -> str:
+    said = [next_measurement(d.found, d.closed, d.unexplained), proposal]
+    rows = "".join(f"<p>{html.escape(one)}.</p>" for one in said if one)
+    return f"<h2>Next strike</h2>{rows}" if rows else ""
 
 
 def _table(head: tuple[str, ...], rows: list[Any]) -> str:
