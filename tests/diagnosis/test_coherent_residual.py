@@ -122,13 +122,14 @@ def test_a_room_leaves_little_whatever_is_beside_it(
     guess, and no mesh is to blame: a response takes up its errors.
     """
     monkeypatch.setattr(loop, "of_the_mesh", lambda *_: np.inf)
+    monkeypatch.setattr(loop, "with_unmatched_modes_moved", lambda h, _: (h, 0.0))
     body, room, law = recorded(), Room(0.5, 0.4, 1), DampingLaw("constant-loss", 6e-3)
     named: list[tuple[Effect, float]] = [(room, 10.0)] + ([(law, gain_db)] if gain_db is not None else [])
     h = replace(fitted(body), effects=tuple(e for e, _ in named))
     added = [Candidate(e.id, e, h, np.full(5, gain), gain, 0.0, {}) for e, gain in named]
-    assert loop._verdict(h, added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,)))) == verdict
+    problem = posed((body,), takes_of((body,)))
+    assert loop._verdict(fitted(body), h, added, 20.0, Score(left_db + 1.0, 1.0), problem)[0] == verdict
     dry = replace(h, effects=(law,))
     assert (
-        loop._verdict(dry, added[1:] or added, 20.0, Score(left_db + 1.0, 1.0), posed((body,), takes_of((body,))))
-        == "explained"
+        loop._verdict(fitted(body), dry, added[1:] or added, 20.0, Score(left_db + 1.0, 1.0), problem)[0] == "explained"
     ), "where there is no room, a mesh may be to blame"
