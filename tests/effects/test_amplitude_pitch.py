@@ -15,8 +15,7 @@ from sonic_bullet.diagnosis.evidence.small_amplitude import _off_hz, at_rest
 from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects import amplitude_pitch
-from sonic_bullet.effects.amplitude_pitch import FAR as FARTHER
-from sonic_bullet.effects.amplitude_pitch import NEAR, AmplitudePitch, _moments, _slopes
+from sonic_bullet.effects.amplitude_pitch import GROWTHS_TRIED, AmplitudePitch, _moments, _slopes
 from sonic_bullet.effects.amplitude_pitch.degenerate_pitch import bend_with_axes
 from sonic_bullet.effects.common.envelope import Envelopes, alone, envelopes, windowed
 from sonic_bullet.effects.contact_time import ContactTime
@@ -206,7 +205,8 @@ def test_a_bend_is_told_with_the_axes_of_twins() -> None:
     told = evidence_of(refitted(fitted(body), (body,)), (body,), BAND).observed[0]
     e = envelopes(told)
     assert e is not None
-    near = bend_with_axes(e, told, "velocity", bend_with_axes(e, told, "velocity", 0.5, FARTHER), NEAR)
+    far = bend_with_axes(e, told, "velocity", 0.5, GROWTHS_TRIED.far)
+    near = bend_with_axes(e, told, "velocity", far, GROWTHS_TRIED.near)
     assert near == pytest.approx(0.7, rel=0.04)
 
 

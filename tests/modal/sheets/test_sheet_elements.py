@@ -110,6 +110,7 @@ def test_a_dented_tube_has_the_modes_of_rayleigh() -> None:
     assert model.freq_hz[:4] == pytest.approx([flat, flat, tilted, tilted], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_plate_of_many_holes_states_an_error_within_what_is_asked() -> None:
     shape, holes = _perforated(4, 4, 0.02, 0.002)
     model = analyse((shape,), STEEL, count=3, cache=None)
