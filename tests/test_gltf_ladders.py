@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.gltf_ladders import judge
-from benchmarks.ladders.impacts import IMPACTS
-from benchmarks.ladders.verdicts import AGREES, ERRS
+from studies.gltf_ladders.__main__ import judge
+from studies.gltf_ladders.impacts import IMPACTS
+from studies.gltf_ladders.verdicts import AGREES, ERRS
 
 
 @pytest.mark.shared

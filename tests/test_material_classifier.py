@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.material_classifier import CENTRES_HZ, FLOOR_DB, Heard, features_of, learn, names_of, unheard_names
+from studies.material_classifier import CENTRES_HZ, FLOOR_DB, Heard, features_of, learn, names_of, unheard_names
 
 
 def test_gain_moves_no_feature_and_a_tone_lies_in_its_octave() -> None:

@@ -301,6 +301,13 @@ def test_files_stay_short() -> None:
     assert not long
 
 
+def test_benchmarks_answer_standing_questions_alone() -> None:
+    """What was asked once is in studies/, which benchmarks do not need."""
+    scripts = [path.read_text(encoding="utf-8") for path in sorted((REPO / "benchmarks").rglob("*.py"))]
+    assert sum(text.count("\n") for text in scripts) <= 7500
+    assert not any(re.search(r"^\s*(?:from|import) studies\b", text, re.MULTILINE) for text in scripts)
+
+
 def test_lines_stay_narrow() -> None:
     """Counted here, for a linter passes over the end of a line that silences another tool."""
     wide = [

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.special import spherical_jn, spherical_yn
 
-from benchmarks import radiation_bem
 from sonic_bullet.radiation.far_field import radiation
 from sonic_bullet.radiation.surface_waves import SurfaceWaves
 from sonic_bullet.records import Air, Array, ModalModel
+from studies import radiation_bem
 from tests.radiation.test_far_field import box, icosphere
 
 AIR = Air()

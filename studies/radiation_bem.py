@@ -1,6 +1,6 @@
 """How far are the pressure weights of `radiation.far_field` from a boundary element solution of the same modes?
 
-    python benchmarks/radiation_bem.py [--only plate] [--modes 24] [--coarse]
+    python studies/radiation_bem.py [--only plate] [--modes 24] [--coarse]
 
 Helmholtz boundary elements after Burton & Miller 1971, eq. 3.5 (no irregular frequencies), constant on triangles,
 collocated at centroids:

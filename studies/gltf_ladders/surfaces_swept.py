@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.ladders.observed import SR, Observed
-from benchmarks.ladders.verdicts import AGREES, DIFFERS, ERRS, LACKING, PARTLY, Verdict, within
 from sonic_bullet.records import Array
 from sonic_bullet.records.roughness import WAVE_M
+from studies.gltf_ladders.observed import SR, Observed
+from studies.gltf_ladders.verdicts import AGREES, DIFFERS, ERRS, LACKING, PARTLY, Verdict, within
 
 Scenes = Mapping[str, Observed]
 SHOCKS = (

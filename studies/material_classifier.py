@@ -1,7 +1,7 @@
 """Of which of four materials is it? A classifier that learns from one command's data set, on objects it never heard.
 
     sonic-bullet dataset impacts -o out --count 100 --seed 1
-    python -m benchmarks.material_classifier out --data ../shared/measured
+    python -m studies.material_classifier out --data ../shared/measured
 
 Each object of the data set is named by what was learnt from all others; every body of the recordings whose material is
 one of the four, by what was learnt from all. Writes docs/measured/material-classifier.md. Nothing of it was chosen by
@@ -143,7 +143,7 @@ def page(rows: Mapping[str, Sequence[Heard]], heard: Sequence[Heard], real: Sequ
         "",
         "```text",
         asked,
-        "python -m benchmarks.material_classifier out --data ../shared/measured",
+        "python -m studies.material_classifier out --data ../shared/measured",
         "```",
         "",
         f"{len(heard)} sounds of {len(objects)} objects: {', '.join(f'{n} {of}' for of, n in counts.items())}.",

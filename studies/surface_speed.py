@@ -1,6 +1,6 @@
 """What share of real time do 100 rolling pairs cost on one core? Least of five half-second runs, in processor time.
 
-    python benchmarks/surface_speed.py
+    python studies/surface_speed.py
 
 Pairs at rest are not among the voices of a step: they cost what a look at their rows does.
 """

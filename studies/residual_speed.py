@@ -1,6 +1,6 @@
 """How long does a residual's transfer take?
 
-`python benchmarks/residual_speed.py`: one core, one run, everything counted.
+`python studies/residual_speed.py`: one core, one run, everything counted.
 
 From scratch: pairs of modes, shift, stretch and scale of the spectrogram, phases, four turns of the inversion,
 fade: a grain of 0.5 s at 48 kHz for one body and place. From the cache: which place it is, the grain found, a fresh

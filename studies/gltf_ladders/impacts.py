@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.ladders.observed import SR, Observed
-from benchmarks.ladders.verdicts import AGREES, ERRS, PARTLY, Verdict, within
+from studies.gltf_ladders.observed import SR, Observed
+from studies.gltf_ladders.verdicts import AGREES, ERRS, PARTLY, Verdict, within
 
 Scenes = Mapping[str, Observed]
 

@@ -1,6 +1,6 @@
 """Do the ladders of the draft glTF extension KHR_audio_rigid_bodies come out here as its text predicts?
 
-    python -m benchmarks.gltf_ladders --data ../shared/gltf-audio [--out PAGE] [LADDER ...]        half a minute
+    python -m studies.gltf_ladders --data ../shared/gltf-audio [--out PAGE] [LADDER ...]        half a minute
 
 A ladder is two to four scenes that differ in one thing. Each is run for 2 s by `render_scene`, and its log once more,
 watched: lengths of pulses, the contact's force at audio rate. Where we differ, the page says who is right, by a source.
@@ -12,17 +12,17 @@ import argparse
 import textwrap
 from pathlib import Path
 
-from benchmarks.ladders.impacts import IMPACTS
-from benchmarks.ladders.observed import Observed
-from benchmarks.ladders.surfaces_swept import SWEPT
-from benchmarks.ladders.verdicts import Verdict
 from sonic_bullet.storage.atomic import replacing
+from studies.gltf_ladders.impacts import IMPACTS
+from studies.gltf_ladders.observed import Observed
+from studies.gltf_ladders.surfaces_swept import SWEPT
+from studies.gltf_ladders.verdicts import Verdict
 
 HEAD = """# Ladders of the draft glTF extension
 
 The draft KHR_audio_rigid_bodies comes with ladders: scenes that differ in one thing and isolate one prediction.
 This page holds what its text predicts, and what `sonic-bullet render` makes of the scenes.
-It is written by `python -m benchmarks.gltf_ladders --data ../shared/gltf-audio --out PAGE`.
+It is written by `python -m studies.gltf_ladders --data ../shared/gltf-audio --out PAGE`.
 
 Rates are how often the contact's force rises through its load a second.
 Levels are of 0.3 s to 2 s, re 20 µPa, 1.1 m away and more.

@@ -1,6 +1,6 @@
 """Do modes, a log's replay and scenes agree between two Pythons?
 
-    python benchmarks/python_versions.py .venv/bin/python OTHER/bin/python [--scenes bar drop …]
+    python studies/python_versions.py .venv/bin/python OTHER/bin/python [--scenes bar drop …]
 
 Both interpreters must have the package's dependencies; both run this checkout by the command line. Rows:
 

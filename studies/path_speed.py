@@ -1,6 +1,6 @@
 """What does the sound path cost: 100 bodies that sound and move, two microphones, 48 kHz, steps of 1/240 s?
 
-    python benchmarks/path_speed.py
+    python studies/path_speed.py
 
 Prints shares of real time on one core (CPU time of this thread, best of several seconds), sounding and silent, and the
 ratio to the plain way: scipy's cubic interpolation of each body's history at the retarded times.
