@@ -121,7 +121,7 @@ class DiagnosisReport:
             "none": "the model suffices: no effect is accepted",
             "explained": "the model lacks" + (", not alone" if self.found.unexplained else ""),
             "unexplained": "something is left that no known effect explains",
-            "worse-than-silence": "what was fitted is farther from the recordings than silence: no effect was sought",
+            "worse-than-silence": "what was fitted is farther from the recordings than silence, with every effect",
             "nothing": NOTHING,
         }
         nothing = type(self.found.closed) is NothingCompared

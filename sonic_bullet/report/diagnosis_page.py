@@ -47,7 +47,7 @@ def page(d: Diagnosis, proposal: str = "") -> str:
         "explained": "The model lacks something, and what it lacks has a name."
         + (" It does not lack that alone." if d.unexplained else ""),
         "unexplained": "Something is left that none of the known effects accounts for.",
-        "worse-than-silence": "What was fitted is farther from the recordings than silence, so no effect was sought.",
+        "worse-than-silence": "What was fitted is farther from the recordings than silence, with every effect.",
         "nothing": "Nothing could be compared, so nothing is known of what the model lacks.",
     }
     name = html.escape(d.case.name)

@@ -99,7 +99,7 @@ class NothingCompared:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorseThanSilence(NothingCompared):
-    """A selection that never began, as the baseline is no nearer to the recordings than silence: gains mean nothing."""
+    """A selection whose end is no nearer to the recordings than silence: its gains mean nothing."""
 
     before_db: float
     silence_db: float
@@ -138,17 +138,16 @@ def select_effects(
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
     own = [take for take in found.takes if isinstance(take, AudioObservation)]
-    if worse := _worse_than_silence(start, against_silence or own, found.left_out):
-        return worse
     problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent)
-    return _closed(start, made, problem, found.left_out)
+    end = _closed(start, made, problem, found.left_out)
+    return _worse_than_silence(start, end.after, against_silence or own, found.left_out) or end
 
 
 def _worse_than_silence(
-    start: Hypothesis, takes: Sequence[AudioObservation], left_out: tuple[LeftOut, ...]
+    start: Hypothesis, end: Hypothesis, takes: Sequence[AudioObservation], left_out: tuple[LeftOut, ...]
 ) -> WorseThanSilence | None:
-    """Return the verdict that the start is no nearer to the takes with a distance than silence is, if it is."""
-    made = predict_takes(start, takes)
+    """Return the verdict that the end is no nearer to the takes with a distance than silence is, if it is."""
+    made = predict_takes(end, takes)
     held = comparable(takes, made)
     if isinstance(held, Incomparable):
         return None
