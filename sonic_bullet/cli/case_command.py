@@ -95,7 +95,7 @@ def run_case_new(
         name_of = _names(place, [*sounds, *forces, *([Path(mesh)] if mesh is not None else [])])
         if mesh is not None:
             thing["mesh"] = name_of[Path(mesh)]
-        case = _described(
+        case = _case_json(
             place, [name_of[s] for s in sounds], thing, responses[sensor], sensor_at, sensor_direction, medium
         )
         if made is not None:
@@ -234,7 +234,7 @@ def _names(place: Path, files: Sequence[Path]) -> dict[Path, str]:
     return named
 
 
-def _described(
+def _case_json(
     place: Path,
     sounds: Sequence[str],
     thing: dict[str, Any],

@@ -43,10 +43,10 @@ def finite(value: float) -> float | None:
 def decay_cells(row: Row) -> tuple[str, str, str]:
     """Format T60, η and Q for a table."""
 
-    def shown(name: str) -> str:
+    def format_value(name: str) -> str:
         return "?" if row[name] is None else f"{row[name]:.3g}"
 
-    return shown("t60_s"), shown("loss_factor"), shown("q")
+    return format_value("t60_s"), format_value("loss_factor"), format_value("q")
 
 
 def write_csv(path: str | None, rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> None:
@@ -72,7 +72,7 @@ def take_tables(takes: Any) -> list[str]:
     if not takes:
         return []
 
-    def shown(value: float) -> str:
+    def format_value(value: float) -> str:
         return f"{value:.1f} dB" if math.isfinite(value) else "-"
 
     held = all(t.split == "holdout" for t in takes)
@@ -82,10 +82,10 @@ def take_tables(takes: Any) -> list[str]:
     rows = [
         (
             t.file,
-            shown(t.predicted_db),
-            shown(t.silence_db),
-            shown(t.other_take_db),
-            *([shown(t.plausible_db)] if guessed else []),
+            format_value(t.predicted_db),
+            format_value(t.silence_db),
+            format_value(t.other_take_db),
+            *([format_value(t.plausible_db)] if guessed else []),
             ("fitted" if t.gain else NO_GAIN) if t.free_gain else "known",
         )
         for t in takes

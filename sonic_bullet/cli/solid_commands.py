@@ -180,8 +180,8 @@ def run_materials(json_to: str | None) -> None:
         json_to,
         {
             "materials": [_material(m) for m in found],
-            "made": [_material(m) | _described_law(preset) for m, preset in made],
-            "recorded": [_material(m) | _described_origin(preset) for m, preset in recorded],
+            "made": [_material(m) | _law_json(preset) for m, preset in made],
+            "recorded": [_material(m) | _origin_json(preset) for m, preset in recorded],
         },
     )
 
@@ -201,7 +201,7 @@ def _made_row(material: Material, preset: Preset) -> tuple[str, ...]:
     )
 
 
-def _described_law(preset: Preset) -> dict[str, Any]:
+def _law_json(preset: Preset) -> dict[str, Any]:
     """Convert the law of a preset of measured bodies to JSON values."""
     damping = preset.damping
     return {
@@ -234,7 +234,7 @@ def _recorded_row(preset: Preset) -> tuple[str, ...]:
     )
 
 
-def _described_origin(preset: Preset) -> dict[str, Any]:
+def _origin_json(preset: Preset) -> dict[str, Any]:
     """Convert the origin of a recorded preset to JSON values."""
     import msgspec
 

@@ -106,7 +106,7 @@ def build(
     """Set up a floor and the body above it."""
     floor_material = "concrete"
     made = load_material(material)
-    model = known(object, material).model(size, made)
+    model = load_known_shape(object, material).model(size, made)
     client.setGravity(0, 0, -9.81)
     client.setTimeStep(1 / 480)
     floor = client.createMultiBody(0, client.createCollisionShape(client.GEOM_PLANE))
@@ -126,7 +126,7 @@ def build(
     }
 
 
-def known(object: str, material: str) -> KnownShape:
+def load_known_shape(object: str, material: str) -> KnownShape:
     """Solve an object once for all its sizes and materials; apart for slow ones, which have several times the modes."""
     slow = ("plastic",)
     group = [name for name in IMPACTS.materials if (name in slow) == (material in slow)]

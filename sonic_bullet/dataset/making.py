@@ -123,14 +123,14 @@ def make_dataset(
             prepare=prepare,
         )  # fmt: skip
         layouts = {name: str(write_layout(name, kept, numbers, say)) for name in dict.fromkeys(formats)}
-        return _summary(kept, numbers, made, failures, layouts)
+        return _summarise(kept, numbers, made, failures, layouts)
 
 
 def _make(recipe: Recipe, seed: int, sr: int, number: int) -> Sample:
     return make_sample(Job(recipe, seed, number, sr))
 
 
-def _summary(
+def _summarise(
     kept: SampleFolder, numbers: range, made: int, failures: Mapping[int, str], layouts: Mapping[str, str]
 ) -> DatasetSummary:
     samples, objects = Counter[str](), dict[str, set[str]]()

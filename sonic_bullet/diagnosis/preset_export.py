@@ -31,7 +31,8 @@ def preset_of(d: Diagnosis) -> Preset:
         method=f"{base.provenance.method}; effects by cross-validation on strikes left out",
         verdict=d.verdict,
     )
-    effects = (*(stored(e) for e in after.effects if kept(e)), *base.effects)  # recorded lines, in place of all modes
+    # recorded lines stand in place of all modes
+    effects = (*(stored(e) for e in after.effects if is_exported(e)), *base.effects)
     made = msgspec.structs.replace(base, damping=damping, provenance=provenance, effects=effects)
     for effect in after.effects:
         if effect.stage is Stage.MATERIAL:
@@ -46,6 +47,6 @@ def preset_of(d: Diagnosis) -> Preset:
     return made
 
 
-def kept(effect: Effect) -> bool:
+def is_exported(effect: Effect) -> bool:
     """Decide whether a preset holds the effect."""
     return effect.owner in (Owner.MATERIAL, Owner.OBJECT) and isinstance(effect, KEPT_EFFECTS)

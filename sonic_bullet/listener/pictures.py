@@ -1,6 +1,6 @@
 """Interface to draw a scene: meshes at poses, seen by a camera.
 
-    Figure (triangles, colour) … -> open_pictures -> Pictures.picture(poses, Camera) -> (height, width, 3) uint8
+    ColouredMesh (triangles, colour) … -> open_pictures -> Pictures.picture(poses, Camera) -> (height, width, 3) uint8
 
 PyBullet's own renderer is one (listener/pybullet/staged/picture_world.py), without a window or a graphics card; another
 renderer has to provide `picture`.
@@ -23,7 +23,7 @@ VIEW_DEG = 40.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Figure:
+class ColouredMesh:
     """A rigid mesh to be drawn.
 
     Parameters
@@ -89,7 +89,7 @@ class Standing:
     body_id: int
     link: int
     name: str
-    figure: Figure
+    mesh: ColouredMesh
     position_m: Array
     quaternion_xyzw: Array
 
@@ -105,13 +105,13 @@ class Pictures(Protocol):
 
 
 def open_pictures(
-    figures: Sequence[Figure], size: tuple[int, int], *, shadows: bool = False, still: Array | None = None
+    meshes: Sequence[ColouredMesh], size: tuple[int, int], *, shadows: bool = False, still: Array | None = None
 ) -> Pictures:
     """Open a renderer of meshes.
 
     Parameters
     ----------
-    figures
+    meshes
     size
         Width and height in pixels.
     shadows
@@ -125,7 +125,7 @@ def open_pictures(
     """
     from sonic_bullet.listener.pybullet.staged.picture_world import PyBulletPictures
 
-    return PyBulletPictures(figures, size, shadows, np.zeros(len(figures), bool) if still is None else still)
+    return PyBulletPictures(meshes, size, shadows, np.zeros(len(meshes), bool) if still is None else still)
 
 
 def standing_in(client_id: int) -> tuple[Standing, ...]:

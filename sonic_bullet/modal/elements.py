@@ -28,7 +28,7 @@ from sonic_bullet.modal.element_errors import extended, log_changes, recovered_e
 from sonic_bullet.modal.meshing.filling import LATTICE, Filler
 from sonic_bullet.modal.meshing.solid import Solid
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import SECTORS, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Sector, SurfaceShapes, Wanted
 from sonic_bullet.modal.sparse.ordering import dissection
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError, ModalError
@@ -185,13 +185,13 @@ class Elements:
             stiff.append(k_matrix)
         return Sector(tuple(solved), tuple(stiff), mass, 1, (nodes, free, None))
 
-    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+    def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b) on the surface."""
         skin = self.body.skin
         nodes, whole = sectors[0].place[0], _whole(sectors[0], vectors[0])
         on_skin = lagrange.at_nodes(nodes, self.body.solid, skin.node) @ whole.reshape(len(nodes.node_m), -1)
         shape = np.ascontiguousarray(on_skin.reshape(len(skin.node), 3, -1), np.float32)
-        return Shown(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
+        return SurfaceShapes(self.body.solid.node_m[skin.node], skin.face, self.body.curvature_per_m, shape)
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Return the largest relative error estimated of the modes up to top[1], NaN where the user gave the size."""

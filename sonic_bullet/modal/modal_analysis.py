@@ -245,7 +245,7 @@ def _solve(
         kept=(cache, of.solid),
     )
     found = converged(method, [of.stiffness], wanted, asked.accuracy)
-    shown = found.method.shown(found.sectors, [sector.found[0][1] for sector in found.sectors])
+    surface = found.method.evaluate_on_surface(found.sectors, [sector.found[0][1] for sector in found.sectors])
     note = found.method.note(found.sectors)
     left_open = found.method.surface_error(found.sectors, of.stiffness)
     open_too = left_open if left_open >= LEAST_ERROR else 0.0
@@ -265,11 +265,11 @@ def _solve(
         note += f"; arcs in place of its facets change frequencies by up to {_percent(open_too).removeprefix('about ')}"
     return _Unit(
         found.value,
-        np.ascontiguousarray(shown.shape[:, :, found.order]),
+        np.ascontiguousarray(surface.shape[:, :, found.order]),
         found.method.volume,
-        shown.vertex_m,
-        shown.face,
-        shown.curvature_per_m,
+        surface.vertex_m,
+        surface.face,
+        surface.curvature_per_m,
         note,
     )
 

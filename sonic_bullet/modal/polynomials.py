@@ -22,7 +22,7 @@ from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.meshing import prisms, structured
 from sonic_bullet.modal.meshing.shape_meshes import rotation
 from sonic_bullet.modal.meshing.solid import surface
-from sonic_bullet.modal.sectors import Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import Sector, SurfaceShapes, Wanted
 from sonic_bullet.records import Array, Shape
 
 MOST_UNKNOWNS = 2200
@@ -251,7 +251,7 @@ class Ritz:
                 return found
             high *= 2
 
-    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+    def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         shell = structured.box(self.box.size_m, skin_cells(self.size, self.wave))
         skin = surface(shell)
@@ -262,7 +262,7 @@ class Ritz:
         ]
         shape = np.concatenate([m.astype(np.float32) for m in moved], axis=1).transpose(0, 2, 1)
         vertex = point @ self.box.axes.T + self.box.centre_m
-        return Shown(vertex, skin.face, np.zeros(len(skin.face)), np.ascontiguousarray(shape))
+        return SurfaceShapes(vertex, skin.face, np.zeros(len(skin.face)), np.ascontiguousarray(shape))
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Estimate the relative error of the frequency of mode top[1] of sector top[0] by two more degrees."""

@@ -145,21 +145,21 @@ def _reduced(method: ModalMethod, length: float, wanted: Wanted, poisson: tuple[
         whole = (whole + whole.transpose(0, 2, 1)) / 2
         lame += [whole[0]] * sector.multiplicity
         shear += [whole[1]] * sector.multiplicity
-    shown = method.shown(sectors, bases)
+    surface = method.evaluate_on_surface(sectors, bases)
     counts = [
         sum(int((sector.found[k][0] <= wanted.limit).sum()) * sector.multiplicity for sector in sectors) for k in (0, 1)
     ]
     return Family(
         block_diag(*lame),
         block_diag(*shear),
-        shown.shape,
-        shown.vertex_m,
-        shown.face,
+        surface.shape,
+        surface.vertex_m,
+        surface.face,
         length,
         method.volume * length**3,
         min(SECTORS.most_modes, *counts),
         f"{method.note(sectors)}; nu {poisson[0]:g} and {poisson[1]:g}",
         method.meshed,
         error,
-        shown.curvature_per_m,
+        surface.curvature_per_m,
     )

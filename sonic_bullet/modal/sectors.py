@@ -42,7 +42,7 @@ class Sector(NamedTuple):
     place: Any
 
 
-class Shown(NamedTuple):
+class SurfaceShapes(NamedTuple):
     """Surface of a body in m, body frame, as `ModalModel` has it.
 
     shape (v, 3, b) float32 holds the sectors' vectors in turn, repeated by each sector's multiplicity.
@@ -85,7 +85,7 @@ class ModalMethod(Protocol):
         """Solve for the modes wanted of each tensor (6, 6). Raises ModalError, MeshError."""
         ...
 
-    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+    def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         ...
 

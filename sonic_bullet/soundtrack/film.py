@@ -25,7 +25,7 @@ from sonic_bullet.records.errors import AudioError, SceneError
 from sonic_bullet.soundtrack.film_writer import FilmWriter, check_film_output, check_size, pictures_of, samples_of
 from sonic_bullet.soundtrack.overlay import shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import SoundEvent, touching_pairs
-from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of, staged
+from sonic_bullet.soundtrack.staging import Staging, chosen_camera, duration_of, stage_log
 from sonic_bullet.storage.spooled_sound import KeptSound
 
 
@@ -135,11 +135,11 @@ def make_film(
         count = max(count, pictures_of(sound.shape[1], look.fps, sr))
     level = level or find_level(sound, sr, peak_dbfs, lufs, 1.0)
     gain, sound = level.gain_per_pa, sound.shaped(level.curve)
-    staging = staged(log, look.fps, count, standing)
+    staging = stage_log(log, look.fps, count, standing)
     cameras = _cameras(log, staging, look)
     touching = None if events is None else _touching(log, staging)
     still = staging.still if len(cameras) == 1 else None
-    drawer = open_pictures(staging.figures, look.size, shadows=look.shadows, still=still)
+    drawer = open_pictures(staging.meshes, look.size, shadows=look.shadows, still=still)
 
     def draw(k: int) -> Array:
         camera = cameras[k] if len(cameras) > 1 else cameras[0]

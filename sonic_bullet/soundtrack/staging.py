@@ -1,6 +1,6 @@
 """Bodies of a film, and their poses at each of its pictures.
 
-    ContactLog: models -> figures;  poses at step starts -> poses at k/fps, between two steps on the line (and the
+    ContactLog: models -> meshes;  poses at step starts -> poses at k/fps, between two steps on the line (and the
         shorter arc) from one to the other
     Standing (the scene's world at its end): shapes that the log lacks
 
@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.listener.pictures import VIEW_DEG, Camera, Figure, Standing
+from sonic_bullet.listener.pictures import VIEW_DEG, Camera, ColouredMesh, Standing
 from sonic_bullet.records import Array, Body, Microphone
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import SceneError
@@ -27,7 +27,7 @@ from sonic_bullet.runtime.clock import Clock
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Staging:
-    """Figures (k) in n pictures.
+    """Meshes (k) in n pictures.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Staging:
     notes : what is not drawn
     """
 
-    figures: tuple[Figure, ...]
+    meshes: tuple[ColouredMesh, ...]
     body: Array
     position_m: Array
     quaternion_xyzw: Array
@@ -47,7 +47,7 @@ class Staging:
 
     @property
     def still(self) -> Array:
-        """Which figures (k,) do not move in any picture."""
+        """Which meshes (k,) do not move in any picture."""
         stays = [(poses == poses[0]).all(axis=(0, 2)) for poses in (self.position_m, self.quaternion_xyzw)]
         return np.asarray(stays[0] & stays[1] & (self.shown == self.shown[0]).all(axis=0))
 
@@ -63,24 +63,24 @@ def duration_of(log: ContactLog) -> Fraction:
     return Fraction(clock.ticks, clock.per_second)
 
 
-def staged(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Standing] = ()) -> Staging:
-    """Stage all figures at each picture. Raises SceneError where there is nothing to draw."""
+def stage_log(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Standing] = ()) -> Staging:
+    """Pose all meshes at each picture. Raises SceneError where there is nothing to draw."""
     places = {(one.body_id, one.link): one for one in standing}
-    figures: list[Figure] = []
+    meshes: list[ColouredMesh] = []
     index: list[int] = []
     notes: list[str] = []
     how_it_is_drawn = "film the scene, or, of an animation that was scored, give it a material in the table of score"
     for i, body in enumerate(log.bodies):
         known = places.get((body.body_id, body.link))
-        figure = _figure(body) or (known.figure if known is not None else None)
-        if figure is None:
+        mesh = _coloured_mesh(body) or (known.mesh if known is not None else None)
+        if mesh is None:
             notes.append(f"{body.name} is not drawn: the log has no shape of it; {how_it_is_drawn}")
             continue
-        figures.append(figure)
+        meshes.append(mesh)
         index.append(i)
     logged = {(body.body_id, body.link) for body in log.bodies}
     still = [one for one in standing if (one.body_id, one.link) not in logged]
-    if not figures and not still:
+    if not meshes and not still:
         raise SceneError("there is nothing to draw: no body has a shape", "film the scene itself, or add bodies")
     position, turned, shown, step = _poses(log, fps, pictures, np.array(index, np.int64))
     count = len(still)
@@ -88,15 +88,15 @@ def staged(log: ContactLog, fps: Fraction, pictures: int, standing: Sequence[Sta
     turned = np.concatenate([turned, np.tile(_stack([x.quaternion_xyzw for x in still], 4), (pictures, 1, 1))], axis=1)
     shown = np.concatenate([shown, np.ones((pictures, count), bool)], axis=1)
     who = np.array([*index, *([-1] * count)], np.int64)
-    return Staging((*figures, *(x.figure for x in still)), who, position, turned, shown, step, tuple(notes))
+    return Staging((*meshes, *(x.mesh for x in still)), who, position, turned, shown, step, tuple(notes))
 
 
 def _stack(rows: Sequence[Array], size: int) -> Array:
     return np.array(rows, float).reshape(-1, size)
 
 
-def _figure(body: Body) -> Figure | None:
-    """Make a figure of a body's model; None where it has no surface."""
+def _coloured_mesh(body: Body) -> ColouredMesh | None:
+    """Return the coloured surface of a body's model; None where it has no surface."""
     colours = {
         "wood": (0.72, 0.53, 0.34),
         "porcelain": (0.93, 0.93, 0.90),
@@ -112,7 +112,7 @@ def _figure(body: Body) -> Figure | None:
         return None
     name = body.material.name.lower() if body.material is not None else ""
     colour = next((rgb for word, rgb in colours.items() if word in name), other_colour)
-    return Figure(body.model.vertex_m, body.model.face, colour)
+    return ColouredMesh(body.model.vertex_m, body.model.face, colour)
 
 
 def _poses(log: ContactLog, fps: Fraction, pictures: int, who: Array) -> tuple[Array, Array, Array, Array]:
@@ -164,9 +164,9 @@ def chosen_camera(
     log: ContactLog, staging: Staging, eye_m: Sequence[float] | None = None, target_m: Sequence[float] | None = None
 ) -> Camera:
     """Return the camera asked for, or one that shows what moves, from the first microphone's side, seen from above."""
-    radius = np.array([_radius_m(figure) for figure in staging.figures])
+    radius = np.array([_radius_m(mesh) for mesh in staging.meshes])
     moves = np.ptp(staging.position_m, axis=0).max(axis=1) > 1e-3
-    wide_m = 20.0  # a figure wider than this is ground, which need not be in view
+    wide_m = 20.0  # a mesh wider than this is ground, which need not be in view
     small = radius < wide_m
     seen = moves & small if (moves & small).any() else small if small.any() else np.ones(len(radius), bool)
     # percentiles, so that a body that falls for ever is not followed
@@ -187,5 +187,5 @@ def chosen_camera(
     return Camera(target + away * (np.cos(elevation_rad) * side + np.sin(elevation_rad) * np.array([0, 0, 1])), target)
 
 
-def _radius_m(figure: Figure) -> float:
-    return float(np.linalg.norm(figure.vertex_m, axis=1).max(initial=0.0))
+def _radius_m(mesh: ColouredMesh) -> float:
+    return float(np.linalg.norm(mesh.vertex_m, axis=1).max(initial=0.0))

@@ -9,7 +9,7 @@ import pytest
 
 from sonic_bullet.comparing.inputs.call_pairs import aligned, side_by_side
 from sonic_bullet.comparing.inputs.causes import find_causes, log_distance, same_sound, shapley_shares
-from sonic_bullet.comparing.inputs.tree_difference import ABSENT, leaves, same, with_leaves
+from sonic_bullet.comparing.inputs.tree_difference import MISSING, leaves, same, with_leaves
 from sonic_bullet.listener.calls import Call, ObjectId
 from sonic_bullet.storage.spooled_sound import KeptSound
 
@@ -42,7 +42,7 @@ def test_both_orders_are_kept() -> None:
 def test_leaves_come_back() -> None:
     value = {"shape": {"radius": 1.0, "kind": 2}, "mass": 3.0}
     assert dict(leaves(value)) == {("shape", "radius"): 1.0, ("shape", "kind"): 2, ("mass",): 3.0}
-    assert with_leaves(value, {("shape", "radius"): 5.0, ("mass",): ABSENT}) == {"shape": {"radius": 5.0, "kind": 2}}
+    assert with_leaves(value, {("shape", "radius"): 5.0, ("mass",): MISSING}) == {"shape": {"radius": 5.0, "kind": 2}}
     assert same(float("nan"), float("nan"))
     assert not same(np.zeros(2), np.zeros(3))
     assert not same(np.zeros(1), np.array([-0.0]))  # to the bit

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.prediction.prediction import came_from, predict
-from sonic_bullet.effects.common.dashpots import apart, coupled, damped
+from sonic_bullet.effects.common.dashpots import coupled, damped, split_into_runs
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.effects.support_damping.dashpot_fit import DASHPOTS, Dashpot, DashpotFit
@@ -164,9 +164,9 @@ def test_modes_that_change_places_are_known_again() -> None:
 
 
 def test_runs_are_cut_where_frequencies_lie_apart() -> None:
-    runs = apart(np.array([1.0, 1.01, 1.02, 2.0, 2.01, 2.02, 2.03, 4.0]), 4)
+    runs = split_into_runs(np.array([1.0, 1.01, 1.02, 2.0, 2.01, 2.02, 2.03, 4.0]), 4)
     assert [run.tolist() for run in runs] == [[0, 1, 2], [3, 4, 5, 6], [7]]
-    assert max(len(run) for run in apart(np.linspace(1, 2, 57), 10)) <= 10
+    assert max(len(run) for run in split_into_runs(np.linspace(1, 2, 57), 10)) <= 10
 
 
 @pytest.mark.slow

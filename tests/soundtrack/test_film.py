@@ -12,7 +12,7 @@ import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
-from sonic_bullet.listener.pictures import Camera, Figure, open_pictures, standing_in
+from sonic_bullet.listener.pictures import Camera, ColouredMesh, open_pictures, standing_in
 from sonic_bullet.records import Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError, RecordError, SceneError
@@ -20,7 +20,7 @@ from sonic_bullet.runtime.replay import render_kept
 from sonic_bullet.soundtrack.film import FilmLook, make_film, pictures_in
 from sonic_bullet.soundtrack.overlay import COLOURS, pixel, shown_at, with_contacts
 from sonic_bullet.soundtrack.sound_events import find_sound_events
-from sonic_bullet.soundtrack.staging import chosen_camera, duration_of, staged
+from sonic_bullet.soundtrack.staging import chosen_camera, duration_of, stage_log
 from sonic_bullet.storage.spooled_sound import KeptSound
 from tests.made.films import decoded
 from tests.made.models import STEEL, box_body, box_surface
@@ -50,7 +50,7 @@ def moving_log(steps: int = 48, dt_s: float = 1 / 240, teleport: int = -1) -> Co
 def test_poses_are_those_of_the_pictures_times(fps: Fraction) -> None:
     log = moving_log()
     count = pictures_in(log, Fraction(fps))
-    found = staged(log, Fraction(fps), count)
+    found = stage_log(log, Fraction(fps), count)
     time_s = np.arange(count) / float(fps)
     known = time_s <= 47 / 240
     assert found.position_m[known, 0, 0] == pytest.approx(2 * time_s[known], abs=1e-12)
@@ -63,14 +63,14 @@ def test_poses_are_those_of_the_pictures_times(fps: Fraction) -> None:
 
 
 def test_who_is_set_elsewhere_does_not_fly_there() -> None:
-    found = staged(moving_log(teleport=20), Fraction(1000), 100)
+    found = stage_log(moving_log(teleport=20), Fraction(1000), 100)
     assert set(found.position_m[:, 0, 1].tolist()) == {0.0, 5.0}
 
 
 def test_a_body_is_seen_while_it_is_there() -> None:
     log = table_log()
     fps = Fraction(60)
-    found = staged(log, fps, pictures_in(log, fps))
+    found = stage_log(log, fps, pictures_in(log, fps))
     column = {log.bodies[i].until_step: k for k, i in enumerate(found.body) if log.bodies[i].until_step >= 0}
     for until, k in column.items():
         assert found.shown[: until // 4, k].all() and not found.shown[until // 4 + 1 :, k].any()
@@ -92,8 +92,8 @@ def test_lengths_are_exact_and_what_is_too_long_is_refused() -> None:
         pictures_in(replace(log, steps=()), Fraction(24))
 
 
-def figure(edges_m: Any = (0.2, 0.2, 0.2), colour: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> Figure:
-    return Figure(*box_surface(edges_m), colour)
+def coloured_mesh(edges_m: Any = (0.2, 0.2, 0.2), colour: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> ColouredMesh:
+    return ColouredMesh(*box_surface(edges_m), colour)
 
 
 def coloured(picture: Any) -> np.ndarray:
@@ -103,7 +103,7 @@ def coloured(picture: Any) -> np.ndarray:
 
 def test_a_point_is_drawn_where_the_projection_says() -> None:
     size, camera = (320, 200), Camera([0.3, -2.0, 1.0], [0.0, 0.0, 0.2], 35)
-    drawer = open_pictures([figure((0.02,) * 3)], size)
+    drawer = open_pictures([coloured_mesh((0.02,) * 3)], size)
     try:
         for place in ([0.0, 0.0, 0.2], [0.4, 0.3, 0.5], [-0.5, -0.4, 0.1]):
             picture = drawer.picture(np.array([place]), np.array([UPRIGHT]), np.array([True]), camera)
@@ -117,9 +117,10 @@ def test_a_point_is_drawn_where_the_projection_says() -> None:
 
 def test_what_stands_still_is_drawn_once_and_the_picture_is_the_same() -> None:
     size, camera = (200, 120), Camera([0.0, -2.0, 1.0], [0.0, 0.0, 0.0])
-    figures = [figure((1.0, 0.6, 0.02), (0.5, 0.4, 0.3)), figure(), figure((0.3, 0.1, 0.4), (0, 0, 1))]
+    edges_and_colours = ((1.0, 0.6, 0.02), (0.5, 0.4, 0.3)), (), ((0.3, 0.1, 0.4), (0, 0, 1))
+    meshes = [coloured_mesh(*one) for one in edges_and_colours]
     turned = np.tile(np.array(UPRIGHT), (3, 1))
-    one, other = open_pictures(figures, size), open_pictures(figures, size, still=np.array([True, False, True]))
+    one, other = open_pictures(meshes, size), open_pictures(meshes, size, still=np.array([True, False, True]))
     try:
         for x in (-0.6, 0.0, 0.1, 0.4):
             poses = np.array([[0, 0, 0], [x, 0.05, 0.1], [0.2, -0.1, 0.2]])
@@ -133,7 +134,7 @@ def test_what_stands_still_is_drawn_once_and_the_picture_is_the_same() -> None:
 def test_the_chosen_camera_takes_in_what_moves() -> None:
     log = table_log()
     fps = Fraction(10)
-    found = staged(log, fps, pictures_in(log, fps))
+    found = stage_log(log, fps, pictures_in(log, fps))
     camera = chosen_camera(log, found)
     moves = ~found.still
     inside = [
@@ -191,8 +192,8 @@ def test_the_world_tells_the_shapes_that_a_log_has_not() -> None:
         found = standing_in(client._client)
         assert len(found) == 2
         assert found[1].position_m == pytest.approx([0.3, 0.2, 0.4])
-        assert np.ptp(found[1].figure.vertex_m, axis=0) == pytest.approx([0.2, 0.1, 0.01])
-        assert np.ptp(found[0].figure.vertex_m, axis=0)[0] > 10
+        assert np.ptp(found[1].mesh.vertex_m, axis=0) == pytest.approx([0.2, 0.1, 0.01])
+        assert np.ptp(found[0].mesh.vertex_m, axis=0)[0] > 10
     finally:
         disconnect(client)
 

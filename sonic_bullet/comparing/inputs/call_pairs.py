@@ -111,7 +111,7 @@ def _middle(
 
 
 def differing(a: Call | None, b: Call | None) -> dict[tuple[str, ...], tuple[Any, Any]]:
-    """Return the leaves of two calls that differ: (A's, B's), ABSENT where one has none."""
+    """Return the leaves of two calls that differ: (A's, B's), MISSING where one has none."""
     return differing_leaves(a.arguments if a else {}, b.arguments if b else {})
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from sonic_bullet.comparing.inputs.call_pairs import CallPair, differing, side_by_side
 from sonic_bullet.comparing.inputs.substitution import HANDLES, Place
-from sonic_bullet.comparing.inputs.tree_difference import ABSENT, Path, leaves
+from sonic_bullet.comparing.inputs.tree_difference import MISSING, Path, leaves
 from sonic_bullet.comparing.sides import Side
 from sonic_bullet.listener.calls import Call, ObjectId
 
@@ -216,7 +216,7 @@ def _link(call: Call) -> int:
 
 
 def _value(value: Any) -> Any:
-    return None if value is ABSENT else value
+    return None if value is MISSING else value
 
 
 def _options(a: Side, b: Side) -> list[Asked]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sonic_bullet.comparing.inputs.call_pairs import CallPair, about, differing
-from sonic_bullet.comparing.inputs.tree_difference import ABSENT, Path, leaves, with_leaves
+from sonic_bullet.comparing.inputs.tree_difference import MISSING, Path, leaves, with_leaves
 from sonic_bullet.listener.calls import Call
 
 HANDLES = ("bodyUniqueId", "objectUniqueId", "multiBodyUniqueId", "body", "links", "linkIndex", "jointIndex")
@@ -74,7 +74,7 @@ class Substitution:
             if pair.a is None or pair.b is not None:
                 continue
             paths = {path for path, _ in leaves(pair.a.arguments)}
-            absent = {path: ABSENT for path in paths if (number, path) not in self.chosen and path[0] not in HANDLES}
+            absent = {path: MISSING for path in paths if (number, path) not in self.chosen and path[0] not in HANDLES}
             if (number, None) in self.chosen:
                 found.append(pair.a)
             elif len(absent) < len([path for path in paths if path[0] not in HANDLES]):

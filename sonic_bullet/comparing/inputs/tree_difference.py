@@ -19,13 +19,13 @@ Path = tuple[str, ...]
 """Path of a leaf: names of arguments, of fields of records, of keys."""
 
 
-class _Absent:
+class _Missing:
     def __repr__(self) -> str:
         """Return the word that reports print."""
         return "nothing"
 
 
-ABSENT = _Absent()
+MISSING = _Missing()
 """Stands for a leaf that is not there."""
 
 
@@ -42,7 +42,7 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def with_leaves(value: Any, given: Mapping[Path, Any]) -> Any:
-    """Return the value with those leaves replaced; ABSENT removes a key.
+    """Return the value with those leaves replaced; MISSING removes a key.
 
     Raises what a record raises that rejects the value.
     """
@@ -55,7 +55,7 @@ def with_leaves(value: Any, given: Mapping[Path, Any]) -> Any:
         made = dict(value)
         for name, inner in heads.items():
             one = with_leaves(made.get(name, {}), inner)
-            if one is ABSENT:
+            if one is MISSING:
                 made.pop(name, None)
             else:
                 made[name] = one
@@ -79,14 +79,14 @@ def same(one: Any, other: Any) -> bool:
     return one is other or (type(one) is type(other) and bool(one == other))
 
 
-def differing_leaves(one: Any, other: Any, absent: Any = ABSENT) -> dict[Path, tuple[Any, Any]]:
+def differing_leaves(one: Any, other: Any, absent: Any = MISSING) -> dict[Path, tuple[Any, Any]]:
     """Return the leaves of two trees that differ, by path: (one's, other's), ``absent`` where one has none."""
     old, new = dict(leaves(one)), dict(leaves(other))
     pairs = {path: (old.get(path, absent), new.get(path, absent)) for path in {**old, **new}}
     return {path: pair for path, pair in pairs.items() if not same(*pair)}
 
 
-def unlike_fraction(one: Any, other: Any, absent: Any = ABSENT) -> float:
+def unlike_fraction(one: Any, other: Any, absent: Any = MISSING) -> float:
     """Compute the fraction of all leaves of both trees that differ."""
     most = len({path for tree in (one, other) for path, _ in leaves(tree)})
     return len(differing_leaves(one, other, absent)) / max(most, 1)

@@ -199,11 +199,11 @@ def in_words(bands: Sequence[BandOff]) -> str:
         runs = [*runs[:-1], [*runs[-1], band]] if one else [*runs, [band]]
     runs = sorted(runs, key=lambda run: -max(abs(band.recorded_over_played_db) for band in run))
     shown = 4  # in words
-    said = [_said(run) for run in runs[:shown]]
+    said = [_format_run(run) for run in runs[:shown]]
     return "; ".join(said) + (f"; and {len(runs) - shown} more" if len(runs) > shown else "")
 
 
-def _said(run: Sequence[BandOff]) -> str:
+def _format_run(run: Sequence[BandOff]) -> str:
     """Describe a run as one band, with the largest value."""
     far = max(run, key=lambda band: abs(band.recorded_over_played_db))
     words = str(replace(far, from_hz=run[0].from_hz, to_hz=run[-1].to_hz))

@@ -28,7 +28,7 @@ def of_decays(h: Hypothesis, effect: Effect) -> bool:
     return effect.stage is Stage.MODES and not moves_itself(h, effect)
 
 
-def numbers(effect: Effect) -> int:
+def parameter_count(effect: Effect) -> int:
     """Count the numbers that an effect adds to a model: a law in Rayleigh's place removes α and β."""
     return effect.freedom() - 2 * effect.traits.replaces_rayleigh
 
@@ -45,7 +45,7 @@ def misfit(made: Predictions, effect: Effect, evidence: Evidence) -> float:
         good = _has_decay(one)
         total += float(_cost(made, one)[good].sum())
         count += int(good.sum())
-    return total + numbers(effect) * float(np.log(max(count, 1)))
+    return total + parameter_count(effect) * float(np.log(max(count, 1)))
 
 
 def _has_decay(one: ObjectEvidence) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sonic_bullet.diagnosis.selection.decay_test import numbers
+from sonic_bullet.diagnosis.selection.decay_test import parameter_count
 from sonic_bullet.diagnosis.selection.stepwise import Closed, NothingCompared
 
 NAMED = "named"
@@ -61,5 +61,5 @@ def effect_table(end: Closed | NothingCompared) -> tuple[Row, ...]:
     made = []
     for c in (*end.added, *(c for c in end.tried if c.id not in named)):
         word = NAMED if c.id in named else f"withheld: {why}" if c.id in withheld else c.why_not
-        made.append(Row(c.id, numbers(c.effect), c.mean_db, c.sd_db, c.control_db, len(c.drop_db), word))
+        made.append(Row(c.id, parameter_count(c.effect), c.mean_db, c.sd_db, c.control_db, len(c.drop_db), word))
     return tuple(sorted(made, key=lambda row: (row.word != NAMED, -row.nearer_db)))

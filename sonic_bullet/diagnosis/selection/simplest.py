@@ -19,7 +19,7 @@ from sonic_bullet.diagnosis.prediction.score import Score
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.diagnosis.selection.acceptance import Candidate, evidence_between, needed, refusal
 from sonic_bullet.diagnosis.selection.decay_test import misfit as decays
-from sonic_bullet.diagnosis.selection.decay_test import numbers, of_decays, tells
+from sonic_bullet.diagnosis.selection.decay_test import of_decays, parameter_count, tells
 from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Evidence
@@ -98,7 +98,7 @@ def simplest(able: Sequence[Candidate], bodies: tuple[Struck, ...], known: Evide
             off = {name: value + phases[name] for name, value in off.items()}
     least = min(off.values())
     near = [c for c in rivals if off[c.id] <= least + RULES.strong_evidence]
-    return min(near, key=lambda c: (numbers(c.effect), off[c.id]))
+    return min(near, key=lambda c: (parameter_count(c.effect), off[c.id]))
 
 
 def pruned(

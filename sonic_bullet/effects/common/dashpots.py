@@ -89,7 +89,7 @@ def _kin(found: Coupled) -> Array:
     return np.asarray(linear_sum_assignment(-(np.abs(found.turn.T) ** 2))[1])
 
 
-def apart(omega: Array, most: int) -> list[Array]:
+def split_into_runs(omega: Array, most: int) -> list[Array]:
     """Divide modes into runs of neighbours that nearly do not couple with other runs.
 
     Parameters

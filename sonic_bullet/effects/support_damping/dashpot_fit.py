@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sonic_bullet.effects.common.dashpots import apart, coupled
+from sonic_bullet.effects.common.dashpots import coupled, split_into_runs
 from sonic_bullet.effects.common.pairs import every_line
 from sonic_bullet.effects.common.points import solved, vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
@@ -145,8 +145,8 @@ class DashpotFit:
             np.unique(x.face),
             into,
             out,
-            tuple(apart(x.freq_hz, run)),
-            tuple(apart(x.freq_hz, wide)),
+            tuple(split_into_runs(x.freq_hz, run)),
+            tuple(split_into_runs(x.freq_hz, wide)),
             least_law(h.omega, h.decay_per_s),
         )
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sonic_bullet.estimator.lines.line_values import PINNED, Lines, lines_at
-from sonic_bullet.estimator.lines.pole_selection import apart, selected
+from sonic_bullet.estimator.lines.pole_selection import drop_near_doubles, selected
 from sonic_bullet.estimator.lines.projection import amplitudes_at, basis_gram, normal_equations, products, spreads
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.parallel import one_thread
@@ -103,7 +103,7 @@ def _identified(
                 return _struck(after, signals)
     if few is not None:
         return _struck(few, signals)
-    start = apart(start)
+    start = drop_near_doubles(start)
     many = len(start) > JOINT.most_lines
     loudest = (
         np.argsort(-amplitudes_at(signals, noise, start, sr)[2])[: JOINT.most_lines] if many else np.arange(len(start))
@@ -146,7 +146,7 @@ def _significant(signals: Array, noise: Array, pole: Array, sr: int, low: float,
     colour = _colour(signals, noise, sr)
     for turn in range(3):
         before = len(pole)
-        pole = _polished(signals, noise, apart(pole) if turn else pole, sr, low, high)
+        pole = _polished(signals, noise, drop_near_doubles(pole) if turn else pole, sr, low, high)
         _, _, energy, _ = amplitudes_at(signals, noise, pole, sr)
         pole = pole[energy / colour(pole.imag / (2 * np.pi)) > JOINT.significant]
         if (len(pole) == before and (turn or before < JOINT.most_lines)) or not len(pole):
@@ -160,7 +160,7 @@ def _over_what_is_left(signals: Array, noise: Array, pole: Array, sr: int, low: 
     A line's weight is what the likelihood loses without it, |A|²/var A [Wald 1943], in the noise that all lines leave.
     """
     while len(pole):
-        pole = _polished(signals, noise, apart(pole), sr, low, high)
+        pole = _polished(signals, noise, drop_near_doubles(pole), sr, low, high)
         lines = lines_of(signals, noise, pole, sr, True)
         weight = (np.abs(lines.amplitude / lines.amplitude_sd) ** 2).sum(axis=0)
         weak = int((weight < JOINT.significant).sum())

@@ -12,7 +12,7 @@ from sonic_bullet.estimator.lines.likelihood import moments
 from sonic_bullet.records import Array
 
 
-def apart(pole: Array) -> Array:
+def drop_near_doubles(pole: Array) -> Array:
     """Poles sorted by frequency without near doubles, which no recording of finite length tells apart."""
     pole = pole[np.argsort(pole.imag)]
     keep = np.ones(len(pole), bool)

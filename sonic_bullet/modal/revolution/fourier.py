@@ -14,7 +14,7 @@ from sonic_bullet.modal.revolution import facets, rings, skin
 from sonic_bullet.modal.revolution.rings import Revolved
 from sonic_bullet.modal.revolution.section import Section, sectioned
 from sonic_bullet.modal.revolution.series import Series, series
-from sonic_bullet.modal.sectors import SECTORS, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Sector, SurfaceShapes, Wanted
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.errors import ModalError
 
@@ -111,7 +111,7 @@ class Fourier:
             solved.append((modes.lambda_per_s2[keep], modes.vector[:, keep]))
         return Sector(tuple(solved), stiff, mass, multiplicity, (m, problems)), np.array(lowest)
 
-    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+    def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b), a matrix a sector, on the surface."""
         around = max((sector.place[0] for sector in sectors), default=0)
         cells = int(np.clip(skin.AROUND_WAVE * around, *skin.AROUND_CELLS))
@@ -124,7 +124,7 @@ class Fourier:
             moved += list(skin.displacements(self.section, circles, problems.whole(m, vector), m, cells)[:, grid])
         shape = np.einsum("yx,vxb->vyb", self.body.axes.astype(np.float32), np.concatenate(moved, axis=2))
         vertex = point * self.length_m @ self.body.axes.T + self.body.centre_m
-        return Shown(vertex, face, curvature / self.length_m, np.ascontiguousarray(shape))
+        return SurfaceShapes(vertex, face, curvature / self.length_m, np.ascontiguousarray(shape))
 
     def error(self, sectors: Sequence[Sector], tensor: Array, top: tuple[int, int]) -> float:
         """Estimate the largest relative error of the frequencies up to mode top[1] of sector top[0] by a finer section.

@@ -24,7 +24,7 @@ from sonic_bullet.modal.meshing.named_shapes import soup
 from sonic_bullet.modal.meshing.solid import QUARTERS
 from sonic_bullet.modal.meshing.surfaces import Skin, prepared
 from sonic_bullet.modal.meshing.tetrahedra import EndlessError
-from sonic_bullet.modal.sectors import SECTORS, Sector, Shown, Wanted
+from sonic_bullet.modal.sectors import SECTORS, Sector, SurfaceShapes, Wanted
 from sonic_bullet.modal.sheets import wedges
 from sonic_bullet.modal.sheets.layers import layer_of
 from sonic_bullet.modal.sheets.sheet_sides import Sides, rim, sides_of
@@ -171,7 +171,7 @@ class SheetElements:
         layer = _meshed(self.skin, self.sides, edge_m, scale)
         return replace(self, layer=layer, edge_m=edge_m, scale=scale, coarser=None, known={})
 
-    def shown(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> Shown:
+    def evaluate_on_surface(self, sectors: Sequence[Sector], vectors: Sequence[Array]) -> SurfaceShapes:
         """Evaluate vectors (n, b) on the surface."""
         (vector,) = vectors
         nodes, n, six = sectors[0].place, len(self.layer.outer_m), self.layer.triangle
@@ -189,7 +189,7 @@ class SheetElements:
         nearest, _, _ = geometry.closest_point(
             self.skin.vertex_m, self.skin.face, vertex_m[face].mean(axis=1), geometry.outward_normals(vertex_m, face)
         )
-        return Shown(vertex_m, face, np.asarray(given[nearest]), shape)
+        return SurfaceShapes(vertex_m, face, np.asarray(given[nearest]), shape)
 
     def note(self, sectors: Sequence[Sector]) -> str:
         """Describe how the modes were found."""

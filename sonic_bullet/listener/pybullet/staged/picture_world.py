@@ -1,6 +1,6 @@
 """Pictures by PyBullet's software renderer (TinyRenderer), in a world that holds only what is drawn.
 
-Figure -> visual shape of its triangles, a normal a corner -> a body of mass 0, set to a pose for each picture
+ColouredMesh -> visual shape of its triangles, a normal a corner -> a body of mass 0, set to a pose for each picture
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pybullet
 
 from sonic_bullet.geometry.shape_surfaces import shape_triangles
 from sonic_bullet.geometry.triangles import corner_normals
-from sonic_bullet.listener.pictures import Camera, Figure, Standing
+from sonic_bullet.listener.pictures import Camera, ColouredMesh, Standing
 from sonic_bullet.listener.pybullet import body_facts as facts
 from sonic_bullet.listener.pybullet.clients import direct_client, disconnect, links_with_shapes
 from sonic_bullet.listener.pybullet.collision_shapes import shapes_of
@@ -28,19 +28,19 @@ class PyBulletPictures:
     merged by depth.
     """
 
-    def __init__(self, figures: Sequence[Figure], size: tuple[int, int], shadows: bool, still: Array) -> None:
+    def __init__(self, meshes: Sequence[ColouredMesh], size: tuple[int, int], shadows: bool, still: Array) -> None:
         self._client, self._size, self._shadow = direct_client(), size, int(shadows)
-        self._bodies = [self._made(figure) for figure in figures]
-        self._radius_m = np.array([np.linalg.norm(figure.vertex_m, axis=1).max(initial=0) for figure in figures])
+        self._bodies = [self._made(mesh) for mesh in meshes]
+        self._radius_m = np.array([np.linalg.norm(mesh.vertex_m, axis=1).max(initial=0) for mesh in meshes])
         # a shadow falls on still meshes, too
         self._still = still if not shadows else np.zeros(len(still), bool)
         self._backdrop: tuple[Array, Array] | None = None
 
-    def _made(self, figure: Figure) -> list[int]:
+    def _made(self, mesh: ColouredMesh) -> list[int]:
         """Create a body for every `faces_most` triangles."""
         # most faces of a shape: PyBullet takes 131 072 vertices, and here each face has its own three
         faces_most = 40_000
-        vertex, face = simplified(figure.vertex_m, figure.face)
+        vertex, face = simplified(mesh.vertex_m, mesh.face)
         normals, bodies = corner_normals(vertex, face), []
         for at in range(0, len(face), faces_most):
             corner, normal = vertex[face[at : at + faces_most]], normals[at : at + faces_most]
@@ -49,10 +49,10 @@ class PyBulletPictures:
                 vertices=corner.reshape(-1, 3).tolist(),
                 indices=list(range(3 * len(corner))),
                 normals=normal.reshape(-1, 3).tolist(),
-                rgbaColor=[*figure.colour, 1],
+                rgbaColor=[*mesh.colour, 1],
             )
             if shape < 0:
-                raise SceneError("PyBullet does not draw a figure", "give it a simpler mesh")
+                raise SceneError("PyBullet does not draw a mesh", "give it a simpler mesh")
             bodies.append(int(self._client.createMultiBody(0, -1, shape)))
         return bodies
 
@@ -162,7 +162,7 @@ def standing(client_id: int) -> tuple[Standing, ...]:
         seen = [x[7] for x in ask.getVisualShapeData(body, physicsClientId=client_id) if x[1] == link]
         colour = tuple(seen[0][:3]) if seen else (0.7, 0.7, 0.7)
         name = facts.link_names(client_id, body)[link + 1]
-        found.append(Standing(body, link, name, Figure(vertex, face, colour), np.array(position), np.array(turn)))
+        found.append(Standing(body, link, name, ColouredMesh(vertex, face, colour), np.array(position), np.array(turn)))
     return tuple(found)
 
 
