@@ -14,6 +14,7 @@ import click
 
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, status, table, warn, write_json
 from sonic_bullet.files.cases import read_case
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import FileError
 
@@ -42,19 +43,19 @@ def run_diagnose(
     with clean_stdout(json_to) as say:
         from sonic_bullet.diagnosis.diagnose import diagnose
 
-        with status(source) as progress:
-            found = diagnose(case, seed=seed, progress=progress)
+        with status(source):
+            found = diagnose(case, seed=seed)
             if folder is not None:
                 written = f"{format_count(_predicted(found, folder), 'strike')} predicted in {predict}"
             if propose:
                 from sonic_bullet.diagnosis.separating_strike import separating_strike
 
-                progress("looking for the strike that would tell most")
+                report_progress("looking for the strike that would tell most")
                 strike = separating_strike(found.closed)
             if report is not None:
                 from sonic_bullet.report.diagnosis_page import write_report
 
-                progress("drawing the report")
+                report_progress("drawing the report")
                 write_report(report, found, proposal(strike) if propose else "")
         if output is not None:
             from sonic_bullet.diagnosis.preset_export import preset_of

@@ -11,6 +11,7 @@ from sonic_bullet.cli.line_table import decay_cells, decay_values, finite, write
 from sonic_bullet.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
 from sonic_bullet.estimator.lines.line_values import Features
 from sonic_bullet.files import read_channel
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
@@ -38,8 +39,8 @@ def run_features(
     with clean_stdout(json_to) as say:
         from sonic_bullet.estimator.lines.extraction import extract
 
-        with status(recording) as progress:
-            progress("looking for modes")
+        with status(recording):
+            report_progress("looking for modes")
             try:
                 found = extract(observed, sr, onset_s=onset_s, band_hz=(band[0], band[1]) if band else None)
             except AudioError as error:

@@ -78,8 +78,8 @@ def run_fit(
         from sonic_bullet.estimator.fit.material_fit import fit_case
         from sonic_bullet.presets import write_preset
 
-        with status(source) as progress:
-            found = fit_case(case, progress=progress)
+        with status(source):
+            found = fit_case(case)
         if uff_to is not None:
             from sonic_bullet.estimator.fit.modal_shapes import mobilities, modal_shapes
 

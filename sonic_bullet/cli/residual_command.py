@@ -12,6 +12,7 @@ from sonic_bullet.cli.fit_command import as_case
 from sonic_bullet.cli.line_table import take_tables
 from sonic_bullet.cli.output import clean_stdout, places, print_report, status, warn, write_json
 from sonic_bullet.files import read_channel
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Residual
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
@@ -28,8 +29,8 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
         from sonic_bullet.presets import write_preset
 
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
-        with status(source) as progress:
-            preset, strikes, takes = (_shaped if whole else _unshaped)(source, one, progress)
+        with status(source):
+            preset, strikes, takes = (_shaped if whole else _unshaped)(source, one)
         write_preset(str(to), preset)
         if picture is not None:
             from sonic_bullet.plots.residual_plot import write_residual_picture
@@ -40,7 +41,7 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
     write_json(json_to, report.to_json())
 
 
-def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
+def _shaped(source: str, one: dict[str, Any]) -> tuple[Any, Any, Any]:
     """Return preset, strikes and take distances, with the residual, of a case or a recording of a known shape."""
     import msgspec
 
@@ -56,15 +57,15 @@ def _shaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, 
         raise FileError(
             f"case {case.name} has no 'fit' recording", "a residual is what a recording has beside its object's modes"
         )
-    found = fit_case(case, progress=progress)
+    found = fit_case(case)
     warn(found.warnings)
-    progress("taking what is left")
+    report_progress("taking what is left")
     strikes = case_strikes(found)
-    takes = predicted_takes(found, residual=strikes.residual, progress=progress)
+    takes = predicted_takes(found, residual=strikes.residual)
     return msgspec.structs.replace(preset_of(found), residual=form_of(strikes.residual)), strikes, takes
 
 
-def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any, Any]:
+def _unshaped(source: str, one: dict[str, Any]) -> tuple[Any, Any, Any]:
     """Return preset and strikes of a recording without a shape: a named material, with features in place of modes."""
     unshaped = ("strike", "direction", "impulse", "scale", "sensor", "sensor_at", "sensor_direction", "fixed", "medium")
     import msgspec
@@ -87,7 +88,7 @@ def _unshaped(source: str, one: dict[str, Any], progress: Any) -> tuple[Any, Any
         )
     observed, sr, which = read_channel(source, one["channel"])
     warn(f"{source}: {words}" for words in [which] if words)
-    progress("looking for modes")
+    report_progress("looking for modes")
     try:
         strikes = recording_strikes(observed, sr, one["onset_s"], Path(source).name)
     except AudioError as error:

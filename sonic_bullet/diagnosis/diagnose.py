@@ -42,7 +42,7 @@ from sonic_bullet.estimator.fit.material_fit import choose_lines
 from sonic_bullet.estimator.fit.recorded import check_meshes, gather, onset_sample, recorded_signals
 from sonic_bullet.files import read_audio, read_channel
 from sonic_bullet.files.cases import SPLITS, Case, CaseRecording, read_case
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import report_progress, show_progress
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.storage.cache import Place
@@ -98,7 +98,6 @@ class Diagnosis:
         return self.closed.verdict
 
 
-@says_so(text="progress")
 @one_thread()
 def diagnose(
     case: Case | str | os.PathLike[str],
@@ -130,12 +129,16 @@ def diagnose(
     """
     if not isinstance(case, Case):
         case = read_case(case)
-    say = progress or (lambda _: None)
+    with show_progress(progress):
+        return _diagnosed(case, effects, seed, cache)
+
+
+def _diagnosed(case: Case, effects: Sequence[type[Effect]], seed: int, cache: Place) -> Diagnosis:
     check_meshes(case, (r.object for r in case.recordings))
-    recorded = choose_lines(case, gather(case, cache=cache, progress=progress, clipped=True))
+    recorded = choose_lines(case, gather(case, cache=cache, clipped=True))
     known = tuple(e for e in effects if case.medium == "unknown" or not e.traits.needs_unknown_medium)
     for by_lines in (False, True):
-        start = baseline(case, recorded, by_lines=by_lines, cache=cache, progress=progress)
+        start = baseline(case, recorded, by_lines=by_lines, cache=cache)
         found, bodies, takes = start.found, start.bodies, start.takes
         every = {"fit": takes} | {split: _others(case, bodies, takes, split) for split in SPLITS[1:]}
         end = select_effects(
@@ -145,12 +148,11 @@ def diagnose(
             known,
             case.band_hz,
             seed=seed,
-            progress=progress,
             against_silence=[t for t in every["holdout"] if t.body.recorded is not None],
         )
         if end.added or not start.doubtful:
             break  # else no effect makes the shape's modes meet the lines: these may be another body's
-    say("comparing with what was not fitted")
+    report_progress("comparing with what was not fitted")
     errors: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     sone: dict[str, Any] = {"before": {}, "after": {}, "floor": None}
     out: dict[str, tuple[LeftOut, ...]] = {"fit": end.left_out} if end.left_out else {}

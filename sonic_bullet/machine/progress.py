@@ -18,11 +18,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 Say = Callable[[str], None]
 Params = ParamSpec("Params")
@@ -34,6 +34,7 @@ LONGEST = 300  # characters of a line
 
 _shown: list[Say] = []
 _listener: ContextVar[Say | None] = ContextVar("listener", default=None)
+_fraction_listener: ContextVar[Callable[[float], None] | None] = ContextVar("fraction_listener", default=None)
 
 
 @dataclass(slots=True)
@@ -110,14 +111,20 @@ def shown_by(say: Say) -> Iterator[Say]:
 
 @contextmanager
 def status(label: str) -> Iterator[Say]:
-    """Show the present activity: a spinner on a terminal's stderr, elsewhere lines of it (the module's head).
+    """Show what `report_progress` tells within the context: a spinner on a terminal's stderr, elsewhere lines of it.
 
     Yields a function that takes its text. An activity that starts within another writes into that one.
     """
+    with _display(label) as say, progress_to(say):
+        yield say
+
+
+@contextmanager
+def _display(label: str) -> Iterator[Say]:
     if _shown:
         yield _shown[-1]
     elif not is_shown():
-        yield lambda text: None
+        yield ignore_progress
     elif on_terminal():
         from rich.console import Console
         from rich.markup import escape
@@ -136,33 +143,67 @@ def status(label: str) -> Iterator[Say]:
                 clear_stage()
 
 
+def ignore_progress(_: object) -> None:
+    """Ignore a text, or a fraction done."""
+
+
+def without_progress() -> AbstractContextManager[None]:
+    """Let nobody hear the progress within the context."""
+    return progress_to(ignore_progress, ignore_progress)
+
+
 def report_progress(text: str) -> None:
     """Tell whoever listens (`progress_to`) what is being done; without one, nothing."""
     progress_listener()(text)
 
 
+def report_fraction(done: float) -> None:
+    """Tell whoever listens (`progress_to`) which fraction is done, 0 to 1; without one, nothing."""
+    (_fraction_listener.get() or ignore_progress)(done)
+
+
 def progress_listener() -> Say:
     """Return whoever listens, to be handed to code that takes a function of its own; without one, a deaf one."""
-    return _listener.get() or (lambda text: None)
+    return _listener.get() or ignore_progress
 
 
 @contextmanager
-def progress_to(say: Say | None) -> Iterator[None]:
-    """Let `report_progress` call ``say`` within the context; None: whoever listens already."""
-    if say is None:
-        yield
-        return
-    before = _listener.set(say)
+def progress_to(text: Say | None = None, fraction: Callable[[float], None] | None = None) -> Iterator[None]:
+    """Let `report_progress` call ``text``, `report_fraction` ``fraction`` within the context.
+
+    None: whoever listens already.
+    """
+    before = _listener.set(text or _listener.get())
+    before_fraction = _fraction_listener.set(fraction or _fraction_listener.get())
     try:
         yield
     finally:
         _listener.reset(before)
+        _fraction_listener.reset(before_fraction)
+
+
+@contextmanager
+def show_progress(
+    text: Say | None = None, fraction: Callable[[float], None] | None = None, *, in_percent: bool = False
+) -> Iterator[None]:
+    """Let a caller's functions hear the progress within the context, and nobody else.
+
+    Where the caller gives neither, whoever listens already; where nobody does, `status` shows it.
+
+    in_percent: whether `status` shows the fraction done, too.
+    """
+    if text is not None or fraction is not None:
+        with progress_to(text or ignore_progress, fraction or ignore_progress):
+            yield
+    elif _listener.get() is not None or _fraction_listener.get() is not None:
+        yield
+    else:
+        with status("sonic_bullet"), progress_to(fraction=percent(report_progress) if in_percent else None):
+            yield
 
 
 def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[Params, Made]], Callable[Params, Made]]:
     """Decorate a function: where its caller gives neither argument of these names, `status` shows them.
-
-    What it calls reaches the former by `report_progress`.
 
     text: name of the argument called with what is being done; fraction: of that called with the fraction done.
     """
@@ -171,11 +212,11 @@ def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[Params,
         @wraps(function)
         def called(*args: Params.args, **options: Params.kwargs) -> Made:
             names = [name for name in (text, fraction) if name]
-            if any(options.get(name) is not None for name in names):
-                with progress_to(options.get(text)):  # type: ignore[arg-type]
-                    return function(*args, **options)
-            with status("sonic_bullet") as say, progress_to(say):
-                options.update({name: say if name == text else percent(say) for name in names})
+            given: list[Any] = [options.get(text), options.get(fraction)]
+            with show_progress(*given, in_percent=bool(fraction)):
+                if given == [None, None]:
+                    shares = _fraction_listener.get() or ignore_progress
+                    options.update({name: progress_listener() if name == text else shares for name in names})
                 return function(*args, **options)
 
         return called

@@ -9,7 +9,6 @@ chains and it is not clearly farther;
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +36,7 @@ from sonic_bullet.estimator.fit.material_fit import fit_evidence
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, lines_of, noise_rms
 from sonic_bullet.files.cases import Case
+from sonic_bullet.machine.progress import report_progress, without_progress
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.storage.cache import Place
@@ -76,7 +76,6 @@ def baseline(
     *,
     by_lines: bool = False,
     cache: Place = "default",
-    progress: Callable[[str], None] | None = None,
 ) -> Baseline:
     """Fit the linear model to recorded evidence. Raises SonicBulletError.
 
@@ -90,13 +89,11 @@ def baseline(
         Play bodies whose lines meet their modes no more than by chance by these lines, as `fit` does.
     cache : Place
         Where solved modes are kept.
-    progress : callable
-        Called with what is being done.
     """
     # chains, of all modes' lines: no linear body has so many, so one line each it is unless that is clearly worse
     often, mostly = 0.4, 1.05
     nearer = 0.9  # of the distance, where chains are one line each
-    plain = _of(case, recorded, cache, progress, by_lines)
+    plain = _of(case, recorded, cache, by_lines)
     directions = [tuple(_unchained(one, link) for one in recorded) for link in LINKS] if plain.takes else []
     directions += (
         [tuple(direction(one, case.band_hz) for one in recorded) for direction in (_soft, _unclipped)]
@@ -106,11 +103,11 @@ def baseline(
     directions = [faint for faint in directions if any(a is not b for a, b in zip(faint, recorded, strict=True))]
     if not directions:
         return plain
-    if progress is not None:
-        progress(
-            "modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without"
-        )
-    best = min((_of(case, faint, cache, None, by_lines) for faint in directions), key=_off_db)
+    report_progress(
+        "modes that depend on their level, or a limit, leave lines that are no modes: fitting what is left without"
+    )
+    with without_progress():
+        best = min((_of(case, faint, cache, by_lines) for faint in directions), key=_off_db)
     changed = [one for one, faint in zip(recorded, directions[0], strict=True) if faint is not one]
     most = mostly if all(share(one.lines, LINKS[0]) > often for one in changed) else nearer
     return best if _off_db(best) < most * _off_db(plain) else plain
@@ -178,21 +175,15 @@ def _off_db(b: Baseline) -> float:
     return mean_db(found.takes, made) if isinstance(found, Compared) else np.inf
 
 
-def _of(
-    case: Case,
-    recorded: tuple[Recorded, ...],
-    cache: Place,
-    progress: Callable[[str], None] | None,
-    by_lines: bool,
-) -> Baseline:
+def _of(case: Case, recorded: tuple[Recorded, ...], cache: Place, by_lines: bool) -> Baseline:
     """Build the baseline of some evidence."""
-    found = fit_evidence(case, recorded, progress=progress)
+    found = fit_evidence(case, recorded)
     lines = {g.thing.name: shapeless(found, g) for g in recorded if not _shaped(found, g, by_lines)}
-    shaped = struck_bodies(found, cache=cache, progress=progress) if len(lines) < len(recorded) else ()
+    shaped = struck_bodies(found, cache=cache) if len(lines) < len(recorded) else ()
     bodies = (*(body for body in shaped if body.name not in lines), *lines.values())
     gain = found.fit.sigma if np.isfinite(found.fit.sigma) and found.fit.sigma > 0 else 1.0
     bodies = tuple(with_levels(separated(body), gain) for body in bodies)
-    bodies = with_elastic(found, bodies, cache=cache, progress=progress)
+    bodies = with_elastic(found, bodies, cache=cache)
     base = Hypothesis(found.fit.alpha_per_s, found.fit.beta_s, gain, (), {b.name: b.correction for b in bodies})
     base = replace(base, air=1.0 if found.radiation == "apart" else 0.0)
     bodies = settled(refitted(base, bodies), bodies)

@@ -9,7 +9,6 @@ problem, and no score.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
@@ -24,10 +23,6 @@ from sonic_bullet.diagnosis.prediction.score import (
 )
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Effect
-
-
-def silent(_: str) -> None:
-    """Ignore progress."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +41,6 @@ class DiagnosisProblem:
         The candidates.
     seed : int
         Of all that is drawn.
-    say : callable
-        Takes progress.
 
     Raises
     ------
@@ -60,7 +53,6 @@ class DiagnosisProblem:
     band_hz: tuple[float, float]
     effects: tuple[type[Effect], ...] = ()
     seed: int = 0
-    say: Callable[[str], None] = silent
 
     def __post_init__(self) -> None:
         """Check that there is something to compare with, and a band."""

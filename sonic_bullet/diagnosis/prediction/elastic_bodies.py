@@ -30,7 +30,6 @@ def with_elastic(
     bodies: tuple[Struck, ...],
     *,
     cache: Place = "default",
-    progress: Callable[[str], None] | None = None,
 ) -> tuple[Struck, ...]:
     """Make the bodies with a mesh able to take any elasticity.
 
@@ -42,8 +41,6 @@ def with_elastic(
         The objects.
     cache : Place
         Where families are kept.
-    progress : callable
-        Called with what is being done.
     """
     more = 1.6  # modes than the isotropic body has in the band: other tensors are softer somewhere
     made = []
@@ -67,7 +64,6 @@ def with_elastic(
                     material,
                     count,
                     cache=cache,
-                    say=progress or (lambda _: None),
                 ),
             )
         )
@@ -83,7 +79,6 @@ def elastic_of(
     count: int,
     *,
     cache: Place = "default",
-    say: Callable[[str], None],
 ) -> Elastic:
     """Make an object able to take any elasticity; raises SonicBulletError at its first use.
 
@@ -103,8 +98,6 @@ def elastic_of(
         Modes wanted.
     cache : Place
         Where families are kept.
-    say : callable
-        Takes progress.
     """
     kept = 12  # solved tensors
     thing = case.objects[name]
@@ -119,7 +112,6 @@ def elastic_of(
             count=int(np.clip(count, *modes)),
             fixed=thing.fixed,
             cache=cache,
-            progress=say,
         )
 
     @lru_cache(maxsize=1)

@@ -117,12 +117,9 @@ class Struck:
         return len((model or self.model).vertex_m) - self.strikes - 1
 
 
-def struck_bodies(
-    found: CaseFit, *, cache: Place = "default", progress: Callable[[str], None] | None = None
-) -> tuple[Struck, ...]:
+def struck_bodies(found: CaseFit, *, cache: Place = "default") -> tuple[Struck, ...]:
     """Build every object of the case, fitted ones first. Raises SonicBulletError."""
     case = found.case
-    say = progress or (lambda _: None)
     by_name = {o.evidence.thing.name: o for o in found.objects}
     made = [_fitted(found, o) for o in found.objects]
     for name in dict.fromkeys(r.object for r in case.recordings):
@@ -132,7 +129,7 @@ def struck_bodies(
         guess = guess_of(thing)
         if thing.mesh is None or not found.objects:
             continue
-        family = body_family(case, thing, guess, cache, say)
+        family = body_family(case, thing, guess, cache)
         made.append(_placed(found, name, family, guess.density_kg_m3, None))
     return tuple(made)
 

@@ -34,6 +34,7 @@ from sonic_bullet.diagnosis.selection.control_effect import ControlEffect
 from sonic_bullet.diagnosis.selection.decay_test import likelier, tells
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Cost, Dereverberates, Effect, Evidence, RotatesPairs, Stage
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.parallel import parallel_map
 
 
@@ -82,12 +83,12 @@ def cross_validated(
         ):
             continue  # something cheap says most of it: what is left may ask for more in the next round
         if group[0].traits.cost is Cost.COSTLY:
-            problem.say(f"searching for {group[0].id}")
+            report_progress(f"searching for {group[0].id}")
         proposed = _proposed(group, evidence)
         for kind in group:
             if (whole := proposed[kind]) is None:
                 continue
-            problem.say(f"trying {kind.id}")
+            report_progress(f"trying {kind.id}")
             alone = replace(h, effects=(whole,))
             by_line = kind.traits.by_line
             plain = whole_lines() if by_line else folds

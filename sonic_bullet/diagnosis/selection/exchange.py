@@ -28,6 +28,7 @@ from sonic_bullet.diagnosis.selection.decay_test import misfit, of_decays
 from sonic_bullet.diagnosis.selection.phase_test import misfit as phases
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates, Evidence
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 
@@ -137,7 +138,7 @@ def exchanged(
         far: Array | None = None
         for rival in (c for c in passed[i] if c.id not in names):
             own = added[i]
-            problem.say(f"trying {rival.id} in place of {own.id}")
+            report_progress(f"trying {rival.id} in place of {own.id}")
             effects = tuple(rival.effect if e.id == own.id else e for e in best.effects)
             place = next(k for k, e in enumerate(effects) if e.id == rival.id)
             other = again(refitted(with_effects(best, effects, problem.bodies), problem.bodies), place, problem)

@@ -32,6 +32,7 @@ from sonic_bullet.diagnosis.selection.phase_test import misfit
 from sonic_bullet.diagnosis.selection.simplest import helps
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates, Effect
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.parallel import parallel_map
 
 
@@ -67,7 +68,7 @@ def pairwise(
     if len(first) < 2 or not problem.has_audio:
         return None
     kinds = [type(c.effect) for c in first if not moves(c.hypothesis)]
-    problem.say("trying two at once")
+    report_progress("trying two at once")
 
     pairs = _propose_pairs([c.hypothesis for c in first], kinds, problem)
     now = problem.score(start)
@@ -95,7 +96,7 @@ def in_a_room(
     movers = [c for c in found if moves_itself(h, c.effect)]
     if len(rooms) != 1 or len(h.effects) != 1 or not movers or not problem.has_audio:
         return None
-    problem.say("hearing the room anew beside what moves modes")
+    report_progress("hearing the room anew beside what moves modes")
 
     floor, left = problem.score(h).floor_db, problem.distance_db(reidentified(h, problem.bodies, fully=True))
     for some in (

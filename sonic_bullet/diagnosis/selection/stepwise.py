@@ -9,7 +9,7 @@ gap = before − floor on left-out strikes; acceptance.py decides which effect i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -18,7 +18,7 @@ import numpy as np
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.evidence.mesh_limits import of_the_mesh, with_unmatched_modes_moved
 from sonic_bullet.diagnosis.evidence.refit import refitted, reidentified
-from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem, silent
+from sonic_bullet.diagnosis.prediction.diagnosis_problem import DiagnosisProblem
 from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, mixes_neighbours, moves_itself
 from sonic_bullet.diagnosis.prediction.prediction import Predictions, predict_each
 from sonic_bullet.diagnosis.prediction.score import (
@@ -42,6 +42,7 @@ from sonic_bullet.diagnosis.selection.pairwise import in_a_room, pairwise
 from sonic_bullet.diagnosis.selection.simplest import examined, pruned, simplest
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, Stage
+from sonic_bullet.machine.progress import report_progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,7 +115,6 @@ def select_effects(
     band_hz: tuple[float, float],
     *,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
     against_silence: Sequence[AudioObservation] = (),
 ) -> Closed | NothingCompared:
     """Select effects on fitted strikes alone, those that can be compared.
@@ -127,8 +127,6 @@ def select_effects(
         Fitted strikes and candidates.
     band_hz, seed : (2,), int
         Of the recordings; of control effects and folds.
-    progress : callable
-        Called with what is being done.
     against_silence : sequence of Take
         Takes by which the baseline is compared with silence; the fitted ones where there are none.
     """
@@ -138,7 +136,7 @@ def select_effects(
     if isinstance(found, Incomparable):
         return NothingCompared(start, found.left_out)
     own = [take for take in found.takes if isinstance(take, AudioObservation)]
-    problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed, progress or silent)
+    problem = DiagnosisProblem(bodies, found.takes, band_hz, tuple(effects), seed)
     end = _closed(start, made, problem, found.left_out)
     return _worse_than_silence(start, end.after, against_silence or own, found.left_out) or end
 
@@ -229,7 +227,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
     last: dict[str, Candidate] = {}
     weak = False
     for turn in range(len(problem.effects)):
-        problem.say(
+        report_progress(
             f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB"
         )
         if now.gap_db < RULES.least_drop_db:

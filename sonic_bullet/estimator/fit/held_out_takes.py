@@ -13,7 +13,6 @@ noise's power added, silence with that alone. A prediction farther than silence 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -27,6 +26,7 @@ from sonic_bullet.estimator.fit.takes.best_gain import BestGain, distance_at, fi
 from sonic_bullet.estimator.fit.takes.plausible_preset import plausible_sound
 from sonic_bullet.estimator.fit.typical_strike import strike_lines
 from sonic_bullet.files.cases import CaseRecording
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import SonicBulletError
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from sonic_bullet.estimator.fit.case_fit import CaseFit
 
 
-def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = None) -> CaseFit:
+def judged_by_takes(found: CaseFit) -> CaseFit:
     """Return the fit with its distances from the takes held out, and with the verdict of one worse than silence.
 
     Where none is held out they are those of its own takes. Raises SonicBulletError.
     """
     worse_than_silence = "worse-than-silence"
-    takes = predicted_takes(found, progress=progress)
+    takes = predicted_takes(found)
     judged = replace(found, takes=takes)
     if not judged.worse_than_silence:
         return judged
@@ -56,19 +56,15 @@ def judged_by_takes(found: CaseFit, progress: Callable[[str], None] | None = Non
 
 
 @one_thread()
-def predicted_takes(
-    found: CaseFit, *, residual: Residual | None = None, progress: Callable[[str], None] | None = None
-) -> tuple[TakeDistance, ...]:
+def predicted_takes(found: CaseFit, *, residual: Residual | None = None) -> tuple[TakeDistance, ...]:
     """Distances of the takes held out, or of the fit's own where none is; with a residual, where given.
 
     Raises SonicBulletError where a file cannot be read.
     """
-    return next((rows for split in ("holdout", "fit") if (rows := _of_split(found, split, residual, progress))), ())
+    return next((rows for split in ("holdout", "fit") if (rows := _of_split(found, split, residual))), ())
 
 
-def _of_split(
-    found: CaseFit, split: str, residual: Residual | None, progress: Callable[[str], None] | None
-) -> tuple[TakeDistance, ...]:
+def _of_split(found: CaseFit, split: str, residual: Residual | None) -> tuple[TakeDistance, ...]:
     """Distances of all takes of a split that have audio, of objects that were fitted."""
     rows: list[TakeDistance] = []
     for e in found.evidence:
@@ -79,8 +75,7 @@ def _of_split(
         )
         if not mine or e.signals is None:
             continue
-        if progress is not None:
-            progress(f"predicting takes of {e.thing.name}")
+        report_progress(f"predicting takes of {e.thing.name}")
         signals, sr = recorded_signals(found.case, e.thing, mine)
         takes = [power_spectra(take) for take in e.signals] if sr == e.sr else []
         for recording, signal in zip(mine, signals, strict=True):

@@ -40,7 +40,7 @@ from sonic_bullet.estimator.fit.recorded import RecordedObject, gather
 from sonic_bullet.estimator.lines.after_attack import ringing_lines
 from sonic_bullet.estimator.lines.joint_lines import JOINT, Lines, noise_rms
 from sonic_bullet.files.cases import Case
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import report_progress, show_progress
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError, FileError
@@ -58,7 +58,6 @@ __all__ = [
 ]
 
 
-@says_so(text="progress")
 @one_thread()
 def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], None] | None = None) -> CaseFit:
     """Fit the material of a case, from its 'fit' strikes alone.
@@ -66,8 +65,9 @@ def fit_case(case: Case, *, cache: Place = "default", progress: Callable[[str], 
     Raises SonicBulletError where a file, mesh or number makes a fit impossible; what the recordings do not say stands
     in the verdict instead.
     """
-    evidence = choose_lines(case, gather(case, cache=cache, progress=progress))
-    return judged_by_takes(fit_evidence(case, evidence, cache=cache, progress=progress), progress)
+    with show_progress(progress):
+        evidence = choose_lines(case, gather(case, cache=cache))
+        return judged_by_takes(fit_evidence(case, evidence, cache=cache))
 
 
 @one_thread()
@@ -109,7 +109,6 @@ def fit_evidence(
     evidence: tuple[RecordedObject, ...],
     *,
     cache: Place = "default",
-    progress: Callable[[str], None] | None = None,
 ) -> CaseFit:
     """`fit_case` on evidence already gathered. Raises SonicBulletError."""
     if len({e.guess.name for e in evidence}) > 1:
@@ -130,8 +129,8 @@ def fit_evidence(
         log_gamma, poisson = float(np.log(guess.youngs_pa / guess.density_kg_m3)), guess.poisson
     radiation = radiation_in(case, evidence)
     apart = radiation == "apart"
-    if apart and progress is not None:
-        progress("how its modes radiate")
+    if apart:
+        report_progress("how its modes radiate")
     air = tuple(in_air(e, log_gamma, poisson, case.band_hz[1], apart) for e in shaped)
     lam, decay, decay_sd, extra = _decays(evidence, pairs, air if apart else (None,) * len(air))
     start = (guess.alpha_per_s or 1.0, guess.beta_s or 1.0 / (float(np.median(lam)) if len(lam) else 1e8))

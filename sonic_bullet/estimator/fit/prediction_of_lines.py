@@ -60,7 +60,7 @@ def strike_modes(
     thing = found.case.objects[recording.object]
     same = next((o for o in found.objects if o.evidence.thing.name == recording.object), None)
     guess = guess_of(thing)
-    body = same.evidence.family if same else body_family(found.case, thing, guess, "default", lambda _: None)
+    body = same.evidence.family if same else body_family(found.case, thing, guess, "default")
     if body is None:
         raise FileError(f"object '{thing.name}' has no mesh", "a prediction needs its shape")
     seen = observed(found.case, thing, guess, (recording,), body)

@@ -7,7 +7,7 @@ mesh + guess -> Family (modal.reduced) -> Observation
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,6 +23,7 @@ from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
 from sonic_bullet.files import read_channel
 from sonic_bullet.files.cases import Case, CaseObject, CaseRecording, Line
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.reduced import family
@@ -113,14 +114,12 @@ def gather(
     split: str = "fit",
     cache: Place = "default",
     clipped: bool = False,
-    progress: Callable[[str], None] | None = None,
 ) -> tuple[RecordedObject, ...]:
     """Return RecordedObjects of all objects that have strikes of ``split`` with audio or features.
 
     clipped: let through what stands at its peak, and what holds several hits. Raises SonicBulletError where there is
     none.
     """
-    say = progress or (lambda _: None)
     found: list[RecordedObject] = []
     names = tuple(dict.fromkeys(r.object for r in case.recordings if r.split == split))
     check_meshes(case, names)
@@ -135,13 +134,13 @@ def gather(
             raise FileError(f"cannot read {gone[0]}: no such file", "a fit needs the audio of its 'fit' strikes")
         sounds = None
         if played:  # before the modes, which take longer: a recording that will not do is reported at once
-            say(f"reading {format_count(len(played), 'recording')} of {name or 'the object'}")
+            report_progress(f"reading {format_count(len(played), 'recording')} of {name or 'the object'}")
             sounds = _sounds(case, thing, played, clipped)
-        body = body_family(case, thing, guess, cache, say) if thing.mesh is not None else None
+        body = body_family(case, thing, guess, cache) if thing.mesh is not None else None
         if sounds is not None:
             signals, sr, remarks, before = sounds
             seen = observed(case, thing, guess, played, body) if body is not None else None
-            say(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
+            report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             still = without_hum(signals, noise_rms(signals, sr), sr)
             lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)
@@ -172,7 +171,7 @@ def _modes_observed(body: Family, guess: Material, band_hz: tuple[float, float])
     return int((np.sqrt(value) / (2 * np.pi) < band_hz[1]).sum())
 
 
-def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, say: Callable[[str], None]) -> Family:
+def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place) -> Family:
     """Return the family of a case's object. Raises FileError, MeshError."""
     margin = 1.36  # √(1.3/0.7): how far the guess may put a mode too high
     mesh_m = (2e-4, 5.0)  # bodies smaller or larger than this are in another unit
@@ -197,7 +196,6 @@ def body_family(case: Case, thing: CaseObject, guess: Material, cache: Place, sa
         to_hz=high * margin,
         fixed=thing.fixed,
         cache=cache,
-        progress=say,
     )
 
 
