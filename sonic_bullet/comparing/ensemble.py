@@ -28,6 +28,7 @@ from sonic_bullet.records import Array
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.session.scene_file import defines_build
 from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ, octave_power
+from sonic_bullet.signal.short_time import power_spectrum
 
 RUNS = 99
 """Fewest runs in which a rank can be at the 1 % level."""
@@ -189,7 +190,7 @@ def _band_spectra(x: Array, sr: int) -> Array:
     slices = 12
     n = x.shape[1] // slices
     frames = x[:, : n * slices].reshape(len(x), slices, n)
-    power = (np.abs(np.fft.rfft(frames, axis=2)) ** 2).sum(axis=0) / max(n, 1) ** 2
+    power = power_spectrum(frames).sum(axis=0) / max(n, 1) ** 2
     freq = np.fft.rfftfreq(n, 1 / sr)
     bands = octave_power(power, freq, [f for f in AUDIBLE_OCTAVES_HZ if f < sr / 2**1.5])
     table = np.array(bands).T

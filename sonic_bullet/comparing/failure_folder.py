@@ -13,6 +13,7 @@ from sonic_bullet.comparing.comparison_record import Comparison
 from sonic_bullet.comparing.outcome.sound_effects import at_common_rate
 from sonic_bullet.files import replacing, write_audio
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import power_spectrum
 from sonic_bullet.storage.json_text import json_bytes
 
 
@@ -37,7 +38,7 @@ def _picture(place: Path, one: Array, other: Array, sr: int) -> None:
     figure = Figure(figsize=(8, 4))
     axis = figure.subplots()
     for x, name in ((one, "expected"), (other, "actual")):
-        power = 10 * np.log10((np.abs(np.fft.rfft(x, axis=1)) ** 2).mean(axis=0) + 1e-30)
+        power = 10 * np.log10(power_spectrum(x).mean(axis=0) + 1e-30)
         axis.semilogx(np.fft.rfftfreq(x.shape[1], 1 / sr)[1:], power[1:], lw=0.7, label=name)
     axis.set(xlabel="frequency in Hz", ylabel="level in dB", xlim=(20, sr / 2))
     axis.legend(frameon=False)

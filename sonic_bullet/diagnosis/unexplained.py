@@ -22,6 +22,7 @@ from sonic_bullet.effects.common.points import places_alike
 from sonic_bullet.effects.protocol import ActsAtPlaces
 from sonic_bullet.effects.room.shifted_echo import copied
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import short_time_power, window_energy
 
 SHOWN = 4
 NOTHING = "nothing could be compared"
@@ -159,19 +160,17 @@ def _shares(takes: Sequence[AudioObservation], made: Predictions) -> tuple[Array
     lowest = min([lowest, *(float(g.lines.freq_hz.min(initial=np.inf)) for t in takes if (g := t.body.recorded))])
     edges = edges[(edges < 0.5 * sr) & (edges * 2 ** (1 / 3) > min(lowest, 0.25 * sr))]  # below rings no mode, no line
     rows, level = [], []
-    shape = np.hanning(window)
     for take in takes:
         if take.sr != sr or len(take.sample) < 6 * window:
             continue
         bins = np.searchsorted(edges, np.fft.rfftfreq(window, 1 / sr)) - 1
         table = []
         for x in (take.sample - take.played(made[take.body]), take.sample):
-            frames = np.lib.stride_tricks.sliding_window_view(x, window)[:: window // 2]
-            power = np.abs(np.fft.rfft(frames * shape, axis=1)) ** 2
+            power = short_time_power(x, window, window // 2)
             thirds = [part.sum(axis=0) for part in np.array_split(power, 3)]
             table.append([[row[bins == i].sum() for i in range(len(edges) - 1)] for row in thirds])
         left, own = np.array(table)
-        noise = take.floor.at(window // 2 + 1) * (shape**2).sum() * (len(frames) / 3)
+        noise = take.floor.at(window // 2 + 1) * window_energy(window) * (len(power) / 3)
         floor = np.array([noise[bins == i].sum() for i in range(len(edges) - 1)])
         clear = own > 4 * floor
         rows.append(np.where(clear, np.maximum(left - floor, 0) / np.maximum(own, 1e-300), 0.0))

@@ -20,6 +20,7 @@ from sonic_bullet.effects.common.fitting import bracket
 from sonic_bullet.effects.common.pulses import magnitude
 from sonic_bullet.effects.protocol import Effect, Evidence, Impact, Number, ObjectEvidence, Owner, Stage
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
 
 HERTZ = -0.2
 
@@ -162,14 +163,14 @@ def _from(gain: float, expected: Array, observed: Array, sd: Array, rough: Array
     for _ in range(ROLL_OFF.turns):
         width = sd**2 + (gain * rough) ** 2
         model = expected * (1 + ROLL_OFF.common * own[mode])
-        weight = 1 / (1 + (observed - gain * model) ** 2 / width / 9) / width
+        weight = cauchy_weight((observed - gain * model) ** 2 / width / 9) / width
         gain = max(float((weight * model * observed).sum() / max(float((weight * model**2).sum()), 1e-300)), 1e-12)
         slope = ROLL_OFF.common * gain * expected
         stiff = np.bincount(mode, weight * slope**2, len(own))
         own = np.bincount(mode, weight * slope * (observed - gain * expected), len(own)) / (1 + stiff)
     width = sd**2 + (gain * rough) ** 2
     off = observed - gain * expected * (1 + ROLL_OFF.common * own[mode])
-    return float((np.log(width) + 9 * np.log1p(off**2 / width / 9)).sum() + (own**2 + np.log1p(stiff)).sum())
+    return float((np.log(width) + cauchy_loss(off**2 / width / 9, 9)).sum() + (own**2 + np.log1p(stiff)).sum())
 
 
 def _late(h: ObjectEvidence, effect: ContactTime) -> float:
@@ -185,7 +186,7 @@ def _late(h: ObjectEvidence, effect: ContactTime) -> float:
     turn, off, width = np.broadcast_to(turn, off.shape)[good], off[good], width[good]
 
     def at(delay_s: float) -> float:
-        return float(9 * np.log1p((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9).sum())
+        return float(cauchy_loss((2 * np.sin((off + turn * delay_s) / 2) / width) ** 2 / 9, 9).sum())
 
     onset_delays_s, onset_finer_s = np.arange(-4e-5, 4.01e-5, 2e-6), np.linspace(-2e-6, 2e-6, 9)  # of the files' onset
     middle = min(onset_delays_s, key=at)

@@ -20,6 +20,7 @@ from sonic_bullet.effects.common.fitting import bracket
 from sonic_bullet.effects.common.hum import hum_of
 from sonic_bullet.effects.protocol import Effect, Evidence, Number, Numbers, ObjectEvidence, Owner, Sound, Stage
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
 
 
 class _Chain(NamedTuple):
@@ -196,5 +197,5 @@ def _misfit(y: Array, sd: Array) -> float:
     trust = np.ones(len(y))
     for _ in range(8):
         middle = float((trust * weight * y).sum() / (trust * weight).sum())
-        trust = 1 / (1 + ((y - middle) / sd / 2.5) ** 2)
-    return float(6.25 * np.log1p(((y - middle) / sd / 2.5) ** 2).sum())
+        trust = cauchy_weight(((y - middle) / sd / 2.5) ** 2)
+    return float(cauchy_loss(((y - middle) / sd / 2.5) ** 2, 6.25).sum())

@@ -17,7 +17,6 @@ from typing import Annotated, ClassVar, NamedTuple, Self
 import numpy as np
 from scipy.sparse import csr_array
 
-from sonic_bullet.effects.common.points import solved
 from sonic_bullet.effects.protocol import (
     Effect,
     Evidence,
@@ -29,6 +28,7 @@ from sonic_bullet.effects.protocol import (
     ascending,
 )
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.signal.robust import fit_nonnegative
 
 
 class _RadiationNumbers(NamedTuple):
@@ -97,7 +97,7 @@ class Radiation(Effect):
         sd = np.hypot(observed.decay_sd_per_s, RADIATION.scatter * decay) + 1e-3
         across = float(np.linalg.norm(np.ptp(observed.model.vertex_m[np.unique(observed.model.face)], axis=0)))
         rayleigh = [np.full(len(w2), 0.5), 0.5 * w2]
-        plain = float(solved(decay, sd, np.stack(rayleigh, axis=1))[1].sum())
+        plain = float(fit_nonnegative(decay, sd, np.stack(rayleigh, axis=1))[1].sum())
         radii = np.geomspace(0.02 * across, across, 40)
         # a part of the lines may leave the knee anywhere below the band: it is this one that is fitted again
         if isinstance(evidence.known, cls):
@@ -106,7 +106,7 @@ class Radiation(Effect):
         found = []
         for one in (cls(float(radius), 1.0, order=order) for order in RADIATION.orders for radius in radii):
             lost = 0.5 * RADIATION.impedance * one.efficiency(observed.freq_hz) * mine
-            x, rest = solved(decay, sd, np.stack([*rayleigh, lost], axis=1))
+            x, rest = fit_nonnegative(decay, sd, np.stack([*rayleigh, lost], axis=1))
             if x[2] > 0:
                 found.append((float(rest.sum()), replace(one, strength=float(x[2]))))
         if not found:

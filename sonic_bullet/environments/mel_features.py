@@ -18,6 +18,7 @@ from sonic_bullet.files import check_sr
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_flag, as_number, as_whole
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.short_time import short_time_spectra
 
 
 class _MelDefaults(NamedTuple):
@@ -90,10 +91,9 @@ def log_mel(
         )
     if center:
         samples = np.pad(samples, ((0, 0), (n_fft // 2, n_fft // 2)), mode="reflect")
-    frames = np.lib.stride_tricks.sliding_window_view(samples, n_fft, axis=-1)[:, ::hop]
-    spectrum = np.fft.rfft(frames * get_window("hann", n_fft), axis=-1)
+    spectrum = short_time_spectra(samples, get_window("hann", n_fft), hop)
     power = (spectrum.real**2 + spectrum.imag**2) @ filters
-    return np.log(np.maximum(power, floor)).swapaxes(-1, -2).astype(np.float32)
+    return np.asarray(np.log(np.maximum(power, floor)).swapaxes(-1, -2), np.float32)
 
 
 @lru_cache(maxsize=8)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import normal_sd
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ def measure_pulse(force: Array, sr: int) -> HammerPulse | None:
     turned = -rest.min() > rest.max()
     rest = -rest if turned else rest
     # of the half that is nearest, whatever the other half holds: 1/Φ⁻¹(3/4)
-    noise, peak = 1.4826 * float(np.median(np.abs(rest))), float(rest.max())
+    noise, peak = float(normal_sd(rest)), float(rest.max())
     if not peak > above_noise * noise:
         return None
     # of the peak: what exceeds it is contact; two such stretches further apart than gap_s are two hits

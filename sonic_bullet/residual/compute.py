@@ -21,6 +21,7 @@ from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array, Residual
 from sonic_bullet.records.errors import AudioError
 from sonic_bullet.residual.transfer import StruckModes
+from sonic_bullet.signal.exponential_law import mean_by_median
 from sonic_bullet.signal.spectrogram import RESIDUAL_WINDOW, Power, checked, power, transform
 
 
@@ -64,7 +65,7 @@ def clip_residual(
 def noise_floor_per_hz(left: Power) -> Array:
     """Estimate the floor (b,): the median over the last third of the frames, over ln 2, as of an exponential law."""
     tail = left.per_hz[:, -max(len(left.time_s) // 3, 1) :]
-    return np.asarray(np.median(tail, axis=1) / np.log(2))
+    return mean_by_median(tail, 1)
 
 
 def cells(left: Power, floor_per_hz: Array) -> tuple[Array, Array, Array]:
@@ -124,7 +125,7 @@ def noisiness(fine: Power, freq_hz: Array, time_s: Array) -> Array:
     for b, (low, high) in enumerate(itertools.pairwise(bounds)):
         if high - low > 3:
             band = fine.per_hz[low:high][:, frame]
-            share[b] = np.median(band, axis=0) / np.log(2) / np.maximum(band.mean(axis=0), 1e-300)
+            share[b] = mean_by_median(band, 0) / np.maximum(band.mean(axis=0), 1e-300)
     return np.minimum(share, 1.0)
 
 

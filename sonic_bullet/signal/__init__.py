@@ -1,9 +1,12 @@
-"""Signals as such: short-time spectra and their inverse, octave bands, noise floors, distances of sounds.
+"""Signals as such: windows, spectra and their inverse, bands, noise floors, robust fits, distances of sounds.
 
-    short_time     Hann windows inside a signal -> spectra, powers
-    spectrogram    frames with zeros around a signal, float32 -> transform -> inverse
-    octave_bands   powers over frequency -> powers of octaves
-    log_spectral   stationary noise floors; distance of two sounds where they stand above the noise
+    short_time       windows; a signal, whole or in frames -> spectra, powers
+    spectrogram      frames with zeros around a signal, float32 -> transform -> inverse
+    octave_bands     powers over frequency -> powers of octaves
+    exponential_law  quantiles of noise's powers -> their means
+    log_spectral     stationary noise floors; distance of two sounds where they stand above the noise
+    robust           losses, weights and fits that outliers do not decide
+    matching         prices of pairs -> one-to-one pairs; cosines of columns
 
 What a strike, a line or a mode is nothing here knows.
 """

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
 from sonic_bullet.signal.short_time import short_time_power, window_energy
 
 
@@ -77,8 +78,7 @@ def floor_of(residual: Array) -> Floor:
     """
     window = min(SPECTRAL.floor_window, len(residual) // 4)
     power = short_time_power(residual, window, window // 2) / window_energy(window)
-    # the median of an exponential law is ln 2 of its mean
-    return Floor(np.maximum(np.median(power, axis=0) / np.log(2), 1e-24))
+    return Floor(np.maximum(mean_by_median(power, 0), 1e-24))
 
 
 def floor_between(signals: list[Array]) -> Floor:
@@ -97,8 +97,7 @@ def floor_between(signals: list[Array]) -> Floor:
         if len(tail) < window:
             tail = np.pad(tail, (0, window - len(tail)))
         rows.append(short_time_power(tail, window, window // 2) / window_energy(window))
-    quartile = float(np.log(4 / 3))  # of an exponential law over its mean
-    level = np.quantile(np.concatenate(rows), 0.25, axis=0) / quartile
+    level = mean_by_quartile(np.concatenate(rows), 0)
     return Floor(np.maximum(_broad(level, side * window // SPECTRAL.floor_window), 1e-24))
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.estimator.perceptual.image import pooled, spectra
+from sonic_bullet.estimator.perceptual.image import pooled, window
 from sonic_bullet.estimator.perceptual.loudness import loudness
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import short_time_power
 from studies.ren2013.hybrid.image import Image
 
 
@@ -24,7 +25,7 @@ def plain_distance(target: Image, freq_hz: Array, decay_per_s: Array, amplitude:
         signal += size * np.exp(-decay * time) * np.sin(2 * np.pi * freq * time)
     total = 0.0
     for level in target.levels:
-        power = np.abs(spectra(signal, level.window, level.hop)) ** 2 * level.scale
+        power = short_time_power(signal, window(level.window), level.hop) * level.scale
         loud = loudness(
             pooled(power, level.band, level.share, len(target.middle_hz)), target.middle_hz, target.full_scale_db_spl
         )

@@ -11,11 +11,11 @@ import pytest
 
 from sonic_bullet.diagnosis.evidence.effect_evidence import evidence_of
 from sonic_bullet.diagnosis.prediction.struck_bodies import shapeless
-from sonic_bullet.effects.common.points import solved
 from sonic_bullet.effects.damping_law import DampingLaw
 from sonic_bullet.effects.radiation import Radiation
 from sonic_bullet.effects.support_damping import SupportDamping
 from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.signal.robust import fit_nonnegative
 from tests.made.body import recorded, truth
 
 BAND = (50.0, 7_500.0)
@@ -32,10 +32,10 @@ def test_decays_of_no_line_tell_no_law_and_nothing_that_radiates_or_rubs() -> No
 
 def test_least_squares_say_nothing_where_nothing_is_told() -> None:
     y, columns = np.array([1.0, 2.0, 3.0]), np.stack([np.ones(3), np.arange(3.0)], axis=1)
-    found, left = solved(y, np.full(3, np.inf), columns)
+    found, left = fit_nonnegative(y, np.full(3, np.inf), columns)
     assert found.tolist() == [0.0, 0.0]
     assert left.tolist() == [0.0, 0.0, 0.0]
-    found, _ = solved(y, np.full(3, 0.1), columns)
+    found, _ = fit_nonnegative(y, np.full(3, 0.1), columns)
     assert np.allclose(found, [1.0, 1.0])
 
 

@@ -21,6 +21,7 @@ from sonic_bullet.comparing.outcome.sound_effects import level_words
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.octave_bands import in_octave
+from sonic_bullet.signal.short_time import power_spectrum
 
 
 class _Common(NamedTuple):
@@ -230,7 +231,7 @@ def _response(x: Array, y: Array, sr: int) -> tuple[Array, Array, float]:
 
 def _left(left: Array, level: float, sr: int) -> Consequence:
     """Classify the residual after a gain: a tone, or noise."""
-    spectrum = (np.abs(np.fft.rfft(left * np.hanning(left.shape[1]), axis=1)) ** 2).sum(axis=0)
+    spectrum = power_spectrum(left, np.hanning(left.shape[1])).sum(axis=0)
     k = int(np.argmax(spectrum))
     share = spectrum[max(0, k - 3) : k + 4].sum() / spectrum.sum()
     if share > 0.5:

@@ -15,6 +15,7 @@ from sonic_bullet.comparing.comparison_record import Consequence
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.octave_bands import AUDIBLE_OCTAVES_HZ, octave_power
+from sonic_bullet.signal.short_time import power_spectrum, raised_cosine
 
 
 class _Onset(NamedTuple):
@@ -68,9 +69,9 @@ def band_levels(x: Array, sr: int) -> Array:
     """
     fade_s = 0.02  # a period of 50 Hz
     n, fade = max(x.shape[1], 1), min(round(fade_s * sr), x.shape[1])
-    ending = 0.5 + 0.5 * np.cos(np.pi * (np.arange(fade) + 1) / (fade + 1))
+    ending = raised_cosine((fade - np.arange(fade)) / (fade + 1))
     faded = np.concatenate([x[:, : x.shape[1] - fade], x[:, x.shape[1] - fade :] * ending], axis=1)
-    power = (np.abs(np.fft.rfft(faded, axis=1)) ** 2).sum(axis=0) * 2 / n**2
+    power = power_spectrum(faded).sum(axis=0) * 2 / n**2
     freq = np.fft.rfftfreq(n, 1 / sr)
     sums = octave_power(power, freq, [f for f in AUDIBLE_OCTAVES_HZ if f / math.sqrt(2) < sr / 2])
     with np.errstate(divide="ignore"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_weight
 
 RADIATED_SD = 0.2
 """Relative: how far what a body radiates is computed off, median 0.5 dB of boundary elements and 2 dB at most where it
@@ -28,5 +29,5 @@ def air_factor(lam: Array, decay: Array, sd: Array, radiated: Array) -> float:
     for _ in range(20):
         root = np.sqrt(weight)
         value, _ = nnls(np.vstack([column * scale * root[:, None], prior]), np.append(y * root, 1 / RADIATED_SD))
-        weight = 1 / (1 + ((y - column @ (value * scale)) / 2) ** 2)
+        weight = cauchy_weight(((y - column @ (value * scale)) / 2) ** 2)
     return float(np.clip(value[2], 1 - 3 * RADIATED_SD, 1 + 3 * RADIATED_SD))

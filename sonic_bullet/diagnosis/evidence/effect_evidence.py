@@ -21,6 +21,7 @@ from sonic_bullet.estimator.fit.pairing import PAIRING
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
+from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 
 
 def evidence_of(h: Hypothesis, bodies: tuple[Struck, ...], band_hz: tuple[float, float], *, seed: int = 0) -> Evidence:
@@ -178,8 +179,6 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     """Pair lines and modes by frequency, pattern and decay."""
     lossy, together = 0.06, 0.25  # price of (ln d)² of a line over its mode; ln d of modes that sound as one line
     reach = 0.012  # of a line from its mode where effects have moved it
-    from scipy.optimize import linear_sum_assignment
-
     assert p.body.recorded is not None
     model, lines = p.model, p.body.recorded.lines
     if not len(lines.freq_hz):
@@ -187,16 +186,12 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     gap = np.log(lines.freq_hz)[:, None] - np.log(model.freq_hz)[None, :]
     mine = p.body.fitted[: len(lines.amplitude)]
     expected, observed = np.abs(p.pattern()[mine]), np.abs(lines.amplitude)
-    alike = (observed.T @ expected) / np.maximum(
-        np.linalg.norm(observed, axis=0)[:, None] * np.linalg.norm(expected, axis=0)[None, :], 1e-300
-    )
+    alike = cosines(observed, expected)
     with np.errstate(divide="ignore", invalid="ignore"):
         worse = np.nan_to_num(np.log(lines.decay_per_s[:, None] / model.decay_per_s[None, :]), posinf=0.0, neginf=0.0)
     price = np.minimum((gap / reach) ** 2 + 0.5 * (1 - np.nan_to_num(alike)) + lossy * worse**2, 1.0) - 1.0
     price[known] = 0.0
-    row, column = linear_sum_assignment(price)
-    good = price[row, column] < 0
-    row, column = row[good], column[good]
+    row, column = pairs_of_least_price(price)
     # degenerate modes that nothing has set apart are one line
     group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > PAIRING.degenerate_split)
     taken, mode = set(column.tolist()), []

@@ -34,6 +34,7 @@ from sonic_bullet.estimator.fit.pairing import PAIRING
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.signal.robust import cauchy_weight, weighted_median
 
 ROUGH_LINES = 0.02
 
@@ -278,9 +279,7 @@ def whole(one: ObjectEvidence) -> Array:
 
 def _middle(ratio: Array, weight: Array) -> float:
     """Compute a weighted median, weights within 100 to 1, from which an iteration of weights may start."""
-    order = np.argsort(ratio)
-    total = np.cumsum(np.clip(weight[order], weight.max() / 100, None))
-    return float(ratio[order][np.searchsorted(total, total[-1] / 2)])
+    return weighted_median(ratio, np.clip(weight, weight.max() / 100, None))
 
 
 def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvidence, ...]) -> Hypothesis:
@@ -329,5 +328,5 @@ def _gained(h: Hypothesis, bodies: tuple[Struck, ...], observed: tuple[ObjectEvi
     for _ in range(30):
         sd2 = (s[0] ** 2 + (gain * s[1]) ** 2) + 1e-300
         gain = float((weight * x * y / sd2).sum() / max(float((weight * x**2 / sd2).sum()), 1e-300))
-        weight = 1 / (1 + ((y - gain * x) ** 2 / sd2) / 6.25)
+        weight = cauchy_weight(((y - gain * x) ** 2 / sd2) / 6.25)
     return replace(h, gain=gain * louder) if gain > 0 and np.isfinite(gain) else h

@@ -12,6 +12,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.prediction import pattern
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
+from sonic_bullet.signal.robust import weighted_median
 
 
 def with_levels(body: Struck, gain: float) -> Struck:
@@ -35,9 +36,7 @@ def with_levels(body: Struck, gain: float) -> Struck:
                 np.log(size[good] / played[good]),
                 np.minimum(size[good] / (sd[good] + 1e-300), most_spreads),
             )
-            order = np.argsort(ratio)
-            total = np.cumsum(weight[order])
-            level[strike] = ratio[order][np.searchsorted(total, total[-1] / 2)]
+            level[strike] = weighted_median(ratio, weight)
     if not np.isfinite(level).any():
         return body
     if unknown.all():

@@ -26,6 +26,7 @@ from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.records import Array
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.signal.log_spectral import SPECTRAL, Floor
+from sonic_bullet.signal.short_time import short_time_power, window_energy
 
 CENTRE_HZ = 1000 * 2.0 ** (np.arange(-24, 28) / 6)  # third octaves every sixth
 HALF_BAND = 2 ** (1 / 6)  # of a third octave, to each side
@@ -112,15 +113,16 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
     fits = [w for w in windows if w <= len(recorded)]
     lobe = 2  # cells from the middle of a Hann window's main lobe to its first zeros
     window = np.array([next((w for w in fits if 2 * lobe * sr / w <= wide), 0) for wide in high - low])
-    for w in np.unique(window[inside & (window > 0)]):
+    for w in np.unique(window[inside & (window > 0)]).tolist():
         who = np.flatnonzero(inside & (window == w))
         cell, mine = sr / w, (low[who], high[who])
         edge = np.maximum(lobe * cell, UNMATCHED.correction * CENTRE_HZ[who])
         beyond = (mine[0] - edge, mine[1] + edge)
         (a, near_a), (b, near_b) = (
-            (_within(p, *mine, cell), _within(p, *beyond, cell)) for p in (_power(recorded, w), _power(played, w))
+            (_within(p, *mine, cell), _within(p, *beyond, cell))
+            for p in (short_time_power(x, w, w // 4).sum(axis=0) for x in (recorded, played))
         )
-        n = _within(floor.at(w // 2 + 1) * (np.hanning(w) ** 2).sum() * _frames(len(recorded), w), *mine, cell)
+        n = _within(floor.at(w // 2 + 1) * window_energy(w) * _frames(len(recorded), w), *mine, cell)
         more, less = 10 * np.log10(np.maximum(a, n) / (near_b + n)), 10 * np.log10(np.maximum(near_a, n) / (b + n))
         found[who] = np.where(
             (a > SPECTRAL.above_noise * n) | (b > SPECTRAL.above_noise * n),
@@ -128,12 +130,6 @@ def _over_db(recorded: Array, played: Array, sr: int, floor: Floor, band_hz: tup
             np.nan,
         )
     return found
-
-
-def _power(x: Array, window: int) -> Array:
-    """Sum |X|² (bins,) over frames under a Hann window."""
-    frames = np.lib.stride_tricks.sliding_window_view(x, window)[:: window // 4]
-    return np.asarray((np.abs(np.fft.rfft(frames * np.hanning(window), axis=1)) ** 2).sum(axis=0))
 
 
 def _frames(count: int, window: int) -> int:

@@ -21,6 +21,7 @@ from sonic_bullet.diagnosis.prediction.prediction import Predictions
 from sonic_bullet.diagnosis.selection.thresholds import RULES
 from sonic_bullet.effects.protocol import Dereverberates, Effect, Evidence, ObjectEvidence, Stage
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_loss
 
 
 def of_decays(h: Hypothesis, effect: Effect) -> bool:
@@ -78,4 +79,4 @@ def _cost(made: Predictions, one: ObjectEvidence) -> Array:
     sd = np.hypot(np.nan_to_num(one.decay_sd_per_s / one.decay_per_s, nan=0.05, posinf=1e3), ROUGH_LINES)
     with np.errstate(divide="ignore"):
         z = np.log(one.decay_per_s / np.maximum(model, 1e-9)) / sd
-    return np.asarray(RULES.standard_errors**2 * np.log1p((z / RULES.standard_errors) ** 2))
+    return cauchy_loss((z / RULES.standard_errors) ** 2, RULES.standard_errors**2)

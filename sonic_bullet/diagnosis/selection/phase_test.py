@@ -18,6 +18,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict_fitted
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight
 
 DELAYS_S = np.arange(-4e-4, 4.01e-4, 1e-5)
 FINER_S = np.linspace(-1e-5, 1e-5, 21)  # half a step of the coarse ones is a sixth of a radian at 5 kHz
@@ -68,6 +69,6 @@ def _cost(expected: Array, seen: Array, sd: Array, rough: Array) -> float:
             ),
             1e-3,
         )
-        weight = 1 / (1 + np.abs(seen - gain * expected) ** 2 / width / 9)
+        weight = cauchy_weight(np.abs(seen - gain * expected) ** 2 / width / 9)
     width = sd**2 + (gain * rough) ** 2
-    return float((np.log(width) + 9 * np.log1p(np.abs(seen - gain * expected) ** 2 / width / 9)).sum())
+    return float((np.log(width) + cauchy_loss(np.abs(seen - gain * expected) ** 2 / width / 9, 9)).sum())

@@ -18,6 +18,8 @@ from sonic_bullet.effects.common.pairs import agreed, every_line
 from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.signal.matching import cosines
+from sonic_bullet.signal.robust import cauchy_weight
 
 
 class _MassSearch(NamedTuple):
@@ -176,10 +178,9 @@ class MassFit:
         # of ln f: common shifts of the baseline's modes that are looked at; a mass lowers lines, so up above all
         reach, bins = (-0.1, 0.25), 0.008
         peaks = 2  # of those shifts, tried further
-        alike = 1.0
+        alike = np.ones(1)
         if len(self.size) > 1 and np.isfinite(self.size).all() and np.isfinite(pattern).all():
-            long = np.linalg.norm(self.size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)
-            alike = (self.size.T @ pattern / np.maximum(long, 1e-300)) ** 4
+            alike = cosines(self.size, pattern) ** 4
         gap = np.log(self.line)[:, None] - np.log(freq_hz)
         edge = np.arange(reach[0] - bins, reach[1] + 2 * bins, bins)
         count = np.histogram(gap, edge, weights=np.broadcast_to(alike, gap.shape))[0]
@@ -316,7 +317,7 @@ class MassFit:
         pull = np.array(
             [0, 0, 0, (poisson_range.guess - ratio) / poisson_range.sd**2 if poisson_range is not None else 0.0, 0]
         )
-        weight = 1 / (1 + (off / width) ** 2) / width**2
+        weight = cauchy_weight((off / width) ** 2) / width**2
         held = np.diag(np.array([1.0, 1.0, 1.0, poisson_range.sd if poisson_range is not None else 1.0, 1.0]) ** -2)
         step = np.linalg.solve((slope.T * weight) @ slope + held, (slope.T * weight) @ off + pull)
         return np.asarray(np.clip(step, -np.array(MASS_SEARCH.most), MASS_SEARCH.most))

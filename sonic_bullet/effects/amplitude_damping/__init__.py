@@ -28,7 +28,6 @@ from sonic_bullet.effects.amplitude_damping.damped_lines import (
 from sonic_bullet.effects.amplitude_pitch import MEASURES, _per_velocity
 from sonic_bullet.effects.common.axes import ANGLES, AXES_PAIR, TurnsPairs
 from sonic_bullet.effects.common.envelope import envelopes, levels
-from sonic_bullet.effects.common.points import solved
 from sonic_bullet.effects.protocol import (
     BaselineChange,
     ChangesBaseline,
@@ -42,6 +41,7 @@ from sonic_bullet.effects.protocol import (
     Traits,
 )
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import fit_nonnegative
 
 POWERS = (1.0, 2.0)
 GROWTHS = np.geomspace(0.02, 30, 28)  # of c a₀ at the loudest
@@ -228,5 +228,7 @@ def _rayleigh(h: ObjectEvidence, lines: list[DecayFrames], row: tuple[DecayFit, 
     rough = 0.1  # of a decay: more off counts less
     omega2 = np.array([h.omega[line.number] ** 2 for line in lines])
     decay = np.array([one.decay_per_s[one.best] for one in row])
-    alpha, beta = solved(decay, rough / 3 * decay, np.stack([np.full(len(omega2), 0.5), 0.5 * omega2], axis=1))[0]
+    alpha, beta = fit_nonnegative(
+        decay, rough / 3 * decay, np.stack([np.full(len(omega2), 0.5), 0.5 * omega2], axis=1)
+    )[0]
     return float(alpha), float(beta)

@@ -29,6 +29,7 @@ from sonic_bullet.effects.protocol import (
     Traits,
 )
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_weight, weighted_median
 
 MEASURES = ("impulse", "velocity", "displacement")
 
@@ -175,10 +176,10 @@ def _agreed(table: Array, single: bool) -> Slope:
         return Slope(0.0, np.inf, 0.0, 0.0, single)
     xx, xy, yy = table.T
     value, weight = xy / xx, xx / yy
-    centre = _median(value, weight)
+    centre = weighted_median(value, weight)
     for _ in range(10):
         off = np.abs(value - centre)
-        near = 1 / (1 + (off / (2 * _median(off, weight) + 1e-12 * abs(centre) + 1e-200)) ** 2)
+        near = cauchy_weight((off / (2 * weighted_median(off, weight) + 1e-12 * abs(centre) + 1e-200)) ** 2)
         centre = float((weight * near * value).sum() / (weight * near).sum())
     # of a mode's misfit, as much as a bend would be of it: the others have no say
     says = np.minimum(centre**2 * weight, 1.0)
@@ -217,10 +218,3 @@ def _moments(e: Envelopes, h: ObjectEvidence, level: Array, q: int) -> tuple[flo
     y, x, t, w = (np.concatenate(part) for part in (rows, sides, ramps, weights))
     y, x = y - t * (w * t * y).sum() / (w * t * t).sum(), x - t * (w * t * x).sum() / (w * t * t).sum()
     return float((w * x * x).sum()), float((w * x * y).sum()), float((w * y * y).sum())
-
-
-def _median(value: Array, weight: Array) -> float:
-    """Compute a weighted median."""
-    order = np.argsort(value)
-    total = np.cumsum(weight[order])
-    return float(value[order][np.searchsorted(total, total[-1] / 2)])

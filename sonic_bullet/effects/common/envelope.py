@@ -21,6 +21,7 @@ import numpy as np
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import positive_hann
 
 
 class _Envelope(NamedTuple):
@@ -107,7 +108,7 @@ def shifted(h: ObjectEvidence, signal: Array, selected: list[int], window: list[
     time = np.zeros((len(selected), frames))
     floor = h.noise if len(h.noise) == len(signal) and np.isfinite(h.noise).all() else np.zeros(len(signal))
     for q, (k, length) in enumerate(zip(selected, window, strict=True)):
-        shape = np.hanning(length + 2)[1:-1]
+        shape = positive_hann(length)
         shape /= shape.sum()
         last = min(n - length, int(nepers / max(h.decay_per_s[k], 1e-2) * sr) + length)
         at = np.unique(np.linspace(length // 2, max(last, length // 2 + frames), frames).astype(int))

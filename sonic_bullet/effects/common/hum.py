@@ -15,6 +15,8 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
+from sonic_bullet.signal.exponential_law import mean_by_median
+from sonic_bullet.signal.short_time import power_spectrum
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +71,7 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
     if len(signals) < (1 if known_hz else fewest_recordings) or n < least_s * sr:
         return None
     shape = np.hanning(n)
-    spectrum = np.fft.rfft(tail * shape, 4 * n, axis=1)
-    power, hz = np.abs(spectrum) ** 2, np.fft.rfftfreq(4 * n, 1 / sr)
+    power, hz = power_spectrum(tail, shape, 4 * n), np.fft.rfftfreq(4 * n, 1 / sr)
     floor = (shape**2).sum() * np.median(noise) ** 2
     best: tuple[float, int, Array] | None = None
     multiple = np.arange(1, most + 1)
@@ -80,9 +81,9 @@ def hum_of(signals: Array, noise: Array, sr: int, known_hz: float = 0.0) -> Hum 
             continue
         # pink rooms
         background = np.array(
-            [np.median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], axis=1) for i in multiple]
+            [mean_by_median(power[:, np.abs(np.abs(hz - i * mains) - 0.3 * mains) < 0.15 * mains], 1) for i in multiple]
         )
-        least = np.maximum(background / np.log(2), floor)  # (i, s)
+        least = np.maximum(background, floor)  # (i, s)
         tone = np.array(
             [(power[:, np.minimum(i * near, len(hz) - 1)] / least[i - 1][:, None]).min(axis=0) for i in multiple]
         )

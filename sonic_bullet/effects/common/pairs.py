@@ -13,6 +13,7 @@ import numpy as np
 
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 
 
 def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
@@ -34,6 +35,11 @@ def patterns(h: ObjectEvidence, model: ModalModel) -> Array:
     return np.asarray(
         np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_direction))
     )
+
+
+def worth_of(level: Array, loudest: float) -> Array:
+    """Compute what lines or modes (k,) are worth by their levels: a quarter less a decade below the loudest."""
+    return np.asarray(np.clip(1 + 0.25 * np.log10(np.maximum(level / max(loudest, 1e-300), 1e-6)), 0.1, 1))
 
 
 def agreed(
@@ -77,30 +83,20 @@ def agreed(
     shift : float
         The common shift.
     """
-    from scipy.optimize import linear_sum_assignment
-
     # lists of frequencies, or strikes of unknown place
     if not (np.isfinite(size).all() and size.any() and np.isfinite(pattern).all() and pattern.any()):
         size, pattern = np.ones((1, len(line_hz))), np.ones((1, len(mode_hz)))
     strength = size.max(axis=0)
-    worth = np.clip(1 + 0.25 * np.log10(np.maximum(strength / strength.max(), 1e-6)), 0.1, 1)
     participation = pattern.max(axis=0)
-    force = np.clip(1 + 0.25 * np.log10(np.maximum(participation / max(participation.max(), 1e-300), 1e-6)), 0.1, 1)
-    if len(size) > 1:
-        alike = (size.T @ pattern) / np.maximum(
-            np.linalg.norm(size, axis=0)[:, None] * np.linalg.norm(pattern, axis=0)[None, :], 1e-300
-        )
-    else:
-        alike = np.ones((size.shape[1], pattern.shape[1]))
+    worth, force = worth_of(strength, strength.max()), worth_of(participation, participation.max())
+    alike = cosines(size, pattern) if len(size) > 1 else np.ones((size.shape[1], pattern.shape[1]))
     x, y = np.log(line_hz)[:, None], np.log(mode_hz)[None, :]
     row = column = np.zeros(0, int)
     score = 0.0
     for turn in range(turns + 1):
         price = np.minimum(((x - y - shift) / width) ** 2 / 18 + strict * (1 - alike), 1.0) - 1.0
         price = price * worth[:, None] * force[None, :]
-        row, column = linear_sum_assignment(price)
-        good = price[row, column] < 0
-        row, column = row[good], column[good]
+        row, column = pairs_of_least_price(price)
         score = float(price[row, column].sum())
         if turn < turns and len(row):
             shift += float(np.clip(np.median((x - y)[row, column] - shift), -0.01, 0.01))

@@ -1,4 +1,4 @@
-"""Points of a body's surface, and least squares that are robust against outliers."""
+"""Points of a body's surface: the nearest, some that lie apart, those alike under a symmetry, their normals."""
 
 from __future__ import annotations
 
@@ -55,43 +55,3 @@ def vertex_normals(model: ModalModel) -> Array:
     for i in range(3):
         np.add.at(normal, f[:, i], cross)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))
-
-
-def solved(y: Array, sd: Array, columns: Array) -> tuple[Array, Array]:
-    """Fit coefficients >= 0 of columns, robustly.
-
-    Parameters
-    ----------
-    y : (k,)
-        Data.
-    sd : (k,)
-        Their spreads.
-    columns : (k, c)
-        Columns of any scale.
-
-    Returns
-    -------
-    value : (c,)
-        Coefficients.
-    left : (k,)
-        Twice Huber's losses.
-
-    References
-    ----------
-    Huber's weights [Huber 1964] on least squares without negative numbers [Lawson & Hanson 1974].
-    """
-    from scipy.optimize import nnls
-
-    weight = 1 / sd
-    size = np.sqrt(((columns * weight[:, None]) ** 2).sum(axis=0))
-    scale = np.divide(1, size, out=np.zeros(len(size)), where=size > 0)  # of what nothing is known, nothing is said
-    a, b = columns * scale * weight[:, None], y * weight
-    trust, x = np.ones(len(y)), np.zeros(columns.shape[1])
-    for _ in range(8):
-        root = np.sqrt(trust)
-        x = nnls(a * root[:, None], b * root)[0]
-        before, trust = trust, np.minimum(1.0, 3.0 / np.maximum(np.abs(b - a @ x), 1e-12))
-        if np.abs(trust - before).max() < 1e-3:
-            break
-    off = np.abs(b - a @ x)
-    return x * scale, np.where(off <= 3, off**2, 6 * off - 9)

@@ -22,6 +22,7 @@ import numpy as np
 from sonic_bullet.effects.common.ringing import sounded
 from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import positive_hann
 
 FRAME_S = 0.012
 LEAST = 4  # frames: in less no tail shows
@@ -198,7 +199,7 @@ def direct(h: ObjectEvidence, delta: float) -> Array:
 def _frames(h: ObjectEvidence) -> tuple[Array, Array]:
     """Return the first samples (n,) of the frames, and their window."""
     assert h.signal is not None
-    window = np.hanning(round(FRAME_S * h.sr) + 2)[1:-1]
+    window = positive_hann(round(FRAME_S * h.sr))
     hop = len(window) // 2
     last = max((h.signal.shape[1] - len(window)) // hop, 1)
     dense_frames, frame_count = 24, 56  # frames one after another, then ever farther apart
@@ -261,7 +262,7 @@ def _tail(time: tuple[float, ...], decay: float, delta: float) -> tuple[Array, A
     nodes = 8  # of a window's quadrature
     faint = 1e-25  # of the direct sound's power
     at = np.array(time)
-    node, weight = (np.arange(nodes) + 0.5) / nodes * FRAME_S, np.hanning(nodes + 2)[1:-1]
+    node, weight = (np.arange(nodes) + 0.5) / nodes * FRAME_S, positive_hann(nodes)
     weight = weight / weight.sum()
     t = (at[:, None] + node).ravel()
     gap = 2 * (decay - delta)

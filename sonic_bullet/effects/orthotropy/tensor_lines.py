@@ -14,6 +14,7 @@ import numpy as np
 from sonic_bullet.effects.orthotropy.tensors import stiffness
 from sonic_bullet.effects.protocol import Elastic, Evidence, ObjectEvidence
 from sonic_bullet.records import Array
+from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 
 LINE_CAP = 0.012  # of ln f: a line farther off is no such mode
 
@@ -125,9 +126,7 @@ def seen_by(lines: BodyLines, p: Array) -> Seen:
         if np.isfinite(psi).all():
             a = lines.amplitude if lines.elastic.phased else np.abs(lines.amplitude)
             psi = psi if lines.elastic.phased else np.abs(psi)
-            alike = np.abs(a.T @ psi) / np.maximum(
-                np.linalg.norm(a, axis=0)[:, None] * np.linalg.norm(psi, axis=0), 1e-300
-            )
+            alike = cosines(a, psi)
     return Seen(np.log(freq), slope, alike)
 
 
@@ -152,11 +151,7 @@ def paired(lines: BodyLines, seen: Seen, width: float, lowest: int | None = None
     price : float
         Over the lines' worth, 1 without pairs.
     """
-    from scipy.optimize import linear_sum_assignment
-
     gap = (lines.log_hz[:lowest, None] - seen.log_hz[None, :]) / width
     price = lines.worth[:lowest, None] * (np.minimum(gap**2 / 18 + 1 - seen.alike[:lowest], 1.0) - 1.0)
-    line, mode = linear_sum_assignment(price)
-    good = price[line, mode] < 0
-    line, mode = line[good], mode[good]
+    line, mode = pairs_of_least_price(price)
     return line, mode, 1 + float(price[line, mode].sum() / lines.worth.sum())

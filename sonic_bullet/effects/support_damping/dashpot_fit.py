@@ -24,12 +24,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.effects.common.dashpots import coupled, split_into_runs
-from sonic_bullet.effects.common.pairs import every_line
-from sonic_bullet.effects.common.points import solved, vertex_normals
+from sonic_bullet.effects.common.pairs import every_line, worth_of
+from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.effects.support_damping.dashpot_numbers import DASHPOTS
 from sonic_bullet.effects.support_damping.smooth_law import least_law, smooth_columns
 from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.signal.matching import pairs_of_least_price
+from sonic_bullet.signal.robust import cauchy_loss, fit_nonnegative
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +119,7 @@ class DashpotFit:
         is_mode = index < len(h.freq_hz)
         at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < DASHPOTS.width
         strength = np.nan_to_num(size).max(axis=0)
-        worth = np.clip(
-            1 + 0.25 * np.log10(np.maximum(strength / max(strength.max(initial=0.0), 1e-300), 1e-6)), 0.1, 1
-        ) * np.where(is_mode, 1, np.where(at_home, half, weak))
+        worth = worth_of(strength, strength.max(initial=0.0)) * np.where(is_mode, 1, np.where(at_home, half, weak))
         amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
         level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
         into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
@@ -225,16 +225,16 @@ class DashpotFit:
                 self.worth[line],
                 np.hypot(self.sd[line], DASHPOTS.scatter * np.minimum(extra[mode], self.decay_per_s[line])),
             )
-            law = column @ solved(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
+            law = column @ fit_nonnegative(self.decay_per_s[line] - extra[mode], sd / np.sqrt(worth), column[mode])[0]
         off = np.abs(self.decay_per_s[line] - (extra + law)[mode]) / sd
-        decays = np.minimum(DASHPOTS.missed * np.log1p(off**2 / DASHPOTS.missed), DASHPOTS.gross)
+        decays = np.minimum(cauchy_loss(off**2 / DASHPOTS.missed, DASHPOTS.missed), DASHPOTS.gross)
         observed, modelled = (
             self._seen(self.size),
             self._seen(self._amplitudes_at_lines(line, omega[mode], omega, extra + law, push)),
         )
         patterns = np.minimum((1 - _cosine(observed, modelled)[line] ** 2) / DASHPOTS.rough**2, DASHPOTS.missed)
         level = _level(observed[:, line], modelled[:, line] * self._through(self.freq_hz[line])) / DASHPOTS.level
-        levels = np.minimum(DASHPOTS.missed * np.log1p(level**2 / DASHPOTS.missed), DASHPOTS.gross)
+        levels = np.minimum(cauchy_loss(level**2 / DASHPOTS.missed, DASHPOTS.missed), DASHPOTS.gross)
         return (
             nothing
             + float((worth * (decays + patterns + levels - DASHPOTS.lost)).sum())
@@ -263,7 +263,7 @@ class DashpotFit:
         near = np.abs(np.log(self.observed_hz[:, None] / freq[loud])) < 2 * DASHPOTS.width
         # a line of unknown decay may be any
         hidden = (near & ~(self.rings_per_s[:, None] > longer * decay[loud])).any(axis=0)
-        worth = np.clip(1 + 0.25 * np.log10(np.maximum(level[loud] / max(level[paired].max(), 1e-300), 1e-6)), 0.1, 1)
+        worth = worth_of(level[loud], level[paired].max())
         return float(DASHPOTS.mute * worth[~hidden].sum())
 
     def _amplitudes_at_lines(self, line: Array, at: Array, omega: Array, decay: Array, push: Array) -> Array:
@@ -297,16 +297,12 @@ class DashpotFit:
 
     def _pairs(self, omega: Array, decay: Array, alike: Array) -> tuple[Array, Array, float]:
         """Pair lines and modes at the least price, and return the price."""
-        from scipy.optimize import linear_sum_assignment
-
         off = np.log(2 * np.pi * self.freq_hz)[:, None] - np.log(omega)[None, :]
         worse = np.log(self.decay_per_s)[:, None] - np.log(np.maximum(decay, 1e-3))[None, :]
         price = (
             np.minimum((off / DASHPOTS.width) ** 2 / 18 + (worse / DASHPOTS.decade) ** 2 / 18 + 1 - alike, 1.0) - 1.0
         )
-        row, column = linear_sum_assignment(price * self.worth[:, None])
-        good = price[row, column] < 0
-        row, column = row[good], column[good]
+        row, column = pairs_of_least_price(price, self.worth[:, None])
         return row, column, float((price[row, column] * self.worth[row]).sum())
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.effects.common.points import solved
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import fit_nonnegative
 
 
 def smooth_columns(omega: Array) -> Array:
@@ -30,6 +30,6 @@ def least_law(omega: Array, decay: Array) -> Array:
     column, above = smooth_columns(omega), np.ones(len(omega), bool)
     value = np.zeros(column.shape[1])
     for _ in range(10):
-        value, _ = solved(decay, np.where(above, 1.0, low) * decay, column)
+        value, _ = fit_nonnegative(decay, np.where(above, 1.0, low) * decay, column)
         above = decay > column @ value
     return value

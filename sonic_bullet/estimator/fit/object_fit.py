@@ -19,6 +19,7 @@ from sonic_bullet.estimator.lines.joint_lines import Lines
 from sonic_bullet.files.cases import CaseObject
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Material
+from sonic_bullet.signal.robust import cauchy_weight
 
 
 def fitted_object(
@@ -116,7 +117,7 @@ def gain_of(objects: tuple[ObjectFit, ...]) -> tuple[float, float, float]:
         if not gain > 0:
             return np.nan, np.nan, np.nan
         off = (z / gain - x) / s
-        weight = 1 / (1 + (off / 2.5) ** 2)
+        weight = cauchy_weight((off / 2.5) ** 2)
     scatter = float(np.sqrt((np.abs(y / gain - x) ** 2).sum() / (x**2).sum()))
     spread = gain * float(np.sqrt((weight * off**2).sum() / max(len(y) - 1, 1) / (weight * x**2 / s**2).sum()))
     return gain, max(spread, 1e-6 * gain), scatter

@@ -24,6 +24,8 @@ from sonic_bullet.estimator.lines.joint_lines import PINNED, Lines
 from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
+from sonic_bullet.signal.matching import cosines, pairs_of_least_price
+from sonic_bullet.signal.robust import cauchy_weight
 
 
 class _Pairing(NamedTuple):
@@ -111,9 +113,7 @@ def _patterns(lines: Lines, seen: Observation, modes: Array) -> tuple[Array, Arr
     if not phased(lines, seen):
         p = np.abs(p)
     size, strength = np.linalg.norm(a, axis=0), np.linalg.norm(p, axis=0)
-    alike = (
-        np.abs(a.T @ p) / np.maximum(size[:, None] * strength[None, :], 1e-300) if use.sum() > 1 else np.ones((k, m))
-    )
+    alike = cosines(a, p) if use.sum() > 1 else np.ones((k, m))
     return size / size.max(initial=1e-300), strength / strength.max(initial=1e-300), alike
 
 
@@ -208,7 +208,6 @@ def best_pairs(
 def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple[Array, Array, float]:
     """Lines and modes paired at the least price: (p,), (p,), price. width: of ln f."""
     missed_energy = 0.3
-    from scipy.optimize import linear_sum_assignment
 
     size, strength, alike = _patterns(lines, seen, group.pattern)
     gap = (np.log(lines.freq_hz)[:, None] - np.log(group.freq_hz)[None, :]) / width
@@ -216,9 +215,7 @@ def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple
     line_worth = np.clip(0.5 + 0.06 * np.log10(np.maximum(size, 1e-12)), 0.05, 1) * _rings(lines)
     worth = line_worth[:, None] * np.clip(0.6 + 0.1 * np.log10(np.maximum(strength, 1e-12)), 0.05, 1)
     price = np.minimum(gap**2 / 18 + 1.0 * (1 - alike), 1.0)  # 3 widths off, or another pattern: no pair
-    row, column = linear_sum_assignment(worth * (price - 1.0))
-    paired = price[row, column] < 1.0
-    row, column = row[paired], column[paired]
+    row, column = pairs_of_least_price(price - 1.0, worth)
     missed = 0.0
     # where no pattern tells modes apart, those between the lines that nobody observed count against
     if not _usable(lines, seen).any():
@@ -272,7 +269,7 @@ def solve(
         step = np.linalg.solve(
             held, (slope * (weight / sd**2)[:, None]).T @ off - np.array([0, poisson_off / poisson_sd**2])
         )
-        weight = 1 / (1 + ((off - slope @ step) / sd / 2.5) ** 2)
+        weight = cauchy_weight(((off - slope @ step) / sd / 2.5) ** 2)
     return step, information, weight
 
 

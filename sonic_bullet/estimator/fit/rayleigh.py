@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import cauchy_weight
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +111,7 @@ def _by_most(lam: Array, decay: Array, spread: Array, size: Array, freedom: int)
         return best
     tau = met
     residual = (decay - 0.5 * (law[0] + law[1] * lam)) / np.hypot(spread, tau * size)
-    return _descended(lam, decay, spread, size, freedom, tau, 1 / (1 + (residual / 3.0) ** 2))
+    return _descended(lam, decay, spread, size, freedom, tau, cauchy_weight((residual / 3.0) ** 2))
 
 
 def _through_two(lam: Array, decay: Array, size: Array) -> tuple[Array, float]:
@@ -165,7 +166,7 @@ def _weighted(
         a = slope * scale * np.sqrt(weight)[:, None]
         value = _not_negative(a, decay / sd * np.sqrt(weight))
         residual = decay / sd - slope @ (value * scale)
-        weight = 1 / (1 + (residual / 3.0) ** 2) if len(lam) > 3 else weight
+        weight = cauchy_weight((residual / 3.0) ** 2) if len(lam) > 3 else weight
     value = value * scale
     return value, (slope * weight[:, None]).T @ slope, float(np.minimum(residual**2, 9.0).sum()), weight, residual**2
 

@@ -23,6 +23,7 @@ from sonic_bullet.estimator.lines.line_values import Lines
 from sonic_bullet.estimator.lines.subspace import low_pass
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
+from sonic_bullet.signal.exponential_law import mean_by_median
 from sonic_bullet.signal.log_spectral import floor_between
 
 WIDTHS_AROUND = 7  # widths, from two on, above and below a line
@@ -233,7 +234,7 @@ def _level_around(left: Array, ring: Array, pole: complex) -> Array:
         np.multiply(powers[k - 1], turn, out=powers[k])
     moment = np.concatenate([once @ powers.T, once @ powers.conj().T], axis=1)
     power = np.abs(moment) ** 2 / (np.abs(ring) ** 2).sum()
-    return np.asarray(np.median(power, axis=1) / np.log(2))  # of an exponential law
+    return mean_by_median(power, 1)
 
 
 def _polished(y: Array, pole: Array) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import raised_cosine
 
 LOWEST_AUDIBLE_HZ = 20.0  # of what is heard
 
@@ -37,20 +38,15 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     low, high = band_hz
     reach = min(len(signal), round(periods / max(low, 1.0) * sr))
     # a hum or a tone goes on, and fades: one that is cut off would begin and end with a click, which is in every band
-    fade = _raised(np.arange(reach), reach, 0)
+    fade = raised_cosine((reach - np.arange(reach)) / reach)
     ends = [predicted_on(part, band_order, reach) * fade for part in (signal[reach - 1 :: -1], signal[-reach:])]
     whole = np.concatenate([ends[0][::-1], signal, ends[1]])
     size = next_fast_len(2 * len(whole))
     freq = np.arange(size // 2 + 1) * sr / size
-    gain = _raised(freq, fall[0] * low, low)
+    gain = raised_cosine((freq - fall[0] * low) / (low - fall[0] * low))
     if high * fall[1] < sr / 2:
-        gain *= 1 - _raised(freq, high, fall[1] * high)
+        gain *= 1 - raised_cosine((freq - high) / (fall[1] * high - high))
     return np.asarray(irfft(rfft(whole, size) * gain, size)[reach : reach + len(signal)])
-
-
-def _raised(freq: Array, start: float, stop: float) -> Array:
-    """Return a raised cosine (n,) from 0 at start to 1 at stop."""
-    return 0.5 - 0.5 * np.cos(np.pi * np.clip((freq - start) / (stop - start), 0, 1))
 
 
 def without_drift(signal: Array, sr: int) -> tuple[Array, str]:

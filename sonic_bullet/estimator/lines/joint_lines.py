@@ -22,7 +22,9 @@ from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S, start_poles
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import AudioError
+from sonic_bullet.signal.exponential_law import mean_by_quartile
 from sonic_bullet.signal.log_spectral import floor_between
+from sonic_bullet.signal.short_time import power_spectrum, window_energy
 
 __all__ = ["PINNED", "Lines", "joint_lines", "lines_of", "noise_rms"]
 
@@ -211,10 +213,9 @@ def _struck(lines: Lines, signals: Array) -> Lines:
 def noise_rms(signals: Array, sr: int) -> Array:
     """Return the rms (s,) of the stationary floor, white, from the lower quarter of each last third's spectrum."""
     tail = signals[:, -signals.shape[1] // 3 :]
-    power = np.abs(np.fft.rfft(tail * np.hanning(tail.shape[1]), axis=1)) ** 2
-    # exponential law: its lower quartile is ln(4/3) of the mean
-    density = np.quantile(power, 0.25, axis=1) / np.log(4 / 3)
-    return np.asarray(np.maximum(np.sqrt(density / (np.hanning(tail.shape[1]) ** 2).sum()), JOINT.silent_rms))
+    power = power_spectrum(tail, np.hanning(tail.shape[1]))
+    density = mean_by_quartile(power, 1)
+    return np.asarray(np.maximum(np.sqrt(density / window_energy(tail.shape[1])), JOINT.silent_rms))
 
 
 def _colour(signals: Array, noise: Array, sr: int) -> Callable[[Array], Array]:

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.exponential_law import mean_by_median
+from sonic_bullet.signal.short_time import positive_hann, power_spectrum
 
 FRAME = 256
 
@@ -66,19 +68,19 @@ def measured(left: Array, sr: int, floor: float, modes: int = 0, band_hz: tuple[
         _lower_half(left, sr, band_hz) * np.sqrt(len(left) / max(len(left) - 4 * modes, 0.1 * len(left))), floor
     )
     count = len(left) // FRAME
-    frames = left[: count * FRAME].reshape(count, FRAME) * np.hanning(FRAME + 2)[1:-1]
-    power = np.abs(np.fft.rfft(frames, axis=1))[:, 2:-2] ** 2 / (3 / 8 * FRAME)
+    frames = left[: count * FRAME].reshape(count, FRAME)
+    power = power_spectrum(frames, positive_hann(FRAME))[:, 2:-2] / (3 / 8 * FRAME)
     here = np.interp(np.linspace(0, 1, FRAME // 2 + 1)[2:-2], np.linspace(0, 1, len(density)), density)
     freq = np.fft.rfftfreq(FRAME, 1 / sr)[2:-2]
     inside = (freq >= band_hz[0]) & (freq <= band_hz[1])
     use = inside if inside.any() else np.abs(freq - np.mean(band_hz)) < sr / FRAME
-    course = np.median((power / here**2)[:, use], axis=1) / np.log(2)
+    course = mean_by_median((power / here**2)[:, use], 1)
     return Noise(density, np.maximum(course, 1e-3) if count else np.ones(1), sr)
 
 
 def _lower_half(left: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     """Return rms per sample (n_f,) over 0 … sr/2, from the lower half of the power in neighbourhoods that overlap."""
-    power = _mirrored(np.abs(np.fft.rfft(left)) ** 2 / len(left), sr, band_hz)
+    power = _mirrored(power_spectrum(left) / len(left), sr, band_hz)
     width = min(max(26, len(power) // 60), len(power))
     side = np.pad(power, width // 2, mode="reflect")
     near = np.sort(np.lib.stride_tricks.sliding_window_view(side, width)[:: max(1, width // 8)], axis=1)
@@ -103,7 +105,7 @@ def noise_density(signal: Array, sr: int, band_hz: tuple[float, float], *, tail:
 
     part = signal[-len(signal) // 3 :] if tail else signal
     window = np.hanning(len(part)) if tail else np.ones(len(part))
-    power = _mirrored(np.abs(np.fft.rfft(part * window)) ** 2 / (window**2).sum(), sr, band_hz)
+    power = _mirrored(power_spectrum(part, window) / (window**2).sum(), sr, band_hz)
     power = np.concatenate([power, power[-1:]]) if len(power) < 64 else power
     width = max(25, len(power) // 60)
     coarse = max(1, width // 50)
@@ -134,7 +136,7 @@ def matched(
     score = np.empty((len(decay), len(freq)))
     for i, d in enumerate(decay):
         fade = np.exp(-d * time)
-        score[i] = 2 * np.abs(np.fft.rfft(left * fade, size)) ** 2 / (sigma2 * (share[i] * float(fade @ fade)))
+        score[i] = 2 * power_spectrum(left, fade, size) / (sigma2 * (share[i] * float(fade @ fade)))
     score[:, (freq < band_hz[0]) | (freq > band_hz[1])] = 0
     best = score.max(axis=0)
     peak = np.flatnonzero((best[1:-1] > needed(freq)[1:-1]) & (best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:])) + 1

@@ -12,6 +12,9 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.records.units import MAINS_HZ
+from sonic_bullet.signal.exponential_law import mean_by_median
+from sonic_bullet.signal.robust import weighted_median
+from sonic_bullet.signal.short_time import power_spectrum
 
 
 def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]:
@@ -45,7 +48,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
     n = len(quiet)
     if n < least_s * sr:
         return np.zeros(len(signal)), 0.0
-    power = np.abs(np.fft.rfft((quiet - quiet.mean()) * np.hanning(n), 4 * n)) ** 2
+    power = power_spectrum(quiet - quiet.mean(), np.hanning(n), 4 * n)
     step = sr / (4 * n)
     multiple = np.arange(1, min(most, int(0.45 * sr / MAINS_HZ[-1])) + 1)
 
@@ -53,9 +56,9 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
         """Which multiples of f stand above what lies between them."""
         at = np.round(multiple * f / step).astype(int)
         between = np.array(
-            [np.median(power[int((k + 0.35) * f / step) : int((k + 0.65) * f / step) + 1]) for k in multiple]
+            [mean_by_median(power[int((k + 0.35) * f / step) : int((k + 0.65) * f / step) + 1]) for k in multiple]
         )
-        between_least = np.minimum(between, np.concatenate([between[:1], between[:-1]])) / np.log(2)
+        between_least = np.minimum(between, np.concatenate([between[:1], between[:-1]]))
         return np.asarray(multiple[(power[at] > above * between_least) & (power[at] > 0)])
 
     def left(f: float) -> float:
@@ -82,9 +85,7 @@ def find_standing_hum(signal: Array, sr: int, start: int) -> tuple[Array, float]
         held, carried = (_tones(x[tail], f, found, sr) for x in (signal, hum))
         # the median, as a mode may ring at one of them
         turn, weight = np.angle(held * carried.conj()) / found, (found * np.abs(carried)) ** 2
-        order = np.argsort(turn)
-        middle = order[int(np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum()))]
-        f += float(turn[middle]) * sr / (np.pi * (tail.start + len(signal) - n))
+        f += weighted_median(turn, weight) * sr / (np.pi * (tail.start + len(signal) - n))
     held, rest = (_tones(x[tail], f, found, sr) for x in (signal, signal - hum))
     if (np.abs(rest) ** 2).sum() > stays * (np.abs(held) ** 2).sum():
         return np.zeros(len(signal)), 0.0

@@ -16,6 +16,7 @@ import numpy as np
 from sonic_bullet.estimator.perceptual.loudness import bark, bark_to_hz, loudness
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import RecordError
+from sonic_bullet.signal.short_time import short_time_power
 
 OUTSIDE = -2  # in Level.band: a bin that feeds no triangle
 
@@ -62,12 +63,6 @@ def pooled(power: Array, band: Array, share: Array, bands: int) -> Array:
     pooled[:, place[first] + 1] += np.add.reduceat(power * (1 - share), first, axis=1)
     pooled[:, place[first] + 2] += np.add.reduceat(power * share, first, axis=1)
     return pooled[:, 1:-1]
-
-
-def spectra(signal: Array, length: int, hop: int) -> Array:
-    """(m, length/2 + 1) complex spectra of frames that lie wholly inside ``signal``."""
-    frames = np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
-    return np.asarray(np.fft.rfft(frames * window(length), axis=1))
 
 
 def loudness_levels(
@@ -126,7 +121,7 @@ def loudness_levels(
             break
         band, share = _bins(length, sr, bark_step, bands)
         scale = 2 / (length * float((window(length) ** 2).sum()))
-        power = pooled(np.abs(spectra(observed, length, length // 2)) ** 2 * scale, band, share, bands)
+        power = pooled(short_time_power(observed, window(length), length // 2) * scale, band, share, bands)
         made.append(Level(length, length // 2, band, share, scale, loudness(power, middle_hz, full_scale_db_spl)))
     if not any(level.loud.any() for level in made):
         raise RecordError(

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import positive_hann
 
 
 def limiter_factor(peak_db: Array, sr: int, ceiling_db: float, release_db_s: float) -> Array:
@@ -32,6 +33,6 @@ def limiter_factor(peak_db: Array, sr: int, ceiling_db: float, release_db_s: flo
     padded = np.concatenate([held, np.repeat(held[-1:], width - 1)])
     # of frames i … i + width - 1, at i; the mean at i is then of those that began i - width + 1 … i, all of which saw i
     ahead = minimum_filter1d(np.minimum(padded, 0.0), width, origin=-(width // 2))[: len(wanted)]
-    window = np.hanning(width + 2)[1:-1]
+    window = positive_hann(width)
     before = np.concatenate([np.repeat(ahead[:1], width - 1), ahead])
     return np.asarray(10 ** (np.minimum(oaconvolve(before, window / window.sum(), mode="valid"), 0.0) / 20))

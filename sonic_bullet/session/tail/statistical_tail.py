@@ -28,6 +28,7 @@ from sonic_bullet.modal.fem import VOIGT
 from sonic_bullet.records import Array, Material, ModalModel
 from sonic_bullet.records.mode_shapes import rounded
 from sonic_bullet.records.units import HEARING_LIMIT_HZ
+from sonic_bullet.signal.robust import weighted_median
 
 WALL_SAMPLES = 96
 """Places of the wall and directions at them that averages are over."""
@@ -51,7 +52,7 @@ def with_tail(
     known = across >= 0
     if area[known].sum() < 0.5 * area.sum():
         return model
-    middle_m = _weighted_median(thickness[known], area[known])
+    middle_m = weighted_median(thickness[known], area[known])
     skin = known & (thickness < 2.5 * middle_m)
     wall_m2 = model.volume_m3 / middle_m
     thin_wall = 5.0  # √area over thickness from which on a body is a plate or a shell
@@ -152,12 +153,6 @@ def _places(
     return freq, np.interp(freq, grid, each)
 
 
-def _weighted_median(value: Array, weight: Array) -> float:
-    order = np.argsort(value, kind="stable")
-    total = np.cumsum(weight[order])
-    return float(value[order][np.searchsorted(total, total[-1] / 2)])
-
-
 def _wall_axes(model: ModalModel, weight: Array) -> Array:
     """Find the wall's normal (v, 3) at vertices, of either sign; at those of no wall that of the nearest one."""
     from scipy.spatial import cKDTree
@@ -190,7 +185,7 @@ def _continued(model: ModalModel, axis: Array, weight: Array, waves: _Waves, are
     half = model.mode_count // 2
     along = np.einsum("vi,vim->vm", axis, model.shape[:, :, half:].astype(float))
     low, high = waves.count(model.freq_hz[[half - 1, -1]], area_m2)
-    return _weighted_median((along**2).sum(axis=1), weight) / max(float(high - low), 1e-9)
+    return weighted_median((along**2).sum(axis=1), weight) / max(float(high - low), 1e-9)
 
 
 def _shapes(

@@ -12,6 +12,7 @@ import numpy as np
 
 from sonic_bullet.listener.animated import PoseStage
 from sonic_bullet.records import Array
+from sonic_bullet.signal.robust import normal_sd
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import near_pairs, speeds
 
@@ -90,7 +91,6 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     From the third differences of flights, in which a parabola has none, or else of bodies at rest, which show no
     rounding. apart (t, b): which bodies are near no other.
     """
-    mad = 1.4826  # Standard deviation over median absolute deviation, of a normal distribution
     flies = apart[3:] & apart[2:-1] & apart[1:-2] & apart[:-3]
     who = animation.free & animation.moving
     calm = flies & who
@@ -99,7 +99,7 @@ def pose_noise_m(animation: Animation, apart: Array) -> float | None:
     if calm.sum() < FLIGHT.least_frames:
         return None
     third = np.diff(animation.position_m, 3, axis=0)[calm]  # of white noise √20 σ
-    return float(mad * np.median(np.abs(third), axis=0).max() / np.sqrt(20))
+    return float(normal_sd(third, 0).max() / np.sqrt(20))
 
 
 def _rests(position_m: Array) -> Array:
