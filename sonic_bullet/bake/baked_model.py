@@ -131,6 +131,8 @@ class BakedModel:
         The preset's residual.
     notes
         Notes for the user.
+    assumed_wall_m
+        As of `ModalModel`; files do not hold it.
     """
 
     name: str
@@ -147,6 +149,7 @@ class BakedModel:
     damping_growth_power: float = 1.0
     residual: Residual | None = None
     notes: tuple[str, ...] = ()
+    assumed_wall_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Check shapes and numbers."""

@@ -179,6 +179,7 @@ def bake_body(
         damping_growth_power=model.damping_growth_power,
         residual=material.residual,
         notes=tuple(notes),
+        assumed_wall_m=model.assumed_wall_m,
     )
 
 

@@ -66,6 +66,13 @@ def warn(lines: Iterable[str]) -> None:
         print("sonic-bullet: warning: " + " ".join(line.split()), file=sys.stderr)
 
 
+def warn_of_assumed_wall(mesh: str, wall_m: float) -> None:
+    """Warn of the wall that an open surface was given because nobody stated one; 0: none."""
+    if wall_m:
+        assumed = f"open surface: a wall of {1000 * wall_m:.2g} mm is assumed, pitch goes with it"
+        warn([f"{mesh}: {assumed}; give --thickness"])
+
+
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
     """Discard stderr within the block, also from C: PyBullet prints its build time when it is imported."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sonic_bullet.cli.output import clean_stdout, places, print_report, status, table, warn, write_json
+from sonic_bullet.cli.output import (
+    clean_stdout,
+    places,
+    print_report,
+    status,
+    table,
+    warn_of_assumed_wall,
+    write_json,
+)
 from sonic_bullet.files import write_model
 from sonic_bullet.files.uff.writer import ModalShapes, uff_name, write_uff
 from sonic_bullet.geometry import oversize
@@ -92,9 +99,7 @@ def run_modes(
         beyond = "" if whole is model else f"with --tail, or tail=True in a scene{more}"
         report = ModesReport(mesh, made, model, output, beyond)
         print_report(report, say)
-    if thickness_m is None and (wall := re.search(r"open surface given a wall of ([\d.e-]+) m", model.note)):
-        assumed = f"open surface: a wall of {1000 * float(wall[1]):.2g} mm is assumed, pitch goes with it"
-        warn([f"{mesh}: {assumed}; give --thickness"])
+    warn_of_assumed_wall(mesh, model.assumed_wall_m)
     if large := oversize(model.vertex_m, model.mass_kg):
         print(
             f"sonic-bullet: warning: {mesh} {large}; "

@@ -59,6 +59,7 @@ class ModelEntry(msgspec.Struct, omit_defaults=True):
     note: str
     damping_growth_power: float = msgspec.field(default=1.0, name="choke_power")
     includes_radiation: bool = False
+    assumed_wall_m: float | None = None
 
 
 LoggedModel = ModelEntry | ModelHash
@@ -219,6 +220,7 @@ def _pack_model(x: ModalModel) -> ModelEntry:
         as_json_text(x.note),
         float(x.damping_growth_power),
         bool(x.includes_radiation),
+        float(x.assumed_wall_m) if x.assumed_wall_m else None,
     )
 
 
@@ -274,6 +276,7 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
         note=header.note,
         damping_growth_power=header.damping_growth_power,
         includes_radiation=header.includes_radiation,
+        assumed_wall_m=header.assumed_wall_m or 0.0,
     )
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet.geometry import oversize
 from sonic_bullet.machine.progress import says_so
 from sonic_bullet.modal.keys import key
+from sonic_bullet.modal.meshing.surfaces import given_wall_m
 from sonic_bullet.modal.methods import chosen, converged
 from sonic_bullet.modal.sectors import SECTORS, Wanted
 from sonic_bullet.parallel import one_thread
@@ -142,6 +143,7 @@ def analyse(
         dropped=dropped,
         note=note,
         includes_radiation=material.includes_radiation,
+        assumed_wall_m=given_wall_m(unit.note) if thickness_m is None else 0.0,
     )
 
 

@@ -60,9 +60,7 @@ def isotropic_stiffness_pa(youngs_pa: float, poisson: float) -> Array:
 
 
 ORTHOTROPIC = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1), (3, 3), (4, 4), (5, 5))
-"""Indices in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, the constants that symmetry planes along the axes
-leave.
-"""
+"""Indices in the Voigt tensor of C11 C22 C33 C23 C13 C12 C44 C55 C66, which symmetry planes along the axes leave."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -268,8 +266,8 @@ class ModalModel:
         The surface, body frame, outward.
     curvature_per_m : Array, shape (f,)
         Mean of the principal curvatures of the smooth surface (0 flat, 1/r sphere, negative inside a bowl).
-    volume_m3, mass_kg
-        Of the meshed solid at the material's density.
+    volume_m3, mass_kg, assumed_wall_m
+        Of the meshed solid at the material's density; the wall that an open surface got as none was stated, 0: none.
     dropped
         Number of modes left out as overdamped.
     note
@@ -277,8 +275,7 @@ class ModalModel:
     bend_s2_m2 : Array, shape (m,)
         Relative rise of a mode's frequency per square of its peak velocity at the surface; None: a linear body.
     damping_growth_s_m : Array, shape (m,)
-        Relative rise of its decay is (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: a linear
-        body.
+        Relative rise of its decay is (damping_growth · that velocity)^damping_growth_power, 1 or 2; None: linear.
     includes_radiation
         Of decay_per_s (see `Material`).
     stands_for : Array, shape (m,)
@@ -300,6 +297,7 @@ class ModalModel:
     damping_growth_power: float = 1.0
     includes_radiation: bool = False
     stands_for: Array | None = None
+    assumed_wall_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the fields."""
@@ -318,6 +316,7 @@ class ModalModel:
             damping_growth_power=as_number(self.damping_growth_power, "damping_growth_power", "give 1 or 2"),
             volume_m3=as_number(self.volume_m3, "volume_m3", "orient the mesh outward", least=0),
             mass_kg=as_number(self.mass_kg, "mass_kg", "orient the mesh outward", least=0),
+            assumed_wall_m=as_number(self.assumed_wall_m, "assumed_wall_m", "give a thickness in m, or 0", least=0),
             dropped=as_whole(self.dropped, "dropped", "give the number of modes left out", least=0),
             curvature_per_m=frozen_array(self.curvature_per_m, float, (len(face),), "curvature_per_m"),
         )

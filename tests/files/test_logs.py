@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from sonic_bullet import files
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.files.models import as_json_text
+from sonic_bullet.files.models import as_json_text, model_key
 from sonic_bullet.records import Body, Material, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import FileError, LogError, SonicBulletError
@@ -57,6 +57,12 @@ def test_equal_models_and_materials_are_stored_once(tmp_path: Path) -> None:
 def test_a_model_comes_back_bit_for_bit(tmp_path: Path) -> None:
     files.write_model(tmp_path / "m.npz", model())
     assert same(model(), files.read_model(tmp_path / "m.npz"))
+    shell = replace(model(), assumed_wall_m=0.0024)
+    files.write_model(tmp_path / "shell.npz", shell)
+    assert same(shell, files.read_model(tmp_path / "shell.npz")) and model_key(shell) != model_key(model())
+    for name, holds in (("m.npz", False), ("shell.npz", True)):  # as files of before the field, where there is none
+        with np.load(tmp_path / name) as arrays:
+            assert any(b"assumed_wall_m" in array.tobytes() for array in arrays.values()) == holds
     with pytest.raises(LogError, match="sonic-bullet-contacts/3"):
         files.read_log(tmp_path / "m.npz")
 

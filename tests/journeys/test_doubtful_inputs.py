@@ -49,6 +49,7 @@ def place(tmp_path: Path) -> Path:
         ("fit bar.obj -o p.json --mesh bar.obj --material pre.json", 2, ["--strike missing; give it,"]),
         (f"fit zero.wav -o p.json --mesh bar.obj --material pre.json {TAP}", 2, [GIGA, "zero.wav: it is empty"]),
         ("modes open.obj --count 3 --material steel", 0, [SHELL]),
+        ("bake open.obj -o open.json --material steel --to-hz 5000", 0, [SHELL]),
         ("modes open.obj --material steel --thickness 3", 2, ["wall of 3 m on a body of", "give metres: 0.003?"]),
         ("case check far", 2, ["strike 1 at (60, 0, 3) m lies 60 m off the surface"]),
         ("case check mistyped", 2, ["'recodings' is not known: did you mean 'recordings'?"]),

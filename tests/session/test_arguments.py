@@ -97,6 +97,7 @@ MODEL = dict(
     damping_growth_power=1,
     includes_radiation=False,
     stands_for=None,
+    assumed_wall_m=0,
 )
 LOG = {
     "bodies": (),
@@ -524,7 +525,7 @@ BAD: dict[str, dict[str, list[Any]]] = {
         **{name: [*ARRAY, 5] for name in ("freq_hz", "shape", "vertex_m", "face", "curvature_per_m")},
         "face": [*ARRAY, [[0, 1, 1.5]] * 4],
         "decay_per_s": ["x", object(), {}, 1j, [[1], [2, 3]]],
-        **{name: [*NUMBER, -1] for name in ("volume_m3", "mass_kg")},
+        **{name: [*NUMBER, -1] for name in ("volume_m3", "mass_kg", "assumed_wall_m")},
         "dropped": [*WHOLE, -1],
         "note": TEXT,
         **{

@@ -15,6 +15,7 @@ from sonic_bullet.cli.output import (
     quiet_stderr,
     status,
     warn,
+    warn_of_assumed_wall,
     write_json,
 )
 from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, is_log
@@ -128,6 +129,8 @@ def run_bake(
         print_report(report, say)
         pruned = [f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note]
         warn([*pruned, *(notes or ())])
+        if not scene:
+            warn_of_assumed_wall(source, models[0].assumed_wall_m)
     write_json(json_to, report.to_json())
 
 

@@ -245,3 +245,12 @@ def prepared(vertex_m: Array, face: Array, thickness_m: float | None) -> Skin:
     vertex_m, face = _walled(vertex_m, face, wall_m / 2, wall_m / 2)
     note += f"; open surface given a wall of {wall_m:.3g} m"
     return Skin(vertex_m, face, wall_m, note, guessed=thickness_m is None)
+
+
+def given_wall_m(note: str) -> float:
+    """Return the wall that a note says an open surface was given, 0 where it says none.
+
+    Solved bodies come from the cache with their note alone.
+    """
+    _, found, rest = note.partition("open surface given a wall of ")
+    return float(rest.split(" ", 1)[0]) if found else 0.0
