@@ -182,6 +182,19 @@ def test_surfaces_are_closed_without_degenerate_faces_and_face_outward(name: str
     ).all()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in objects.RECIPES if name != "angle_plastic"])  # cut along its cells
+def test_the_truth_does_not_go_with_its_mesh(name: str, tmp_path: Path) -> None:
+    recipe = objects.RECIPES[name]
+    made = objects.MATERIALS[recipe.material]
+    coarse, fine = (
+        objects.as_made(objects.solved(recipe, made.poisson, tmp_path, fineness=f), made).value for f in (1.0, 4 / 3)
+    )
+    n = min(len(coarse), len(fine))
+    assert abs(len(coarse) - len(fine)) <= 1
+    assert np.abs(np.sqrt(coarse[:n] / fine[:n]) - 1).max() < 1.5e-3
+
+
 def test_a_mode_bends_by_the_level_that_a_half_sine_leaves(bar: objects.Body, folder: Path) -> None:
     """|P(f)| of a half sine of unit area is |cos(pi f tau) / (1 - (2 f tau)^2)|."""
     tau, levels = 4e-4, []

@@ -113,15 +113,15 @@ def accepted(c: Candidate, gap_db: float) -> bool:
     return not refusal(c, gap_db)
 
 
-def refusal(c: Candidate, gap_db: float) -> str:
+def refusal(c: Candidate, gap_db: float, *, least_evidence: float = RULES.strong_evidence) -> str:
     """Return why a candidate is not accepted; empty where it is."""
     if len(c.drop_db) == 0:
         return "no strike could be left out"
     need = needed(gap_db)
     if not c.mean_db > need:
         return f"strikes left out must come {need:.2f} dB nearer"
-    if not evidence(c.drop_db, c.gap_db) > RULES.strong_evidence:
-        return f"strikes left out say less than {RULES.strong_evidence:g} (2 Δ ln L)"
+    if not evidence(c.drop_db, c.gap_db) > least_evidence:
+        return f"strikes left out say less than {least_evidence:g} (2 Δ ln L)"
     # a control effect is not held against corrections either
     return "" if c.whole_db - max(c.control_db, 0.0) > RULES.most_share * c.whole_db else "chance comes as near"
 

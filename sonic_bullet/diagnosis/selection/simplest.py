@@ -26,13 +26,24 @@ from sonic_bullet.effects.protocol import Evidence
 
 
 def examined(found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score) -> list[Candidate]:
-    """Return a round's candidates, each with why it is not accepted; else lines may favour one. full: a room anew."""
+    """Return a round's candidates, each with why it is not accepted; else lines may favour one. full: a room anew.
 
-    def why_not(c: Candidate) -> str:
-        why = refusal(c, max(now.gap_db, 0.0))
+    Where one is accepted, something acts on the sound. Which, is asked of those, too, that come nearer than it but say
+    too little by themselves, as their gains go with the strike.
+    """
+
+    def why_not(c: Candidate, **least: float) -> str:
+        why = refusal(c, max(now.gap_db, 0.0), **least)
         return why or ("" if helps(c, problem, now, full) else "all strikes together come no nearer")
 
     made = [replace(c, why_not=why_not(c)) for c in found]
+    nearest_db = max((c.mean_db for c in made if not c.why_not), default=np.inf)
+    made = [
+        replace(c, why_not=why_not(c, least_evidence=0.0))
+        if c.mean_db > nearest_db and not moves_itself(c.hypothesis, c.effect)
+        else c
+        for c in made
+    ]
     if all(c.why_not for c in made):
         by = max((c for c in made if by_lines(c, problem, full)), key=lambda c: c.lines, default=None)
         made = [replace(c, why_not="") if c is by else c for c in made]
