@@ -24,14 +24,13 @@ from multiprocessing.connection import Connection
 from multiprocessing.reduction import ForkingPickler
 from typing import Any, TypeVar
 
-from sonic_bullet.machine.progress import PipeSay, clear_stage, waiting_for
+from sonic_bullet.machine.progress import clear_stage, in_every_process, progress_to, report_progress, waiting_for
 from sonic_bullet.machine.worker import end_with
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 _inside: ContextVar[bool] = ContextVar("inside", default=False)  # a list that is being worked on
-_out: ContextVar[Connection | None] = ContextVar("out", default=None)  # of the other process
 
 
 @contextmanager
@@ -48,38 +47,17 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-def said_here(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Return ``say`` for code that runs in a `parallel_map`: messages of the other process are passed to this one.
-
-    A caller's function is thus called in the caller's process.
-    """
-    if isinstance(say, PipeSay):  # its pipe is every process's
-        return say
-
-    def tell(text: str) -> None:
-        out = _out.get()
-        if out is None:
-            say(text)
-        else:
-            with suppress(OSError):
-                out.send_bytes(ForkingPickler.dumps((None, text)))
-
-    return tell
-
-
-def parallel_map(
-    do: Callable[[Item], Made], items: Iterable[Item], say: Callable[[str], None] = lambda text: None
-) -> list[Made]:
+def parallel_map(do: Callable[[Item], Made], items: Iterable[Item]) -> list[Made]:
     """Return [do(item) for item in items], on two cores where there are two; raises whatever ``do`` raises.
 
-    ``do`` must not depend on earlier calls. say: gets messages of the other process (`said_here`) once this one has no
-    further item to begin.
+    ``do`` must not depend on earlier calls. Progress of the other process is reported in this one, once this one has no
+    further item to begin; what shows it by a pipe hears it at once.
     """
     listed = list(items)
     if _inside.get():
         return [do(item) for item in listed]
     with one_thread():
-        return _shared(do, listed, say) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
+        return _shared(do, listed) if len(listed) > 1 and _can_fork() else [do(item) for item in listed]
 
 
 def arrays_in_order(make: Callable[[int], Any], count: int, shape: tuple[int, ...], dtype: Any) -> Iterator[Any]:
@@ -156,7 +134,7 @@ def _make_asked(make: Callable[[int], Any], room: Any, ours: Connection, theirs:
             theirs.send((number, None))
 
 
-def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str], None]) -> list[Made]:
+def _shared(do: Callable[[Item], Made], listed: list[Item]) -> list[Made]:
     try:
         other, ours, taken = _started(do, listed)
     except OSError:  # no memory or no process to be had
@@ -170,7 +148,7 @@ def _shared(do: Callable[[Item], Made], listed: list[Item], say: Callable[[str],
             while (found := _received(ours)) is not None:
                 number, what = found
                 if number is None:
-                    say(what)
+                    report_progress(what)
                 else:
                     made[number] = what
         return [made[i] if i in made else do(item) for i, item in enumerate(listed)]
@@ -242,8 +220,11 @@ def _help(
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process handles it, and ends this one
     end_with(parent)
     ours.close()
-    _out.set(theirs)
-    with suppress(OSError):  # the pipe is closed
+
+    def report(text: str) -> None:
+        theirs.send_bytes(ForkingPickler.dumps((None, text)))
+
+    with suppress(OSError), progress_to(None if in_every_process() else report):  # the pipe is closed
         while os.getppid() == parent and (i := _next(taken)) < len(items):
             try:
                 message = ForkingPickler.dumps((i, do(items[i])))

@@ -28,7 +28,7 @@ from sonic_bullet.listener import (
     own_clients,
     seen_settings,
 )  # fmt: skip
-from sonic_bullet.machine.progress import Say, says_so
+from sonic_bullet.machine.progress import show_progress, without_progress
 from sonic_bullet.machine.worker import running_scene
 from sonic_bullet.records import Array, Material, Sensor
 from sonic_bullet.records.coerce import as_call, as_flag, as_path, as_whole, quote
@@ -44,7 +44,6 @@ from sonic_bullet.session.scene_findings import find_mute_bodies, find_nothing_a
 from sonic_bullet.session.scene_steps import as_seconds, run_built, run_plain
 from sonic_bullet.storage.spooled_sound import KeptSound
 
-Progress = Callable[[float], None]
 Receive = Callable[[tuple[Sensor, ...]], tuple[Sensor, ...]]
 
 
@@ -64,7 +63,7 @@ class RenderResult:
         return self.sound.samples()
 
 
-@says_so(text="say", fraction="progress")
+@show_progress(in_percent=True)
 def render_scene(
     path: str | Path,
     *,
@@ -79,8 +78,6 @@ def render_scene(
     residual: bool = True,
     supports: bool = True,
     image: bool | None = None,
-    progress: Progress | None = None,
-    say: Say | None = None,
     at_start: Callable[[Listener], object] | None = None,
     at_end: Callable[[Listener], object] | None = None,
     tail_db: float | None = None,
@@ -93,7 +90,7 @@ def render_scene(
     mode, as by ``tail=True`` of `Listener.add`. residual: whether the non-modal sound of materials is added.
     supports: whether resting contacts damp and transmit, image: whether large flat faces mirror, as in `attach`;
     None: as the scene's own listener has it.
-    progress gets the fraction done, say the current task. at_start, at_end: called with the listener before the first
+    at_start, at_end: called with the listener before the first
     step, and after the last while its world exists. tail_db: level below the peak at which the decay after the last
     step ends, -60 say, at most 10 s; None, 0: no decay. Raises SonicBulletError; where the scene fails or is
     interrupted, the exception carries the sound so far as ``partial``.
@@ -109,12 +106,12 @@ def render_scene(
         "at_start": as_call(at_start, "at_start"),
     }
     seconds = None if seconds is None else as_seconds(seconds, "seconds")
-    as_call(progress, "progress"), as_call(say, "say"), as_call(at_end, "at_end")
+    as_call(at_end, "at_end")
     tail_db = as_tail_db(tail_db)
     with _stage(path, **asked) as stage:
         try:
             with interrupts():
-                notes = stage.run(seconds, progress, say)
+                notes = stage.run(seconds)
                 if at_end is not None:
                     at_end(stage.need_listener())
         except (SonicBulletError, KeyboardInterrupt) as error:
@@ -137,8 +134,6 @@ def run_scene(
     silent: Iterable[str] = (),
     fill_modes: bool = False,
     receive: Receive | None = None,
-    progress: Progress | None = None,
-    say: Say | None = None,
 ) -> tuple[str, ...]:
     """Run a scene whose listener is passed to ``begin`` before its first step; return notes for the user.
 
@@ -153,19 +148,18 @@ def run_scene(
         "receive": as_call(receive, "receive"),
     }
     with _stage(path, **asked, begin=begin) as stage, interrupts():
-        notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"), progress, say)
+        notes = stage.run(None if seconds is None else as_seconds(seconds, "seconds"))
         return (*notes, *stage.check_names(), *stage.need_listener().notes)
 
 
-def examine_scene(path: str | Path, seconds: float = 1.0, say: Say | None = None) -> tuple[Finding, ...]:
+def examine_scene(path: str | Path, seconds: float = 1.0) -> tuple[Finding, ...]:
     """Find what in a scene would spoil its sound, and the remedies.
 
-    Runs it for ``seconds`` of physics time; say gets the current task. Raises SonicBulletError.
+    Runs it for ``seconds`` of physics time. Raises SonicBulletError.
     """
-    as_call(say, "say")
     quiet = _stage(path, sr=8_000, seed=0, microphones=())  # no sensor: contacts alone
     with quiet as stage, seen_settings() as seen:
-        stage.run(as_seconds(seconds, "seconds"), None, say)
+        stage.run(as_seconds(seconds, "seconds"))
         listener = stage.need_listener()
         return (*diagnose_world(listener.world, seen=seen), *find_nothing_added(listener), *find_mute_bodies(listener))
 
@@ -206,12 +200,12 @@ class _Stage:
             self.listener.detach()
         self.clients.close()
 
-    def run(self, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
+    def run(self, seconds: float | None) -> tuple[str, ...]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)  # they are in the result's notes
             run = run_gltf if is_gltf(self.path) else run_built if defines_build(self.path) else run_plain
             with running_scene(self.path), choosing(self.choice):
-                return run(self, seconds, progress, say)
+                return run(self, seconds)
 
     def attached(self, client: Any, microphones: MicrophoneLike) -> Listener:
         """Attach a listener that keeps log and sound, unless it is played at once."""
@@ -262,7 +256,8 @@ class _Stage:
             sound = listener.kept_sound(tail_db=tail_db)
             return RenderResult(sound, log, self.sr, (*notes, *render_notes(sound, log)), listener.lifted)
         log = replace(log, sr=self.sr, sensors=log.sensors if self.microphones is None else self.microphones)
-        sound = render_kept(log, tail_db=tail_db)
+        with without_progress():
+            sound = render_kept(log, tail_db=tail_db)
         lifted = listener.lifted if log.supports else {}
         return RenderResult(sound, log, self.sr, (*notes, *render_notes(sound, log)), lifted)
 

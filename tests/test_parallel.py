@@ -16,7 +16,8 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import sonic_bullet.parallel as module
-from sonic_bullet.parallel import arrays_in_order, one_thread, parallel_map, said_here
+from sonic_bullet.machine.progress import progress_to, report_progress
+from sonic_bullet.parallel import arrays_in_order, one_thread, parallel_map
 from sonic_bullet.records.errors import AudioError
 
 TWO = module._can_fork()
@@ -169,14 +170,14 @@ def test_linear_algebra_has_one_thread_in_each_process() -> None:
 def test_what_the_other_process_says_is_said_here() -> None:
     """A caller's function is called in the caller's process, whoever does the work."""
     heard: list[str] = []
-    say = said_here(heard.append)
 
     def work(number: int) -> int:
-        say(f"{number} by {os.getpid()}")
+        report_progress(f"{number} by {os.getpid()}")
         time.sleep(0.05)
         return number
 
-    assert parallel_map(work, range(6), heard.append) == list(range(6))
+    with progress_to(heard.append):
+        assert parallel_map(work, range(6)) == list(range(6))
     assert sorted(line.split()[0] for line in heard) == [str(number) for number in range(6)]
     if module._can_fork():
         assert len({line.split()[2] for line in heard}) == 2

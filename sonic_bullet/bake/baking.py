@@ -19,6 +19,7 @@ from sonic_bullet.bake.baked_model import BakedMaterial, BakedModel, MassPropert
 from sonic_bullet.bake.mode_importance import important_modes, mode_energy
 from sonic_bullet.bake.sample_points import sample_points
 from sonic_bullet.geometry import SurfaceIndex, inertia, nearest, volume_m3
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Air, Array, Body, Material, ModalModel
 from sonic_bullet.records.arrays import store
 from sonic_bullet.records.bodies import isotropic_stiffness_pa
@@ -101,8 +102,9 @@ def bake_mesh(
     shape = read_mesh(path, scale)
     vertex, face = read_own_vertices(Path(path))
     made = with_material(material)
-    how: dict[str, Any] = {"to_hz": to_hz, "thickness_m": thickness_m, "accuracy": accuracy, "progress": progress}
-    model = analyse_body((shape,), made, tail=False, **how)
+    how: dict[str, Any] = {"to_hz": to_hz, "thickness_m": thickness_m, "accuracy": accuracy}
+    with progress_to(progress):
+        model = analyse_body((shape,), made, tail=False, **how)
     solid = _solid_of(model, made.density_kg_m3)
     body = Body(
         0,

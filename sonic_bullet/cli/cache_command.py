@@ -51,9 +51,9 @@ def cache(clear: bool, limit: str | None, json_to: str | None) -> None:
         "kinds": by_kind(left),
         "removed": by_kind(removed),
     }
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         report = CacheReport(result, asked=clear or limit is not None)
-        print_report(report, say)
+        print_report(report, echo)
     write_json(json_to, report.to_json())
 
 

@@ -18,7 +18,6 @@ import click
 from sonic_bullet.cli.examples import EXAMPLES
 from sonic_bullet.cli.output import clean_stdout, folder_place, places, print_report, quiet_stderr, status, write_json
 from sonic_bullet.cli.parameters import json_option
-from sonic_bullet.machine.progress import progress_listener, progress_to
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import CompareError, FileError
 from sonic_bullet.records.file_endings import SCENE_ENDINGS
@@ -46,7 +45,7 @@ def compare(a: str, b: str | None, **options: Any) -> None:
     _check(a, b, options["ref"], options["report"])
     _check_options(a, b, options)
     to, page = places(options["json_to"], options["report"])
-    with clean_stdout(to) as say, ExitStack() as stack:
+    with clean_stdout(to) as echo, ExitStack() as stack:
         with quiet_stderr():
             import sonic_bullet.comparing.compared_sides
 
@@ -58,10 +57,10 @@ def compare(a: str, b: str | None, **options: Any) -> None:
             there, options["revision"] = stack.enter_context(at_revision(a, options["ref"]))
             a, b = there, a
         assert b is not None
-        stack.enter_context(progress_to(stack.enter_context(status("compare"))))
+        stack.enter_context(status("compare"))
         found, stopped = _found(Path(a), Path(b), options, page is not None)
         summary = CompareReport(found, stopped)
-        print_report(summary, say)
+        print_report(summary, echo)
         if page is not None:
             from sonic_bullet.report.compare_page import write_page
 
@@ -138,7 +137,7 @@ def _found(a: Path, b: Path, options: Any, page: bool) -> tuple[list[Any], bool]
     if a.suffix.lower() == ".json":
         return [Paired(b.name, _against_baseline(a, b, options["tolerance_db"]))], False
     if a.is_dir():
-        return compare_folders(a, b, both, progress_listener())
+        return compare_folders(a, b, both)
     kept = both(a, b)
     return [Paired(b.name, kept)], kept["stopped"]
 
@@ -244,7 +243,7 @@ def baseline(scenes: tuple[str, ...], folder: str | None, reason: str, runs: int
         import sonic_bullet.scene  # noqa: F401  PyBullet says when it was built
         from sonic_bullet.comparing.baselines import make_baseline, write_baseline
     for scene, place in zip(scenes, to, strict=True):
-        with status(scene) as say, progress_to(say):
+        with status(scene):
             made = make_baseline(scene, reason, runs)
         place.parent.mkdir(parents=True, exist_ok=True)
         write_baseline(str(place), made)

@@ -40,7 +40,7 @@ def run_diagnose(
     folder = None if predict is None else folder_place(predict, *SIDES)
     case, strike, written = read_case(source), None, ""
     warn(case.warnings)
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         from sonic_bullet.diagnosis.diagnose import diagnose
 
         with status(source):
@@ -63,7 +63,7 @@ def run_diagnose(
 
             write_preset(output, preset_of(found))
         summary = DiagnosisReport(found, propose, strike, written)
-        print_report(summary, say)
+        print_report(summary, echo)
     warn(found.warnings)
     write_json(json_to, summary.to_json())
     if found.verdict == "worse-than-silence":

@@ -36,7 +36,7 @@ def run_features(
     picture, json_to, csv_to = places(picture, json_to, csv_to)
     observed, sr, which = read_channel(recording, channel)
     warn(f"{recording}: {words}" for words in [which] if words)
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         from sonic_bullet.estimator.lines.extraction import extract
 
         with status(recording):
@@ -49,7 +49,7 @@ def run_features(
         if picture is not None:
             _draw(picture, observed, sr, found)
         report = FeatureReport(recording, found, notes, bool(found.note) or (bool(which) and channel is None))
-        print_report(report, say)
+        print_report(report, echo)
     warn(f"{recording}: {note}" for note in [found.note] if note)
     write_csv(csv_to, report.rows(), (*LINE_NUMBERS, *decays))
     write_json(json_to, report.to_json())

@@ -73,7 +73,7 @@ def run_fit(
     to, picture, json_to, csv_to, uff_to = places(output, picture, json_to, csv_to, uff_name(uff_to))
     case = _with_tolerance(as_case(source, one), tolerance_percent)
     warn(case.warnings)
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         from sonic_bullet.estimator.fit.fitted_preset import preset_of
         from sonic_bullet.estimator.fit.material_fit import fit_case
         from sonic_bullet.presets import write_preset
@@ -92,7 +92,7 @@ def run_fit(
 
             write_fit_picture(picture, found)
         report = FitReport(found, preset)
-        print_report(report, say)
+        print_report(report, echo)
     warn(found.warnings)
     write_csv(csv_to, report.line_rows(), fit_columns)
     write_json(json_to, report.to_json())

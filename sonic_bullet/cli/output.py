@@ -15,7 +15,15 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from sonic_bullet.machine.progress import is_shown, on_terminal, percent, shown_by, status
+from sonic_bullet.machine.progress import (
+    is_shown,
+    on_terminal,
+    percent,
+    progress_to,
+    report_progress,
+    shown_by,
+    status,
+)
 from sonic_bullet.records.errors import FileError
 
 __all__ = [
@@ -125,9 +133,9 @@ def folder_place(asked: str, *inside: str) -> str:
     return str(folder)
 
 
-def print_report(report: Report, say: Callable[[str], None]) -> None:
+def print_report(report: Report, echo: Callable[[str], None]) -> None:
     """Print the lines of a report."""
-    say("\n".join(report.lines()))
+    echo("\n".join(report.lines()))
 
 
 def write_json(json_to: str | None, value: Any) -> None:
@@ -148,11 +156,11 @@ def write_json(json_to: str | None, value: Any) -> None:
 
 
 @contextmanager
-def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
-    """Yield functions for the fraction done and for the current task, shown on stderr; in a pipe as of `status`."""
+def progress_bar(label: str) -> Iterator[None]:
+    """Show the fraction done and the current task within the context, on stderr; in a pipe as of `status`."""
     if not (is_shown() and on_terminal()):
-        with status(label) as say:
-            yield percent(say), say
+        with status(label), progress_to(fraction=percent(report_progress)):
+            yield
         return
     from rich.console import Console
     from rich.markup import escape
@@ -177,8 +185,15 @@ def progress_bar(label: str) -> Iterator[tuple[Callable[[float], None], Callable
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=1.0)
-        with shown_by(lambda text: progress.update(task, description=escape(f"{label}: {text}"))) as say:
-            yield (lambda share: progress.update(task, description=label, completed=share)), say
+
+        def rewrite(text: str) -> None:
+            progress.update(task, description=escape(f"{label}: {text}"))
+
+        def move(done: float) -> None:
+            progress.update(task, description=label, completed=done)
+
+        with shown_by(rewrite), progress_to(rewrite, move):
+            yield
 
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

@@ -25,7 +25,7 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
     if picture is not None and not picture.endswith((".png", ".pdf", ".svg")):
         raise FileError(f"cannot write {picture}: pictures are .png, .pdf or .svg", "end the name with one of them")
     to, picture, json_to = places(output, picture, json_to)
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         from sonic_bullet.presets import write_preset
 
         whole = Path(source).is_dir() or Path(source).name == "case.json" or one["mesh"] is not None
@@ -37,7 +37,7 @@ def run_residual(source: str, *, output: str, picture: str | None, json_to: str 
 
             write_residual_picture(picture, strikes)
         report = ResidualReport(source, strikes.residual, takes)
-        print_report(report, say)
+        print_report(report, echo)
     write_json(json_to, report.to_json())
 
 

@@ -70,13 +70,13 @@ def run_modes(
     if count is not None and to_hz is not None:
         raise FileError("both --count and --to-hz are given", "give one of them")
     made = chosen_material(material, youngs_pa, poisson, density_kg_m3)
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         from sonic_bullet.effects.presets_of_effects import with_material
         from sonic_bullet.modal import read_mesh
         from sonic_bullet.session.body_models import analyse_body
         from sonic_bullet.session.tail.statistical_tail import with_tail
 
-        with status(mesh) as progress:
+        with status(mesh):
             shape = read_mesh(mesh, scale)
             model = analyse_body(
                 (shape,),
@@ -85,7 +85,6 @@ def run_modes(
                 fixed=fixed,
                 thickness_m=thickness_m,
                 accuracy=accuracy,
-                progress=progress,
                 to_hz=to_hz or HEARING_LIMIT_HZ,
                 tail=False,
             )
@@ -98,7 +97,7 @@ def run_modes(
         more = whole.note[len(solved.note) :].replace("; ", ", ", 1)
         beyond = "" if whole is model else f"with --tail, or tail=True in a scene{more}"
         report = ModesReport(mesh, made, model, output, beyond)
-        print_report(report, say)
+        print_report(report, echo)
     warn_of_assumed_wall(mesh, model.assumed_wall_m)
     if large := oversize(model.vertex_m, model.mass_kg):
         print(

@@ -24,7 +24,7 @@ from sonic_bullet.comparing.revision_tree import unpinned, unpinned_words
 from sonic_bullet.comparing.sides import OtherSound, SceneSide, Side, as_side, run
 from sonic_bullet.comparing.words import difference_words, logged_words
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.machine.progress import report_progress, says_so
+from sonic_bullet.machine.progress import report_progress, show_progress
 from sonic_bullet.records.coerce import as_call
 from sonic_bullet.records.errors import CompareError
 from sonic_bullet.runtime.replay import render_kept
@@ -35,7 +35,6 @@ Given = str | Path | SceneSide | ContactLog | Side
 CAUSES_FIRST = {True: 0, None: 1, False: 2}
 
 
-@says_so(text="say")
 def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> Comparison:
     """Compare B with A, and name the causes of differences.
 
@@ -57,11 +56,11 @@ def compare(a: Given, b: Given, *, say: Callable[[str], None] | None = None) -> 
     SonicBulletError
         A side cannot be run, read or compared.
     """
-    as_call(say, "say")
-    report_progress("A")
-    one = as_side(a, "a")
-    report_progress("B")
-    return compared(one, as_side(b, "b"))
+    with show_progress(as_call(say, "say")):
+        report_progress("A")
+        one = as_side(a, "a")
+        report_progress("B")
+        return compared(one, as_side(b, "b"))
 
 
 def compared(a: Side, b: Side) -> Comparison:

@@ -22,7 +22,7 @@ from sonic_bullet.comparing.inputs.tree_difference import with_leaves
 from sonic_bullet.comparing.sides import SceneSide, Side, run
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import Call, ObjectId
-from sonic_bullet.machine.progress import progress_listener, progress_to, report_progress
+from sonic_bullet.machine.progress import report_progress, without_progress
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import CompareError
@@ -128,10 +128,10 @@ def ensemble(scene: SceneSide, runs: int = RUNS) -> Ensemble:
 
     def one(seed: int) -> tuple[Array, Array]:
         report_progress(f"run {seed} of {runs}")
-        with progress_to(lambda text: None):
+        with without_progress():
             return measured(run(longer, "b", plan=Shifted(seed)))
 
-    found = parallel_map(one, range(1, runs + 1), progress_listener())
+    found = parallel_map(one, range(1, runs + 1))
     return Ensemble(np.array([x for x, _ in found]), np.array([y for _, y in found]), seconds, rests)
 
 

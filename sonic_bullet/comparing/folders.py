@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records.errors import CompareError, SonicBulletError
 from sonic_bullet.records.file_endings import AUDIO_FORMATS, GLTF_ENDINGS
@@ -53,9 +54,7 @@ def _taken(path: Path) -> bool:
     return path.suffix.lower() in (".npz", *GLTF_ENDINGS, *AUDIO_FORMATS)
 
 
-def compare_folders(
-    a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]], say: Callable[[str], None]
-) -> tuple[list[Paired], bool]:
+def compare_folders(a: Path, b: Path, both: Callable[[Path, Path], dict[str, Any]]) -> tuple[list[Paired], bool]:
     """Return the result of ``both`` for each pair, and whether it was stopped before the last.
 
     both: compares two files, on two cores side by side; "stopped" in its result ends all.
@@ -80,8 +79,8 @@ def compare_folders(
     done: list[Paired] = []
     try:
         for start in range(0, len(listed), at_once):
-            say(f"{start} of {len(listed)}")
-            done += parallel_map(do, listed[start : start + at_once], say)
+            report_progress(f"{start} of {len(listed)}")
+            done += parallel_map(do, listed[start : start + at_once])
     except KeyboardInterrupt:
         known = {one.name for one in done}
         return [*done, *(one for one in reached if one.name not in known)], True

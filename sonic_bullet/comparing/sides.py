@@ -19,7 +19,7 @@ from sonic_bullet.comparing.revision_tree import RevisionTree, noted_files, own_
 from sonic_bullet.files import read_audio, read_audio_scale, read_log
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.calls import FIRST_ABSENT, Call, ObjectId, Plan
-from sonic_bullet.machine.progress import progress_listener
+from sonic_bullet.machine.progress import progress_listener, progress_to
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import as_path, quote
 from sonic_bullet.records.errors import CompareError, SonicBulletError
@@ -189,10 +189,11 @@ def run(
     watch = _Run(side, plan, like)
     watch.calls = Interception(side, plan, watch.look)
     clear_file_cache()
-    with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch):
+    heard = progress_to(progress_listener())  # else nobody's run would show its own
+    with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch), heard:
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
-            material=scene.material, residual=scene.residual, say=progress_listener(),
+            material=scene.material, residual=scene.residual,
         )  # fmt: skip
     names = {(watch.calls.who(body.body_id), body.link): body.name for body in result.log.bodies}
     return Side(

@@ -16,7 +16,7 @@ from sonic_bullet.dataset.sample_folder import SampleFolder, open_folder
 from sonic_bullet.dataset.samples import Job, Sample, make_sample, warm_up
 from sonic_bullet.files.levels import check_sr
 from sonic_bullet.jobs.job_driver import finish_jobs, open_workers
-from sonic_bullet.machine.progress import Say
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.session.run_recorder import package_versions
 
@@ -66,7 +66,6 @@ def make_dataset(
     formats: Sequence[str] = (),
     shares: Mapping[str, float] = SHARES,
     scheduler: str | None = None,
-    say: Say = lambda text: None,
 ) -> DatasetSummary:
     """Make those of the ``count`` samples from number ``first`` on that the folder has not.
 
@@ -82,8 +81,6 @@ def make_dataset(
         Of the objects, by split.
     scheduler
         Address of a Dask scheduler whose workers make the samples, in place of processes of this machine.
-    say
-        Called with how far it is.
 
     Raises
     ------
@@ -107,9 +104,9 @@ def make_dataset(
 
         def prepare() -> None:
             if crew.cluster is None:
-                say("machine code")
+                report_progress("machine code")
                 warm_up()
-            say("objects")
+            report_progress("objects")
             splits.update(splits_of(object_names(recipe, seed, kept, numbers.stop, workers, limit_s), shares))
 
         def keep(number: int, made: Sample) -> str | None:
@@ -119,10 +116,10 @@ def make_dataset(
             return None
 
         made, failures = finish_jobs(
-            job, missing, crew, keep=keep, write_lists=lambda failed: kept.write_lists(numbers, failed), say=say,
+            job, missing, crew, keep=keep, write_lists=lambda failed: kept.write_lists(numbers, failed),
             prepare=prepare,
         )  # fmt: skip
-        layouts = {name: str(write_layout(name, kept, numbers, say)) for name in dict.fromkeys(formats)}
+        layouts = {name: str(write_layout(name, kept, numbers)) for name in dict.fromkeys(formats)}
         return _summarise(kept, numbers, made, failures, layouts)
 
 

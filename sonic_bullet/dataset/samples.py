@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet.dataset.contact_labels import contact_labels, log_digest
 from sonic_bullet.dataset.recipes import Recipe, read_recipe
 from sonic_bullet.listener import direct_client
+from sonic_bullet.machine.progress import without_progress
 from sonic_bullet.parallel import one_thread
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import SceneError, SceneWarning
@@ -53,7 +54,8 @@ def make_sample(job: Job) -> Sample:
         if not isinstance(cast, Mapping):
             raise SceneError(f"build(client) returned {type(cast).__name__}", "return a dict from bodies to materials")
         with attach(client, sr=job.sr, seed=seed, microphone=scene.microphones) as listener:
-            listener.add_all(cast, progress=_silent)
+            with without_progress():
+                listener.add_all(cast)
             while listener.time_s < scene.seconds - 1e-9:
                 client.stepSimulation()
             sound, log = listener.sound(), listener.contacts
@@ -86,7 +88,3 @@ def warm_up() -> None:
     Loaded in each of them, they would take six times as long as a sample.
     """
     make_sample(Job(read_recipe("impacts"), 0, 0, 8000))
-
-
-def _silent(_: str) -> None:
-    """Drop a line of progress."""

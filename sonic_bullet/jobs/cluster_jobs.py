@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 from sonic_bullet.jobs.job_processes import ATTEMPTS, Failed, attempt
-from sonic_bullet.machine.progress import Say
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.errors import FileError, exception_words
 from sonic_bullet.session.run_recorder import package_versions
 
@@ -69,7 +69,7 @@ def _without_log() -> Iterator[None]:
 
 
 def run_on_cluster(
-    client: Any, do: Callable[[Item], Made], items: Iterable[Item], limit_s: float, say: Say
+    client: Any, do: Callable[[Item], Made], items: Iterable[Item], limit_s: float
 ) -> Iterator[tuple[Item, Made | Failed]]:
     """Yield (item, do(item)) as they are done, or `Failed` after three tries; a try ends after limit_s seconds.
 
@@ -101,7 +101,7 @@ def run_on_cluster(
                 elif now_s - answered_s > ANSWER_S:
                     raise _gone(client)
                 if not workers:
-                    say("no worker yet")
+                    report_progress("no worker yet")
             while len(running) < workers:
                 following = again.popleft() if again else next(todo, None)
                 if following is None:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from sonic_bullet.jobs.cluster_jobs import open_cluster, run_on_cluster
 from sonic_bullet.jobs.job_processes import Failed, run_jobs
-from sonic_bullet.machine.progress import Say
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.errors import SonicBulletError
 
 Item = TypeVar("Item")
@@ -58,7 +58,6 @@ def finish_jobs(
     *,
     keep: Callable[[Item, Made], str | None],
     write_lists: Callable[[Mapping[Item, str]], None],
-    say: Say,
     prepare: Callable[[], None] = lambda: None,
 ) -> tuple[int, dict[Item, str]]:
     """Do the jobs that are missing; return how many are done, and why others are not.
@@ -72,8 +71,6 @@ def finish_jobs(
         None.
     write_lists
         Called with the reasons at the end, also where an error or an interrupt ends the run.
-    say
-        Called with how far it is.
     prepare
         Called before the first job, where one is missing.
 
@@ -86,18 +83,18 @@ def finish_jobs(
     try:
         if missing:
             prepare()
-            say(f"0 of {len(missing)}")
+            report_progress(f"0 of {len(missing)}")
         if workers.cluster is None:
             jobs = run_jobs(do, missing, workers.processes, workers.limit_s)
         else:
-            jobs = run_on_cluster(workers.cluster, do, missing, workers.limit_s, say)
+            jobs = run_on_cluster(workers.cluster, do, missing, workers.limit_s)
         for item, found in jobs:
             reason = found.reason if isinstance(found, Failed) else keep(item, found)
             if reason is None:
                 made += 1
             else:
                 failures[item] = reason
-            say(f"{made} of {len(missing)}{f', {len(failures)} failed' if failures else ''}")
+            report_progress(f"{made} of {len(missing)}{f', {len(failures)} failed' if failures else ''}")
     except BaseException:
         with suppress(SonicBulletError):
             write_lists(failures)

@@ -1,6 +1,6 @@
 """Progress messages of long work, and their display.
 
-    report_progress(text) ─► whoever listens (progress_to, says_so)
+    report_progress(text) ─► whoever listens (progress_to)
     status(label), show_stage(text) ─► a terminal: one line, rewritten
                                     ─► else a pipe ─► supervisor of the command, or a thread ─► lines of stderr
 
@@ -21,19 +21,13 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
-
-Say = Callable[[str], None]
-Params = ParamSpec("Params")
-Made = TypeVar("Made")
 
 COMMAND_QUIET_S, CALL_QUIET_S = 1.0, 2.0
 """A command, a call from Python that takes less shows nothing."""
 LONGEST = 300  # characters of a line
 
-_shown: list[Say] = []
-_listener: ContextVar[Say | None] = ContextVar("listener", default=None)
+_shown: list[Callable[[str], None]] = []
+_listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
 _fraction_listener: ContextVar[Callable[[float], None] | None] = ContextVar("fraction_listener", default=None)
 
 
@@ -49,7 +43,7 @@ _sink = _Sink()
 
 
 @dataclass(frozen=True, slots=True)
-class PipeSay:
+class PipeProgress:
     """Writer of progress into the pipe, from any process."""
 
     label: str
@@ -100,45 +94,41 @@ class ProgressLines:
 
 
 @contextmanager
-def shown_by(say: Say) -> Iterator[Say]:
-    """Let `status` write through ``say`` within the context."""
-    _shown.append(say)
+def shown_by(display: Callable[[str], None]) -> Iterator[None]:
+    """Let `status` write through ``display`` within the context."""
+    _shown.append(display)
     try:
-        yield say
+        yield
     finally:
-        _shown.remove(say)
+        _shown.remove(display)
 
 
 @contextmanager
-def status(label: str) -> Iterator[Say]:
+def status(label: str) -> Iterator[None]:
     """Show what `report_progress` tells within the context: a spinner on a terminal's stderr, elsewhere lines of it.
 
-    Yields a function that takes its text. An activity that starts within another writes into that one.
+    An activity that starts within another writes into that one.
     """
-    with _display(label) as say, progress_to(say):
-        yield say
-
-
-@contextmanager
-def _display(label: str) -> Iterator[Say]:
-    if _shown:
-        yield _shown[-1]
-    elif not is_shown():
-        yield ignore_progress
+    if _shown or not is_shown():
+        with progress_to(_shown[-1] if _shown else ignore_progress):
+            yield
     elif on_terminal():
         from rich.console import Console
         from rich.markup import escape
 
-        with (
-            Console(stderr=True).status(escape(label)) as line,
-            shown_by(lambda text: line.update(escape(f"{label}: {text}"))) as say,
-        ):
-            yield say
+        with Console(stderr=True).status(escape(label)) as line:
+
+            def rewrite(text: str) -> None:
+                line.update(escape(f"{label}: {text}"))
+
+            with shown_by(rewrite), progress_to(rewrite):
+                yield
     else:
-        with _printed(), shown_by(PipeSay(label)) as say:
-            say("")
+        pipe = PipeProgress(label)
+        with _printed(), shown_by(pipe), progress_to(pipe):
+            pipe("")
             try:
-                yield say
+                yield
             finally:
                 clear_stage()
 
@@ -159,16 +149,23 @@ def report_progress(text: str) -> None:
 
 def report_fraction(done: float) -> None:
     """Tell whoever listens (`progress_to`) which fraction is done, 0 to 1; without one, nothing."""
-    (_fraction_listener.get() or ignore_progress)(done)
+    fraction_listener()(done)
 
 
-def progress_listener() -> Say:
-    """Return whoever listens, to be handed to code that takes a function of its own; without one, a deaf one."""
+def progress_listener() -> Callable[[str], None]:
+    """Return whoever hears `report_progress`; without one, a deaf one."""
     return _listener.get() or ignore_progress
 
 
+def fraction_listener() -> Callable[[float], None]:
+    """Return whoever hears `report_fraction`; without one, a deaf one."""
+    return _fraction_listener.get() or ignore_progress
+
+
 @contextmanager
-def progress_to(text: Say | None = None, fraction: Callable[[float], None] | None = None) -> Iterator[None]:
+def progress_to(
+    text: Callable[[str], None] | None = None, fraction: Callable[[float], None] | None = None
+) -> Iterator[None]:
     """Let `report_progress` call ``text``, `report_fraction` ``fraction`` within the context.
 
     None: whoever listens already.
@@ -183,8 +180,27 @@ def progress_to(text: Say | None = None, fraction: Callable[[float], None] | Non
 
 
 @contextmanager
+def progress_under(head: str) -> Iterator[None]:
+    """Let what `report_progress` tells within the context stand behind a head."""
+    outer = progress_listener()
+    with progress_to(lambda text: outer(f"{head}: {text}")):
+        yield
+
+
+@contextmanager
+def progress_part(begin: float, end: float) -> Iterator[None]:
+    """Let what `report_fraction` tells within the context be that of a part, from ``begin`` to ``end`` of the whole."""
+    outer = _fraction_listener.get()
+    with progress_to(fraction=None if outer is None else lambda done: outer(begin + (end - begin) * done)):
+        yield
+
+
+@contextmanager
 def show_progress(
-    text: Say | None = None, fraction: Callable[[float], None] | None = None, *, in_percent: bool = False
+    text: Callable[[str], None] | None = None,
+    fraction: Callable[[float], None] | None = None,
+    *,
+    in_percent: bool = False,
 ) -> Iterator[None]:
     """Let a caller's functions hear the progress within the context, and nobody else.
 
@@ -202,54 +218,37 @@ def show_progress(
             yield
 
 
-def says_so(*, text: str = "", fraction: str = "") -> Callable[[Callable[Params, Made]], Callable[Params, Made]]:
-    """Decorate a function: where its caller gives neither argument of these names, `status` shows them.
-
-    text: name of the argument called with what is being done; fraction: of that called with the fraction done.
-    """
-
-    def decorated(function: Callable[Params, Made]) -> Callable[Params, Made]:
-        @wraps(function)
-        def called(*args: Params.args, **options: Params.kwargs) -> Made:
-            names = [name for name in (text, fraction) if name]
-            given: list[Any] = [options.get(text), options.get(fraction)]
-            with show_progress(*given, in_percent=bool(fraction)):
-                if given == [None, None]:
-                    shares = _fraction_listener.get() or ignore_progress
-                    options.update({name: progress_listener() if name == text else shares for name in names})
-                return function(*args, **options)
-
-        return called
-
-    return decorated
-
-
-def percent(say: Say) -> Callable[[float], None]:
+def percent(listener: Callable[[str], None]) -> Callable[[float], None]:
     """Make a function of the fraction done that reports only new per cents: it is called every physics step."""
     before = -1
 
-    def progress(fraction: float) -> None:
+    def report(done: float) -> None:
         nonlocal before
-        if int(100 * fraction) != before:
-            before = int(100 * fraction)
-            say(f"{before} %")
+        if int(100 * done) != before:
+            before = int(100 * done)
+            listener(f"{before} %")
 
-    return progress
+    return report
 
 
 @contextmanager
 def show_stage(text: str) -> Iterator[None]:
     """Show a stage within the context, beside the present one; a terminal's line stays as it is."""
-    with status("sonic_bullet") as say:
-        before = _sink.last[1]
-        if not isinstance(say, PipeSay) or text in before:
+    with status("sonic_bullet"):
+        before, display = _sink.last[1], progress_listener()
+        if not isinstance(display, PipeProgress) or text in before:
             yield
             return
-        say(f"{before}: {text}" if before else text)
+        display(f"{before}: {text}" if before else text)
         try:
             yield
         finally:
-            say(before)
+            display(before)
+
+
+def in_every_process() -> bool:
+    """Return whether a process that is forked from here reaches whoever listens by itself."""
+    return progress_listener() is ignore_progress or isinstance(progress_listener(), PipeProgress)
 
 
 def is_shown() -> bool:

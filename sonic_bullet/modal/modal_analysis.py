@@ -8,7 +8,7 @@ Solved without units: lengths by the body's diagonal L, stiffness by its largest
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from sonic_bullet.geometry import oversize
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import show_progress
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.meshing.surfaces import given_wall_m
 from sonic_bullet.modal.methods import chosen, converged
@@ -48,7 +48,7 @@ class _Unit:
     note: str
 
 
-@says_so(text="progress")
+@show_progress()
 @one_thread()
 def analyse(
     shapes: tuple[Shape, ...],
@@ -62,7 +62,6 @@ def analyse(
     edge_m: float | None = None,
     exact_shapes: bool = False,
     cache: Path | Literal["default"] | None = "default",
-    progress: Callable[[str], None] | None = None,
 ) -> ModalModel:
     """Compute the vibration modes of a body up to to_hz, or its lowest ``count``.
 
@@ -85,8 +84,6 @@ def analyse(
         Shapes as solved, for whoever derives strains from them and rounds them then; else rounded.
     cache
         Folder, "default" or None.
-    progress
-        Called with a line of text now and then.
 
     Raises
     ------

@@ -14,7 +14,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.modal.isotropic_family import Family, mixed
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.methods import chosen, converged
@@ -36,11 +35,10 @@ def family(
     fixed: tuple[tuple[float, float, float, float], ...] = (),
     edge_m: float | None = None,
     cache: store.Place = "default",
-    progress: Callable[[str], None] | None = None,
 ) -> Family:
     """Build the family of one body about a guess, its modes true up to to_hz at the guessed γ.
 
-    fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
+    fixed, edge_m, cache: as in `analyse`. Raises MeshError, ModalError.
     """
     beyond = 1.1  # × the limit on λ: a mode above it at one ν may lie below it at the other
     length = diagonal_m((shape,))
@@ -68,18 +66,17 @@ def family(
     kept = (cache, solid_key((shape,), None, edge_m))
     low, high = _poissons(poisson)
     wanted = Wanted(limit, SECTORS.most_modes, beyond)
-    with progress_to(progress):
-        method = chosen(
-            (shape,),
-            length,
-            mixed(max(low, high), *_lame_shear()),
-            wanted,
-            clamp=clamp,
-            edge_m=edge_m,
-            thickness_m=None,
-            kept=kept,
-        )
-        made = _reduced(method, length, wanted, (low, high))
+    method = chosen(
+        (shape,),
+        length,
+        mixed(max(low, high), *_lame_shear()),
+        wanted,
+        clamp=clamp,
+        edge_m=edge_m,
+        thickness_m=None,
+        kept=kept,
+    )
+    made = _reduced(method, length, wanted, (low, high))
     # the cache holds finite numbers: -1 is an unknown error
     numbers = np.array([made.volume_m3, made.count, made.meshed, np.nan_to_num(made.error, nan=-1.0)])
     arrays = {

@@ -10,14 +10,13 @@ eight small problems. The reduced modes lie above the true ones, the most by les
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.machine.progress import progress_to, report_progress
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.keys import key
 from sonic_bullet.modal.modal_analysis import diagonal_m
@@ -133,11 +132,10 @@ def tensor_family(
     fixed: tuple[tuple[float, float, float, float], ...] = (),
     edge_m: float | None = None,
     cache: store.Place = "default",
-    progress: Callable[[str], None] | None = None,
 ) -> TensorFamily:
     """Build the orthotropic family of one body: its lowest ``count`` modes.
 
-    poisson: about that of the anchors. fixed, edge_m, cache, progress: as in `analyse`. Raises MeshError, ModalError.
+    poisson: about that of the anchors. fixed, edge_m, cache: as in `analyse`. Raises MeshError, ModalError.
     """
     length = diagonal_m((shape,))
     count = min(count, SECTORS.most_modes)
@@ -162,10 +160,9 @@ def tensor_family(
         return _joined(
             a["part"], a["ends"], a["skin"], a["vertex"], a["face"], (length, float(volume), count, bool(meshed)), note
         )
-    with progress_to(progress):
-        made = _of_box(shape, length, count, poisson) if edge_m is None and not len(clamp) else None
-        if made is None:
-            made = _of_elements(shape, length, count, poisson, clamp, edge_m)
+    made = _of_box(shape, length, count, poisson) if edge_m is None and not len(clamp) else None
+    if made is None:
+        made = _of_elements(shape, length, count, poisson, clamp, edge_m)
     body = made.body
     numbers = np.array([body.volume_m3, body.meshed])
     store.save(

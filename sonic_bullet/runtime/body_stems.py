@@ -8,11 +8,12 @@ is its stem. Pressure is linear in the sources [Pierce 1989, sec. 4-3], so the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.body_lifetime import admit, release
 from sonic_bullet.runtime.channels.body_images import completed
@@ -32,8 +33,6 @@ def render_per_body(
     frames: int | None = None,
     observer: StepObserver | None = None,
     room: RoomPlan | None = None,
-    progress: Callable[[float], None] | None = None,
-    say: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[Array, Array]]:
     """Render pieces as `render_blocks`, before bodies are summed.
 
@@ -48,14 +47,17 @@ def render_per_body(
         Observer that is called with every step.
     room
         What it is in.
-    progress, say
-        As of `render_log`, and so are errors.
+
+    Raises
+    ------
+    AudioError, LogError
+        As `render_log`.
     """
     from sonic_bullet.files import check_sr
     from sonic_bullet.runtime.replay import make_radiation_known, quenched_steps, together
 
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
-    make_radiation_known(log, say)
+    make_radiation_known(log)
     setup = Setup(
         log.sr, log.sensors, log.seed, log.air, residual=log.residual, apart=True, supports=log.supports, room=room
     )
@@ -75,8 +77,7 @@ def render_per_body(
         if state.present is not state.body and done >= looked + LOOK_EVERY:
             looked = done
             release(state)
-        if progress is not None:
-            progress(done / len(log.steps))
+        report_fraction(done / len(log.steps))
     body, frame = state.body, drained(setup, state, last)
     yield body, frame.reshape(len(body), setup.channels, frame.shape[1])
     missing = 0 if frames is None or last is None else frames - clock_after(state).sample(log.sr)

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from sonic_bullet.files.contact_log import ContactLog
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import report_fraction, report_progress, show_progress
 from sonic_bullet.path.room import room_of
 from sonic_bullet.path.room.room_convolution import add_room, keep_with_room
 from sonic_bullet.path.room.room_plan import RoomPlan
@@ -44,7 +43,6 @@ __all__ = [
 ]
 
 
-@says_so(text="say", fraction="progress")
 def render_log(
     log: ContactLog,
     *,
@@ -79,7 +77,8 @@ def render_log(
     SceneError
         The room is smaller than what is in it, or its response has other channels.
     """
-    blocks = [*render_blocks(log, sr=sr, residual=residual, room=room, progress=progress, say=say)]
+    with show_progress(as_call(say, "say"), as_call(progress, "progress"), in_percent=True):
+        blocks = [*render_blocks(log, sr=sr, residual=residual, room=room)]
     return np.ascontiguousarray(np.concatenate(blocks, axis=1))
 
 
@@ -89,22 +88,20 @@ def render_blocks(
     sr: int | None = None,
     residual: bool | None = None,
     room: ShoeboxRoom | RoomResponse | None = None,
-    progress: Callable[[float], None] | None = None,
-    say: Callable[[str], None] | None = None,
 ) -> Iterator[Array]:
     """Render a contact log in pieces (channels, n) of some steps each, for logs longer than the memory.
 
     Arguments and errors: as of `render_log`; arguments are checked at once.
     """
-    log, residual = _checked(log, sr, residual, progress, say)
+    log, residual = _checked(log, sr, residual)
     if room is None:
-        return _blocks(log, _synthesizer(log, residual), progress, say)
+        return _blocks(log, _synthesizer(log, residual))
     plan = room_of(room, log)
     log = replace(log, sensors=plan.sensors)
-    return add_room(plan, _blocks(log, _synthesizer(log, residual, plan), progress, say))
+    return add_room(plan, _blocks(log, _synthesizer(log, residual, plan)))
 
 
-def _checked(log: ContactLog, sr: object, residual: object, progress: Any, say: Any) -> tuple[ContactLog, bool]:
+def _checked(log: ContactLog, sr: object, residual: object) -> tuple[ContactLog, bool]:
     """Check the arguments; return a log at the rate asked for, and whether residuals sound.
 
     Raises AudioError, LogError.
@@ -114,7 +111,6 @@ def _checked(log: ContactLog, sr: object, residual: object, progress: Any, say: 
     as_kind(log, ContactLog, "log", "give listener.contacts, or read_log(path)", error=LogError)
     log = replace(log, sr=check_sr(sr if sr is not None else log.sr))
     residual = log.residual if residual is None else as_flag(residual, "residual")
-    as_call(progress, "progress"), as_call(say, "say")
     return log, residual
 
 
@@ -125,8 +121,6 @@ def render_kept(
     residual: bool | None = None,
     tail_db: float | None = None,
     plan: RoomPlan | None = None,
-    progress: Callable[[float], None] | None = None,
-    say: Callable[[str], None] | None = None,
 ) -> KeptSound:
     """Render a contact log, beyond a few seconds into a nameless temporary file.
 
@@ -140,13 +134,13 @@ def render_kept(
         The exception, Ctrl-C too, carries what was rendered so far as ``kept``.
     """
     tail_db = as_tail_db(tail_db)
-    log, residual = _checked(log, sr, residual, progress, say)
+    log, residual = _checked(log, sr, residual)
     if plan is not None:
         log = replace(log, sensors=plan.sensors)
     synth = _synthesizer(log, residual, plan)
     spool = SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing))
     try:
-        for block in _blocks(log, synth, progress, say):
+        for block in _blocks(log, synth):
             if spool.tail[0]:
                 spool.add(block)
         sound = spool.kept() if spool.tail[0] else KeptSound.of(block)
@@ -159,10 +153,8 @@ def render_kept(
         raise
 
 
-def _blocks(
-    log: ContactLog, synth: Synthesizer, progress: Callable[[float], None] | None, say: Callable[[str], None] | None
-) -> Iterator[Array]:
-    make_radiation_known(log, say)
+def _blocks(log: ContactLog, synth: Synthesizer) -> Iterator[Array]:
+    make_radiation_known(log)
     quenches = quenched_steps(log)
     done = 0
     for steps in together(log.steps, quenches):
@@ -170,8 +162,7 @@ def _blocks(
             synth.quench()
         yield synth.play(steps, log.bodies)
         done += len(steps)
-        if progress is not None:
-            progress(done / len(log.steps))
+        report_fraction(done / len(log.steps))
     yield synth.rest()
 
 
@@ -182,12 +173,11 @@ def _synthesizer(log: ContactLog, residual: bool, room: RoomPlan | None = None) 
     )  # fmt: skip
 
 
-def make_radiation_known(log: ContactLog, say: Callable[[str], None] | None) -> None:
-    """Compute the radiation of the bodies' modes where it is not cached; report each to ``say``."""
+def make_radiation_known(log: ContactLog) -> None:
+    """Compute the radiation of the bodies' modes where it is not cached."""
     for body in log.bodies if log.sensors else ():
         if body.model is not None and body.model.mode_count:
-            if say is not None:
-                say(f"how {format_count(body.model.mode_count, 'mode')} of {body.name} radiate")
+            report_progress(f"how {format_count(body.model.mode_count, 'mode')} of {body.name} radiate")
             radiation_of(body.model, log.air)
 
 
@@ -214,12 +204,9 @@ def same_bodies(one: Step, other: Step) -> bool:
     return one.body is other.body or np.array_equal(one.body, other.body)
 
 
-def log_frames(log: ContactLog, *, say: Callable[[str], None] | None = None) -> Iterator[Array]:
-    """Render a contact log a step at a time, as `Listener.frame` had it: (channels, n), `LATENCY_STEPS` late.
-
-    say is called with what is being computed before the first step.
-    """
-    make_radiation_known(log, say)
+def log_frames(log: ContactLog) -> Iterator[Array]:
+    """Render a contact log a step at a time, as `Listener.frame` had it: (channels, n), `LATENCY_STEPS` late."""
+    make_radiation_known(log)
     synth = _synthesizer(log, log.residual)
     quenches = quenched_steps(log)
     for number, step in enumerate(log.steps):

@@ -25,8 +25,8 @@ from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
 from sonic_bullet.machine.compiled import folder as code_folder
-from sonic_bullet.machine.progress import says_so
-from sonic_bullet.parallel import one_thread, parallel_map, said_here
+from sonic_bullet.machine.progress import progress_under, report_progress, show_progress
+from sonic_bullet.parallel import one_thread, parallel_map
 from sonic_bullet.radiation.radiated import radiation_of
 from sonic_bullet.records import Air, Material, ModalModel, Shape
 from sonic_bullet.records.coerce import as_kind, as_number, check_options, quote
@@ -39,8 +39,6 @@ from sonic_bullet.runtime.replay import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,14 +157,12 @@ def _naming(link: str, of: int) -> Iterator[None]:
         raise type(error)(what, error.remedy + rest) from error
 
 
-@says_so(text="progress")
+@show_progress()
 def solved_bodies(
     world: World,
     wanted: Sequence[BodyRequest],
     known: Iterable[ModalModel],
     air: Air | None,
-    *,
-    progress: Say | None = None,
 ) -> list[list[ModalModel]]:
     """Return the models of each body's links.
 
@@ -177,15 +173,14 @@ def solved_bodies(
     air
         The medium; None: no sensor receives them.
     """
-    assert progress is not None
     with one_thread():
-        _prepare(world, wanted, air, progress)
+        _prepare(world, wanted, air)
         models, shared = [], list(known)
         for one in wanted:
-            mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared, progress)
+            mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared)
             for (name, _), model in zip(one.parts, mine, strict=True):
                 if air is not None and model.mode_count:
-                    progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
+                    report_progress(f"how {format_count(model.mode_count, 'mode')} of {name} radiate")
                     with _naming(name, len(one.parts)):
                         radiation_of(model, air)
             shared += mine
@@ -223,7 +218,7 @@ def oversize_notes(wanted: Sequence[BodyRequest], models: Sequence[Sequence[Moda
                 yield f"{name} {large}; {remedy}"
 
 
-def _solved(one: BodyRequest, known: Sequence[ModalModel], say: Say) -> list[ModalModel]:
+def _solved(one: BodyRequest, known: Sequence[ModalModel]) -> list[ModalModel]:
     """Compute the models of a body's links; check all and mesh the most intricate first, to fail early."""
     from sonic_bullet import modal
 
@@ -237,15 +232,15 @@ def _solved(one: BodyRequest, known: Sequence[ModalModel], say: Say) -> list[Mod
         name, shapes = one.parts[i]
         head = f"modes of {name}" + (f", {len(models) + 1} of {len(one.parts)}" if several else "")
         if several:
-            say(head)
-        with _naming(name, len(one.parts)):
-            solved = _analysed(shapes, one, lambda text, head=head: say(f"{head}: {text}"))  # type: ignore[misc]
+            report_progress(head)
+        with progress_under(head), _naming(name, len(one.parts)):
+            solved = _analysed(shapes, one)
             models[i] = _shared(solved, (*known, *models.values()))
     return [models[i] for i in range(len(one.parts))]
 
 
-def _analysed(shapes: tuple[Shape, ...], one: BodyRequest, say: Say) -> ModalModel:
-    return analyse_body(shapes, one.material, **asdict(one.options), progress=say)
+def _analysed(shapes: tuple[Shape, ...], one: BodyRequest) -> ModalModel:
+    return analyse_body(shapes, one.material, **asdict(one.options))
 
 
 def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
@@ -262,19 +257,20 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None, say: Say) -> None:
+def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None) -> None:
     """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
-    missing, say_here, say = _missing(wanted), say, said_here(say)
+    missing = _missing(wanted)
 
     def solve(number: int, name: str, shapes: tuple[Shape, ...], one: BodyRequest) -> None:
         head = f"modes of {name}" + (f", {number} of {len(missing)}, two at a time" if len(missing) > 1 else "")
-        model = _analysed(shapes, one, lambda text: say(f"{head}: {text}"))
-        if air is not None and model.mode_count:
-            say(f"{head}: how they radiate")
-            radiation_of(model, air)
+        with progress_under(head):
+            model = _analysed(shapes, one)
+            if air is not None and model.mode_count:
+                report_progress("how they radiate")
+                radiation_of(model, air)
 
     def make(which: str, ready: Callable[[], None]) -> None:
-        say(f"machine code of {which}, kept for later runs")
+        report_progress(f"machine code of {which}, kept for later runs")
         ready()
 
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
@@ -283,7 +279,7 @@ def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None, say: 
             jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
         jobs.insert(2, partial(make, "the listener", world.make_ready))
     if jobs:
-        parallel_map(_done, jobs, say_here)
+        parallel_map(_done, jobs)
 
 
 def _done(job: Callable[[], None]) -> None:

@@ -6,11 +6,11 @@ ContactLog + MaterialChoice -> each body's surface, from its model in the log ->
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, replace
 
 from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Body, Material, ModalModel, Shape
 from sonic_bullet.records.errors import LogError, MeshError, ModalError
 from sonic_bullet.records.modal_options import ModalOptions
@@ -18,9 +18,7 @@ from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.material_choice import MaterialChoice
 
 
-def with_choice(
-    log: ContactLog, choice: MaterialChoice, where: str, say: Callable[[str], None] | None = None
-) -> tuple[ContactLog, tuple[str, ...]]:
+def with_choice(log: ContactLog, choice: MaterialChoice, where: str) -> tuple[ContactLog, tuple[str, ...]]:
     """Return the log with its bodies made of the chosen materials, and silent where chosen, and notes for the user.
 
     Modes are those of the body's surface in the log, clamped and counted as before.
@@ -55,7 +53,7 @@ def with_choice(
         material = choice.material_of(body.name)
         if material is not None and (body.material is not None or choice.names(body.name)):
             changed[body.name] = material.name
-            bodies.append(replace(_made_of(body, material, where, solved, say), silent=silent))
+            bodies.append(replace(_made_of(body, material, where, solved), silent=silent))
         else:
             bodies.append(replace(body, silent=silent))
     idle = choice.silent_notes(body for body in log.bodies if not body.silent)
@@ -63,13 +61,7 @@ def with_choice(
     return replace(log, bodies=tuple(bodies)), (*((f"{said}: {as_recorded}",) if changed else ()), *idle)
 
 
-def _made_of(
-    body: Body,
-    chosen: Material,
-    where: str,
-    solved: dict[tuple[int, int, str], ModalModel],
-    say: Callable[[str], None] | None,
-) -> Body:
+def _made_of(body: Body, chosen: Material, where: str, solved: dict[tuple[int, int, str], ModalModel]) -> Body:
     material = with_material(chosen)
     if body.material is None:
         raise LogError(
@@ -80,13 +72,12 @@ def _made_of(
         return replace(body, material=material)
     key = id(body.model), id(chosen), repr(body.options)
     if key not in solved:
-        if say is not None:
-            say(f"modes of {body.name} in {chosen.name}")
+        report_progress(f"modes of {body.name} in {chosen.name}")
         # the surface is that of the solid, whatever wall an open one was given
         options = asdict(replace(body.options or ModalOptions(), thickness_m=None))
         surface = Shape("mesh", vertex_m=body.model.vertex_m, face=body.model.face)
         try:
-            solved[key] = analyse_body((surface,), material, **options, progress=say)
+            solved[key] = analyse_body((surface,), material, **options)
         except (MeshError, ModalError) as error:
             raise type(error)(f"{body.name}: {error.what}", error.remedy) from error
     return replace(body, material=material, model=solved[key])

@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from sonic_bullet.effects.presets_of_effects import needs_exact_shapes, with_material, with_modes
-from sonic_bullet.machine.progress import Say
 from sonic_bullet.modal import read_mesh
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.modal.model_of_size import check_isotropic, model_of_size
@@ -93,7 +92,6 @@ def known_shape(
     *,
     largest: float = 1.0,
     to_hz: float = HEARING_LIMIT_HZ,
-    progress: Say | None = None,
 ) -> KnownShape:
     """Solve a shape once, for every isotropic material among ``materials`` and near them, and every size.
 
@@ -107,8 +105,6 @@ def known_shape(
         Size up to which they are known.
     to_hz
         Frequency up to which they are known, at every size.
-    progress
-        Called with what is being done.
 
     Raises
     ------
@@ -131,6 +127,5 @@ def known_shape(
         gamma_m2_s2=gamma,
         poisson=poisson,
         to_hz=to_hz * largest * frequency_margin,
-        progress=progress or (lambda _: None),
     )
     return KnownShape(found, largest, gamma, to_hz)

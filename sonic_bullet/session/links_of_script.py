@@ -24,7 +24,6 @@ def add_links(
     listener: Listener,
     cast: Mapping[tuple[int, int], Material],
     static: Callable[[int, int], bool],
-    progress: Callable[[str], None] | None = None,
 ) -> tuple[str, ...]:
     """Add those links that can sound, each with its material; return notes on the silent partners.
 
@@ -45,13 +44,13 @@ def add_links(
         except SonicBulletError as error:
             notes.append(_silent(listener, who, error))
     try:
-        listener.add_all(sounding, progress=progress)
+        listener.add_all(sounding)
     except MaterialError:
         raise
     except SonicBulletError:
         for who, material in sounding.items():
             try:
-                listener.add_all({who: material}, progress=progress)
+                listener.add_all({who: material})
             except SonicBulletError as error:
                 notes.append(_silent(listener, who, error))
     return tuple(notes)

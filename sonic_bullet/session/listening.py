@@ -22,6 +22,7 @@ from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener.opening import open_simulator
 from sonic_bullet.listener.world import World
 from sonic_bullet.live import AHEAD_S, FULL_SCALE_PA, Playback, start_playback
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape, channels_of
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
@@ -153,7 +154,8 @@ class Listener:
             "fixed": fixed, "thickness_m": thickness_m, "to_hz": to_hz, "count": count, "accuracy": accuracy,
             "mounting": mounting, "tail": tail,
         }  # fmt: skip
-        return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)], progress)[0]
+        with progress_to(as_call(progress, "progress")):
+            return () if absent(body) else self._added([wanted_body(self.world, body, link, **how)])[0]
 
     def add_all(
         self, cast: Mapping[Any, Any], *, progress: Callable[[str], None] | None = None
@@ -163,16 +165,14 @@ class Listener:
         cast: from a body, (body, link) or (body, "all") to its material, or to keywords of `add`. What the cache lacks
         is computed side by side, on two cores. progress, warnings, errors: as of `add`.
         """
-        return self._added(wanted_cast(self.world, cast, keywords(Listener.add)), progress)
+        with progress_to(as_call(progress, "progress")):
+            return self._added(wanted_cast(self.world, cast, keywords(Listener.add)))
 
-    def _added(
-        self, wanted: Sequence[BodyRequest], progress: Callable[[str], None] | None
-    ) -> list[tuple[ModalModel, ...]]:
+    def _added(self, wanted: Sequence[BodyRequest]) -> list[tuple[ModalModel, ...]]:
         """Add bodies and return their models."""
-        as_call(progress, "progress")
         asked = checked(self.world, wanted)
         wanted = choose_materials(self.world, asked)
-        models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None, progress=progress)
+        models = solved_bodies(self.world, wanted, self._models, self.air if self.sensors else None)
         self._models.update(dict.fromkeys(model for mine in models for model in mine))
         return enter_bodies(self.world, wanted, models, asked)
 

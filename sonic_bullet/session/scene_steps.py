@@ -18,7 +18,7 @@ from sonic_bullet.listener import (
     run_script,
     watch_settings,
 )
-from sonic_bullet.machine.progress import Say
+from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Sensor
 from sonic_bullet.records.coerce import as_number
 from sonic_bullet.records.errors import SceneError
@@ -29,7 +29,6 @@ from sonic_bullet.session.material_choice import MaterialChoice
 from sonic_bullet.session.scene_file import scene_module, user_code, uses_sonic_bullet
 
 DEFAULT_SECONDS = 4.0
-Progress = Callable[[float], None]
 
 
 class SceneStage(Protocol):
@@ -68,7 +67,7 @@ def as_seconds(seconds: object, name: str) -> float:
     return as_number(seconds, name, "give seconds of physics time, above 0", above=0, most=1e6, error=SceneError)
 
 
-def run_built(stage: SceneStage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
+def run_built(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run a file with `build` for so many seconds of physics time; notes a user should read."""
     module = scene_module(stage.path)
     stage.client = client = direct_client()  # dropped, it would end before its world is looked at
@@ -80,12 +79,12 @@ def run_built(stage: SceneStage, seconds: float | None, progress: Progress | Non
     places = stage.microphones if stage.microphones is not None else getattr(module, "MICROPHONE", (0.0, -1.0, 0.5))
     stage.listener = listener = stage.attached(client, places)
     stage.microphones = None
-    user_code(stage.path, partial(listener.add_all, cast, progress=say))
+    user_code(stage.path, partial(listener.add_all, cast))
     said: tuple[str, ...] = ()
     if stage.choice:
         stage.check_names()
         static = partial(is_static, client._client)
-        said = add_links(listener, named_links(listener.world, stage.choice), static, say)
+        said = add_links(listener, named_links(listener.world, stage.choice), static)
     act = getattr(module, "act", None)
     stage.ready()
     own = getattr(module, "SECONDS", DEFAULT_SECONDS)
@@ -94,12 +93,11 @@ def run_built(stage: SceneStage, seconds: float | None, progress: Progress | Non
         if act is not None:
             user_code(stage.path, act, client, listener.time_s)
         client.stepSimulation()
-        if progress is not None:
-            progress(min(listener.time_s / total, 1.0))
+        report_fraction(min(listener.time_s / total, 1.0))
     return said
 
 
-def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | None, say: Say | None) -> tuple[str, ...]:
+def run_plain(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run a script for so many seconds of physics time; notes a user should read."""
     default_material = "plastic"
     total = seconds if seconds is not None else DEFAULT_SECONDS
@@ -114,7 +112,7 @@ def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | Non
                 stage.ready()
 
         try:
-            run_script(stage.path, (look, None), total, names=names, progress=progress)
+            run_script(stage.path, (look, None), total, names=names)
         finally:  # where it fails, the sound so far is kept too
             stage.listener = _listener_in(names)
         stage.adds = True
@@ -134,13 +132,13 @@ def run_plain(stage: SceneStage, seconds: float | None, progress: Progress | Non
         came = [body for body in body_ids(client) if body not in known]
         known.update(came)
         if new := [who for body in came for who in links_with_shapes(client, body)]:
-            said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client), say))
+            said.extend(add_links(stage.listener, dict.fromkeys(new, material), partial(is_static, client)))
         stage.ready()
 
     def after(_: int) -> None:
         stage.need_listener().step()
 
-    run_script(stage.path, (before, after), total, progress=progress)
+    run_script(stage.path, (before, after), total)
     apart = ", ".join(f"{name} as {one.name}" for name, one in stage.choice.named.items())
     but = f", but {apart}" if apart else ""
     return (f"every body sounds as {material.name}{but}: the script names no materials", *said)

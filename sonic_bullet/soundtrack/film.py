@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -17,7 +17,7 @@ import numpy as np
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.levels import FileLevel, check_levels, find_level
 from sonic_bullet.listener.pictures import Camera, Standing, open_pictures
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import report_fraction, show_progress
 from sonic_bullet.parallel import arrays_in_order
 from sonic_bullet.records import Array
 from sonic_bullet.records.coerce import nearest
@@ -87,7 +87,7 @@ def pictures_in(log: ContactLog, fps: Fraction, seconds: float | None = None) ->
     return max(math.ceil(wanted * fps), 1)
 
 
-@says_so(fraction="progress")
+@show_progress(in_percent=True)
 def make_film(
     path: str | os.PathLike[str],
     log: ContactLog,
@@ -102,7 +102,6 @@ def make_film(
     peak_dbfs: float | None = None,
     lufs: float | None = None,
     level: FileLevel | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> FilmReport:
     """Make a film of a log with its sound (channels, n) in pascals, whole or not at all; two processes draw.
 
@@ -118,8 +117,6 @@ def make_film(
         Of the sound, None: the container's usual one.
     level
         Found before, in place of peak_dbfs and lufs.
-    progress
-        Called with the fraction done.
 
     Raises
     ------
@@ -156,8 +153,7 @@ def make_film(
         ) as film:
             for picture in arrays_in_order(draw, count, (height, width, 3), np.uint8):
                 film.write(picture)
-                if progress is not None:
-                    progress(film.pictures / count)
+                report_fraction(film.pictures / count)
     finally:
         drawer.close()
     return FilmReport(

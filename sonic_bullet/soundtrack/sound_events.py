@@ -14,7 +14,7 @@ support; a load that leaps and is not accepted is a strike without a cause.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Literal, NamedTuple
@@ -305,19 +305,13 @@ def level_db(pressure_pa: float) -> float:
     return 20 * float(np.log10(pressure_pa / REFERENCE_PRESSURE_PA))
 
 
-def find_sound_events(
-    log: ContactLog,
-    *,
-    sr: int | None = None,
-    progress: Callable[[float], None] | None = None,
-    say: Callable[[str], None] | None = None,
-) -> tuple[SoundEvent, ...]:
+def find_sound_events(log: ContactLog, *, sr: int | None = None) -> tuple[SoundEvent, ...]:
     """Find all events of a log, whose sound is rendered for it and not kept.
 
     Arguments, errors: as of `render_per_body`.
     """
     observer = EventObserver(log)
-    for _ in render_per_body(log, sr=sr, observer=observer, progress=progress, say=say):
+    for _ in render_per_body(log, sr=sr, observer=observer):
         pass
     return observer.events()
 

@@ -46,8 +46,6 @@ def render_stems(
     frames: int | None = None,
     observer: StepObserver | None = None,
     plan: RoomPlan | None = None,
-    progress: Callable[[float], None] | None = None,
-    say: Callable[[str], None] | None = None,
 ) -> tuple[Stem, ...]:
     """Render the sound of every body with a model, all in one run; the sum is `render_log`'s.
 
@@ -59,9 +57,7 @@ def render_stems(
     who = [index for index, body in enumerate(log.bodies) if body.model is not None]
     sounding = log if plan is None else replace(log, sensors=plan.sensors)
     spools = {index: SoundSpool(channels_of(log.sensors) if plan is None else len(plan.mixing)) for index in who}
-    for body, frame in render_per_body(
-        sounding, sr=sr, frames=frames, observer=observer, room=plan, progress=progress, say=say
-    ):
+    for body, frame in render_per_body(sounding, sr=sr, frames=frames, observer=observer, room=plan):
         there = dict(zip(body.tolist(), frame, strict=True))
         nothing = np.zeros(frame.shape[1:])
         for index, spool in spools.items():

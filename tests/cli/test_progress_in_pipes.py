@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 import trimesh
 
-from sonic_bullet.machine.progress import CALL_QUIET_S, ProgressLines, status
+from sonic_bullet.machine.progress import CALL_QUIET_S, ProgressLines, report_progress, show_progress, status
 from tests.few_cases import parametrize_few
 
 EVERY_S = 4.0
@@ -252,8 +252,8 @@ def test_a_thread_speaks_and_is_gone(monkeypatch: pytest.MonkeyPatch, capsys: py
     before = set(threading.enumerate())
     names: list[Any] = ["cup\x1b[2J", "two\nlines", "Ж" * 999]
     for name in names:
-        with status("sonic_bullet") as say:
-            say(f"modes of {name}")
+        with status("sonic_bullet"):
+            report_progress(f"modes of {name}")
             time.sleep(0.6)
     assert set(threading.enumerate()) == before
     lines = capsys.readouterr().err.splitlines()
@@ -261,19 +261,16 @@ def test_a_thread_speaks_and_is_gone(monkeypatch: pytest.MonkeyPatch, capsys: py
     assert lines[0].endswith("modes of cup?[2J") and lines[1].endswith("modes of two lines")
 
 
-def test_a_caller_who_listens_is_told_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_caller_who_listens_is_told_alone(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """progress=… of `listener.add` in place of lines: nothing on stderr."""
-    from sonic_bullet.machine.progress import says_so
-
     monkeypatch.delenv("SONIC_BULLET_PROGRESS", raising=False)
-    seen: list[object] = []
-
-    @says_so(text="say", fraction="progress")
-    def work(**options: Any) -> None:
-        seen.append(options)
-
-    mine = seen.append
-    work(say=mine)
-    work()
-    assert seen[0] == {"say": mine}
-    assert set(seen[1]) == {"say", "progress"}  # type: ignore[call-overload]
+    monkeypatch.setattr("sonic_bullet.machine.progress.CALL_QUIET_S", 0.0)
+    seen: list[str] = []
+    for mine in (seen.append, None):
+        with show_progress(mine):
+            report_progress("modes of cup")
+            time.sleep(0.3)
+    assert seen == ["modes of cup"]
+    assert "modes of cup" in capsys.readouterr().err

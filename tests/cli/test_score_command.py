@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files import read_audio, read_log
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.runtime.replay import render_log
 from sonic_bullet.soundtrack.score.scoring import read_animation, score_scene
@@ -227,6 +228,6 @@ def test_a_scene_that_is_stopped_after_its_simulation_is_kept(place: Path, at: f
         if share > at:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt) as caught:
-        score_scene("hand.py", sr=8000, progress=stop)
+    with pytest.raises(KeyboardInterrupt) as caught, progress_to(fraction=stop):
+        score_scene("hand.py", sr=8000)
     assert caught.value.partial.sound.samples().any()  # type: ignore[attr-defined]

@@ -14,6 +14,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet import modal
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.errors import MeshError, ModalError, SceneError
 from tests.made.models import STEEL
 from tests.made.worlds import plate_model
@@ -52,10 +53,8 @@ class Solver:
         self.fails_at_m, self.pause_s = fails_at_m, pause_s
         self.solved_m: list[float] = []
 
-    def __call__(
-        self, shapes: tuple[sb.Shape, ...], *_: Any, progress: Callable[[str], None], **__: Any
-    ) -> sb.ModalModel:
-        progress("filling")
+    def __call__(self, shapes: tuple[sb.Shape, ...], *_: Any, **__: Any) -> sb.ModalModel:
+        report_progress("filling")
         time.sleep(self.pause_s)
         size_m = round(float(shapes[0].size_m.max()), 6)
         if size_m == self.fails_at_m:
@@ -172,7 +171,7 @@ def test_what_the_cache_lacks_is_solved_beforehand_each_once(
     twins, seen = robot(client, tmp_path / "twins", foot=ARM, arm=ARM), []
     made, before = solver(beforehand=True, fails_at_m=0.2), []
 
-    def one_by_one(work: Callable[[Any], None], items: list[Any], say: Callable[[str], None]) -> None:
+    def one_by_one(work: Callable[[Any], None], items: list[Any]) -> None:
         for item in items:
             work(item)
         before.extend(made.solved_m)
@@ -263,6 +262,6 @@ def test_a_status_within_a_status_writes_into_it(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr("sys.stderr", Terminal())
     seen: list[str] = []
-    with shown_by(seen.append), status("inner") as say:
-        say("something")
+    with shown_by(seen.append), status("inner"):
+        report_progress("something")
     assert seen == ["something"]

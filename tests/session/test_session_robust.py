@@ -11,6 +11,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.listener import disconnect
+from sonic_bullet.machine.progress import progress_to, report_progress
 from sonic_bullet.records.errors import (
     AudioError,
     FileError,
@@ -149,11 +150,12 @@ def test_adding_tells_which_body_is_analysed_and_an_unknown_body_before_any_work
 ) -> None:
     from sonic_bullet import modal
 
-    def analyse(shapes: Any, material: Any, *, progress: Any, **_: Any) -> Any:
-        progress("assembling")
+    def analyse(shapes: Any, material: Any, **_: Any) -> Any:
+        report_progress("assembling")
         return plate_model()
 
     monkeypatch.setattr(modal, "analyse", analyse)
+    monkeypatch.setattr(modal, "missing_name", lambda *_: None)  # nothing is solved side by side beforehand
     body = box(client, (0, 0, 1))
     listener = sb.attach(client)
     told: list[str] = []
@@ -180,8 +182,8 @@ def test_a_script_with_its_own_listener_that_breaks_keeps_what_was_heard(tmp_pat
         "raise ValueError('x')\n"
     )
     shares: list[float] = []
-    with pytest.raises(SceneError, match="line 7: ValueError: x") as error:
-        render_scene(scene, seconds=1, progress=shares.append)
+    with pytest.raises(SceneError, match="line 7: ValueError: x") as error, progress_to(fraction=shares.append):
+        render_scene(scene, seconds=1)
     assert error.value.partial.samples.shape == (1, 4800)  # type: ignore[attr-defined]
     assert shares[-1] == pytest.approx(0.1)
 

@@ -13,6 +13,7 @@ import pytest
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.listener import direct_client, disconnect
 from sonic_bullet.listener.pictures import Camera, ColouredMesh, open_pictures, standing_in
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.records import Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import AudioError, FileError, RecordError, SceneError
@@ -152,9 +153,9 @@ def test_a_film_has_its_sound_and_follows(tmp_path: Path) -> None:
     log = table_log()
     look = FilmLook(fps=Fraction(25), size=(160, 90), follow="marble")
     shares: list[float] = []
-    report = make_film(
-        tmp_path / "x.mov", log, render_kept(log), log.sr, look=look, peak_dbfs=-1, progress=shares.append
-    )
+    sound = render_kept(log)
+    with progress_to(fraction=shares.append):
+        report = make_film(tmp_path / "x.mov", log, sound, log.sr, look=look, peak_dbfs=-1)
     assert (report.pictures, report.samples, report.clipped, report.channels) == (23, 23 * 1920, 0, 2)
     assert shares == pytest.approx([(k + 1) / 23 for k in range(23)])
     film = decoded(tmp_path / "x.mov")

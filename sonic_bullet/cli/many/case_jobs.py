@@ -19,7 +19,7 @@ import click
 
 from sonic_bullet.files.cases import read_case
 from sonic_bullet.jobs.job_processes import Failed
-from sonic_bullet.machine.progress import shown_by
+from sonic_bullet.machine.progress import ignore_progress, shown_by
 from sonic_bullet.records.errors import FileError, SonicBulletError
 
 
@@ -130,7 +130,7 @@ def run_case(command: str, options: Mapping[str, Any], case: CaseFolder) -> Case
         said, warned = io.StringIO(), io.StringIO()
         try:
             # warnings and reports name files as they are named from here
-            with chdir(root.parent), redirect_stdout(said), redirect_stderr(warned), shown_by(_silent):
+            with chdir(root.parent), redirect_stdout(said), redirect_stderr(warned), shown_by(ignore_progress):
                 commands_of[command](case.name, out, options)
         except click.exceptions.Exit:
             pass  # farther from the recordings than silence: its verdict says so
@@ -165,7 +165,3 @@ def _diagnose(source: str, out: Path, options: Mapping[str, Any]) -> None:
 
 def _inside(out: Path, name: str | None) -> str | None:
     return None if name is None else str(out / name)
-
-
-def _silent(_: str) -> None:
-    """Drop a line of progress: of many cases only their number is told."""

@@ -49,21 +49,21 @@ def run_many(
     made_by = {"command": command, "options": options, "versions": package_versions()}
     own = [case.name for case in cases]
     do = partial(run_case, command, options)
-    with clean_stdout(to) as say, status(format_count(len(cases), "case")) as tell:
+    with clean_stdout(to) as echo, status(format_count(len(cases), "case")):
         with (
             open_workers(many.workers or cores(), many.limit_s or 3600.0, many.scheduler) as crew,
             open_job_folder(root, "run.json", made_by, kind="run", own=own) as place,
         ):
             missing = [case for case in cases if not _is_done(place, case)]
             made, failures = finish_jobs(
-                do, missing, crew, say=tell,
+                do, missing, crew,
                 keep=lambda case, found: _keep(place / case.name, found),
                 write_lists=lambda failed: _write_lists(command, place, cases, failed),
             )  # fmt: skip
             rows = _rows(command, place, cases)
         failed = {case.name: reason for case, reason in failures.items()}
         summary = CasesReport(command, rows, made, failed)
-        print_report(summary, say)
+        print_report(summary, echo)
     write_json(to, summary.to_json())
     if failed or any(row["verdict"] == "worse-than-silence" for row in rows):
         raise click.exceptions.Exit(1)

@@ -60,7 +60,7 @@ def dataset(
 
     (to,) = places(json_to)
     root = folder_place(folder)
-    with clean_stdout(to) as say, status(recipe) as tell:
+    with clean_stdout(to) as echo, status(recipe):
         with quiet_stderr():
             from sonic_bullet.dataset.making import make_dataset
             from sonic_bullet.dataset.object_splits import as_shares
@@ -68,9 +68,9 @@ def dataset(
         made = make_dataset(
             read_recipe(recipe), root, count=count, first=first, seed=seed, sr=sr,
             workers=workers or cores(), limit_s=limit_s, formats=formats,
-            shares=as_shares(shares), scheduler=scheduler, say=tell,
+            shares=as_shares(shares), scheduler=scheduler,
         )  # fmt: skip
-        print_report(made, say)
+        print_report(made, echo)
     write_json(to, made.to_json())
     if made.failures:
         raise click.exceptions.Exit(1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from sonic_bullet.cli.parameters import json_option, scene_options
 from sonic_bullet.cli.scenes.scene_runs import DEFAULT_SR, WantedMaterials, check_scene_file, is_log
 from sonic_bullet.cli.scenes.space_options import OPTIONS as SPACE_OPTIONS
 from sonic_bullet.cli.scenes.space_options import SpaceWish, space_options
+from sonic_bullet.machine.progress import fraction_listener, progress_to, report_progress
 from sonic_bullet.records.errors import AudioError, SceneError
 
 if TYPE_CHECKING:
@@ -58,15 +58,15 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
     given = {name: value for name, value in options.items() if value not in (None, ())}
     if given.get("device", "").isdecimal():
         given["device"] = int(given["device"])
-    with clean_stdout(json_to) as say:
-        with progress_bar(path.name) as (progress, tell):
-            show = _Show({name: given.pop(name) for name in card_options if name in given}, progress, tell)
+    with clean_stdout(json_to) as echo:
+        with progress_bar(path.name):
+            show = _Show({name: given.pop(name) for name in card_options if name in given})
             try:
                 notes = (_play_log if is_log(scene) else _play_scene)(scene, given, materials, space, show)
             except KeyboardInterrupt as error:
                 said = [str(error) or "stopped", *([str(show.report)] if show.playback is not None else [])]
                 raise KeyboardInterrupt("; ".join(said)) from error
-        say(str(show.report))
+        echo(str(show.report))
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)
     known = asdict(show.report)
@@ -76,8 +76,8 @@ def play(scene: str, json_to: str | None, **options: Any) -> None:
 class _Show:
     """A playback, and the line on a terminal that shows its progress."""
 
-    def __init__(self, card: dict[str, Any], progress: Callable[[float], None], tell: Callable[[str], None]) -> None:
-        self.card, self.tell, self._progress, self._drawn_s = card, tell, progress, 0.0
+    def __init__(self, card: dict[str, Any]) -> None:
+        self.card, self._draw, self._drawn_s = card, fraction_listener(), 0.0
         self.playback: Playback | None = None
 
     @property
@@ -93,9 +93,9 @@ class _Show:
             failure = self.playback.failure
             raise AudioError(failure.what, f"{failure.remedy}; {self.report}")
         if time.perf_counter() - self._drawn_s > refresh_s:
-            self._progress(share)
+            self._draw(share)
             if self.playback is not None:
-                self.tell(str(self.report))
+                report_progress(str(self.report))
             self._drawn_s = time.perf_counter()
 
 
@@ -119,7 +119,8 @@ def _play_scene(
 
     if space:
         given["receive"] = receive
-    return (*run_scene(scene, begin, **given, **materials.options, progress=show, say=show.tell), *notes)
+    with progress_to(fraction=show):
+        return (*run_scene(scene, begin, **given, **materials.options), *notes)
 
 
 def _play_log(
@@ -134,7 +135,7 @@ def _play_log(
     from sonic_bullet.runtime.replay import LATENCY_STEPS, log_frames
     from sonic_bullet.session.chosen_in_log import with_choice
 
-    log, said = with_choice(read_log(path), materials.choice(), path, show.tell)
+    log, said = with_choice(read_log(path), materials.choice(), path)
     log = replace(
         log,
         sr=check_sr(given.get("sr", log.sr)),
@@ -146,7 +147,7 @@ def _play_log(
         said = (*said, *more)
     seconds = as_number(given.get("seconds", log.duration_s), "seconds", "give --seconds above 0", above=0)
     log = log.first(int((log.start_s < seconds - 1e-9).sum()))
-    frames = log_frames(log, say=show.tell)
+    frames = log_frames(log)
     with start_playback(
         show.card.pop("device", None),
         sr=log.sr,

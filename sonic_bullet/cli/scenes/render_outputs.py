@@ -53,7 +53,7 @@ class RenderOutputs:
     session: SessionWish
 
     def write(
-        self, result: RenderResult | Replay, standing: list[Standing], say: Callable[[str], None]
+        self, result: RenderResult | Replay, standing: list[Standing], echo: Callable[[str], None]
     ) -> dict[str, Any]:
         """Write all outputs; return them as JSON values; raises SonicBulletError.
 
@@ -77,7 +77,7 @@ class RenderOutputs:
         lifted = None if isinstance(result, Replay) else result.lifted
         rendered = RenderReport(result.log, report, notes, lifted)
         loudness_line = (f"{self.output}: {loudness}",) * (loudness.true_peak_dbtp is not None)
-        say("\n".join([*rendered.lines(), *loudness_line, *(made.words if made is not None else ())]))
+        echo("\n".join([*rendered.lines(), *loudness_line, *(made.words if made is not None else ())]))
         scale = {}
         if report.channels:
             scale = self.level.say(self.to, found, report.peak_pa, result.log, report.clipped)
@@ -95,9 +95,9 @@ class RenderOutputs:
         try:
             if self.contacts is not None:
                 write_log(self.contacts, result.log, self.models or "included")
-            with progress_bar("stems and events") as (progress, tell):
+            with progress_bar("stems and events"):
                 drawn = self.picture is not None or self.session.folder is not None
-                return self.extras.made(result, self.events_to, progress, tell, drawn=drawn)
+                return self.extras.made(result, self.events_to, drawn=drawn)
         except (SonicBulletError, KeyboardInterrupt) as error:
             error.partial = result  # type: ignore[union-attr]
             raise with_partial(error, self.to, self.output, self.level) from error
@@ -115,8 +115,8 @@ class RenderOutputs:
             return {}
         if Path(self.to) != Path(self.session.mix):
             _written(self.session.mix, result, level, made)
-        with progress_bar("session") as (progress, _):
-            words, described = self.session.write(result, level, made, report, standing, progress)
+        with progress_bar("session"):
+            words, described = self.session.write(result, level, made, report, standing)
         made.words.append(words)
         return {"session": described}
 

@@ -88,11 +88,11 @@ def run_render(
     *take_places, page, _ = places(*names, takes.page, json_to)
     outputs = RenderOutputs(scene, output, to, contacts, models, picture, events_to, level, extras, session)
     standing: list[Standing] = []
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         try:
-            with progress_bar(Path(scene).name) as (progress, tell):
+            with progress_bar(Path(scene).name):
                 wish = Wish(
-                    seconds, rate, microphones, seed, materials, residual, supports, progress, tell,
+                    seconds, rate, microphones, seed, materials, residual, supports,
                     at_end=standing_collector(standing) if session.film_fps is not None else None,
                     tail_db=level.tail_db, room=room, image=image,
                 )  # fmt: skip
@@ -109,9 +109,9 @@ def run_render(
         if takes.takes is not None:
             to_each = [(name, str(place)) for name, place in zip(names, take_places, strict=True)]
             log = takes.applied(log, scene)
-            described = write_takes(log, said, takes, level, to_each, page, wish, say)
+            described = write_takes(log, said, takes, level, to_each, page, wish, echo)
         else:
-            described = outputs.write(result, standing, say)
+            described = outputs.write(result, standing, echo)
     write_json(json_to, described)
 
 
@@ -162,17 +162,17 @@ def run_doctor(scene: str, seconds: float, json_to: str | None) -> None:
     (json_to,) = places(json_to)
     if is_log(scene):
         raise SceneError(f"{scene} is a contact log, which has no settings", "give the scene it came from")
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         with quiet_stderr():
             from sonic_bullet.scene import examine_scene
 
-        with status(Path(scene).name) as tell:
-            findings = examine_scene(scene, seconds, tell)
+        with status(Path(scene).name):
+            findings = examine_scene(scene, seconds)
         if findings:
             for finding in findings:
-                say(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
+                echo(f"{finding.severity}: {finding.id}: {finding.what}\n    {finding.remedy}")
         else:
-            say(f"{scene}: nothing found that would spoil its sound")
+            echo(f"{scene}: nothing found that would spoil its sound")
     write_json(
         json_to,
         {

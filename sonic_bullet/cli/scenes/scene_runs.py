@@ -88,8 +88,6 @@ class Wish:
     materials: WantedMaterials
     residual: bool | None
     supports: bool | None
-    progress: Callable[[float], None]
-    say: Callable[[str], None]
     at_end: Callable[[Listener], object] | None = None
     tail_db: float | None = None
     room: ShoeboxRoom | RoomResponse | None = None
@@ -145,7 +143,7 @@ def simulated(scene: str, wish: Wish) -> RenderResult:
         **wish.materials.options,
     }
     with feeling_all() if wish.feels_all else nullcontext():
-        return render_scene(scene, **asked, progress=wish.progress, say=wish.say, at_end=wish.at_end)
+        return render_scene(scene, **asked, at_end=wish.at_end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,7 +171,7 @@ def prepared(path: str, wish: Wish) -> tuple[ContactLog, Wish, tuple[str, ...]]:
     from sonic_bullet.records import Microphone
     from sonic_bullet.session.chosen_in_log import with_choice
 
-    log, said = with_choice(read_log(path), wish.materials.choice(), path, wish.say)
+    log, said = with_choice(read_log(path), wish.materials.choice(), path)
     if wish.microphones:
         log = replace(log, sensors=tuple(Microphone(np.array(place)) for place in wish.microphones))
     if wish.seed is not None:
@@ -204,7 +202,7 @@ def rendered(log: ContactLog, wish: Wish, said: tuple[str, ...]) -> Replay:
         plan = room_of(wish.room, replace(log, sr=rate))
         said = (*said, plan.note)
     try:
-        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, plan=plan, progress=wish.progress, say=wish.say)
+        sound = render_kept(log, sr=wish.rate, tail_db=wish.tail_db, plan=plan)
     except (SonicBulletError, KeyboardInterrupt) as error:
         error.partial = Replay(error.kept, log, rate) if hasattr(error, "kept") else None  # type: ignore[union-attr]
         raise

@@ -36,7 +36,7 @@ def write_takes(
     places: list[tuple[str, str]],
     page: str | None,
     wish: Wish,
-    say: Callable[[str], None],
+    echo: Callable[[str], None],
 ) -> dict[str, Any]:
     """Write all takes of a log; return them as JSON values; raises SonicBulletError, KeyboardInterrupt.
 
@@ -51,8 +51,8 @@ def write_takes(
     for number, (output, to) in enumerate(places, start=1):
         take = make_take(log, number, takes.variation)
         try:
-            with progress_bar(f"take {number} of {len(places)}") as (progress, tell):
-                result = rendered(take.log, replace(wish, progress=progress, say=tell), ())
+            with progress_bar(f"take {number} of {len(places)}"):
+                result = rendered(take.log, wish, ())
         except (SonicBulletError, KeyboardInterrupt) as error:
             raise with_partial(error, to, output, level) from error
         found = find_level_of(result, level, to)
@@ -78,7 +78,7 @@ def write_takes(
     if page is not None:
         write_page(page, entries, f"Takes of {Path(places[0][0]).name}, seed {log.seed}", AS_SIMULATED)
         lines.append(f"{takes.page}: {format_count(len(entries), 'take')}")
-    say("\n".join(lines))
+    echo("\n".join(lines))
     for one, scale in zip(described, scales, strict=True):
         one["scale"] = level.say(*scale) if one["channels"] else {}
     for note in said:

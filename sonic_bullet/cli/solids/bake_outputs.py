@@ -19,6 +19,7 @@ from sonic_bullet.cli.output import (
     write_json,
 )
 from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Body
 from sonic_bullet.records.coerce import LISTED, nearest
 from sonic_bullet.records.counts import format_count
@@ -108,7 +109,7 @@ def run_bake(
         raise FileError("--seconds is of a scene or log as .glb or .gltf", "leave it out: nothing else holds motion")
     notes: tuple[str, ...] | None = None
     programs, few_points = (".dsp", ".h"), 64  # default number of points of programs, whose tables a compiler reads
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         from sonic_bullet.bake import PruningOptions, write_baked
 
         pruning = PruningOptions(modes, below_db, points or (few_points if end in programs else None))
@@ -126,7 +127,7 @@ def run_bake(
         elif not whole:
             write_baked(to, models)
         report = BakeReport(output, models, more, notes)
-        print_report(report, say)
+        print_report(report, echo)
         pruned = [f"{model.name}: {note}" for model in models for note in model.notes if "--points" in note]
         warn([*pruned, *(notes or ())])
         if not scene:
@@ -149,7 +150,7 @@ def _mesh_model(
         raise MaterialError("a mesh is of one material", "give --material M once")
     mesh_material = "steel"
     made = load_material(material[0] if material else mesh_material)
-    with status(mesh) as progress:
+    with status(mesh):
         return bake_mesh(
             mesh,
             made,
@@ -157,7 +158,6 @@ def _mesh_model(
             pruning=pruning,
             to_hz=to_hz or HEARING_LIMIT_HZ,
             thickness_m=thickness_m,
-            progress=progress,
         )
 
 
@@ -184,10 +184,10 @@ def _scene_models(
             f"{source} has {len(bodies)} bodies with modes, and that format holds one",
             f"give --body with one of {', '.join(list(bodies)[:LISTED])}",
         )
-    with status(source) as say:
+    with status(source):
         made = []
         for body in bodies.values():
-            say(body.name)
+            report_progress(body.name)
             made.append(bake_body(body, pruning))
     return made
 
@@ -207,9 +207,9 @@ def scene_log(
         from sonic_bullet.files import read_log
         from sonic_bullet.session.chosen_in_log import with_choice
 
-        with status(source) as say:
-            return with_choice(read_log(source), materials.choice(), source, say)[0]
-    with progress_bar(Path(source).name) as (progress, tell):
+        with status(source):
+            return with_choice(read_log(source), materials.choice(), source)[0]
+    with progress_bar(Path(source).name):
         with quiet_stderr():
             from sonic_bullet.scene import render_scene
 
@@ -220,7 +220,7 @@ def scene_log(
             "at_end": at_end,
             **materials.options,
         }
-        return render_scene(source, **asked, progress=progress, say=tell).log
+        return render_scene(source, **asked).log
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from sonic_bullet.cli.output import status
 from sonic_bullet.cli.scenes.scene_runs import WantedMaterials, is_log
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Body
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import AudioError, FileError
@@ -37,10 +38,10 @@ def write_whole_scene(
     made = recorded_scene(log, *((world.scene, world.links) if world is not None else ()))
     if not any(body is not None and body.model is not None and body.model.mode_count for body in made.members):
         raise FileError(f"no body of {source} has modes", "give one a material that rings")
-    with status(source) as say:
+    with status(source):
         sounds: list[BodySound] = []
         for body in made.members:
-            say("" if body is None else body.name)
+            report_progress("" if body is None else body.name)
             sounds.append(_sound_of(body, pruning))
     unrecorded = _unrecorded(standing, {(body.body_id, body.link) for body in made.members if body is not None})
     notes = (*made.scene.notes, *unrecorded, *write_scene(to, made.scene, sounds))

@@ -90,11 +90,11 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
     standing: list[Standing] = []
 
     sound_to = str(Path(str(to)).with_suffix(".wav"))
-    with clean_stdout(json_to) as say:
-        with progress_bar(Path(scene).name) as (progress, tell):
+    with clean_stdout(json_to) as echo:
+        with progress_bar(Path(scene).name):
             wish = Wish(
                 options["seconds"], rate, options["microphones"], options["seed"], materials, None, None,
-                progress, tell, standing_collector(standing), level.tail_db, room,
+                standing_collector(standing), level.tail_db, room,
             )  # fmt: skip
             try:
                 result = rendered_in_space(scene, wish, space)
@@ -107,11 +107,11 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
         events = None
         with quiet_stderr():
             import sonic_bullet.listener.pybullet.staged.picture_world  # noqa: F401  which says when PyBullet was built
-        with progress_bar("pictures") as (progress, tell):
+        with progress_bar("pictures"):
             if options["overlay"]:
                 from sonic_bullet.soundtrack.sound_events import find_sound_events
 
-                events = find_sound_events(result.log, sr=result.sr, progress=progress, say=tell)
+                events = find_sound_events(result.log, sr=result.sr)
             report = make_film(
                 str(to),
                 result.log,
@@ -123,11 +123,10 @@ def film(scene: str, output: str, json_to: str | None, **options: Any) -> None:
                 events=events,
                 codec=options["codec"],
                 level=found,
-                progress=progress,
             )
         notes = (*result.notes, *report.notes, *_clipped(report))
         written = WrittenFilm(output, report, notes)
-        print_report(written, say)
+        print_report(written, echo)
         peak = float(result.sound.shaped(found.curve).peaks().max())
         scale = level.say(str(to), found, peak, result.log, report.clipped)
         for note in notes:

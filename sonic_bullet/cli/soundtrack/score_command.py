@@ -61,14 +61,14 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
     space = SpaceWish.read(**{name: options[name] for name in SPACE_OPTIONS})
     room = read_room(**{name: options[name] for name in ROOM_OPTIONS})
     to, contacts_to, json_to, _ = places(output, contacts, json_to, level.json_path(output))
-    with clean_stdout(json_to) as say:
+    with clean_stdout(json_to) as echo:
         with quiet_stderr():
             from sonic_bullet.soundtrack.score.scoring import SCORE_MICROPHONE, rules_of, score_animation, score_scene
         rules = rules_of(options["table"])
         result: RenderResult | Replay | None = None
         try:
-            with progress_bar(Path(animation).name) as (progress, tell):
-                how: dict[str, Any] = {"sr": sr, "seed": options["seed"], "progress": progress, "say": tell}
+            with progress_bar(Path(animation).name):
+                how: dict[str, Any] = {"sr": sr, "seed": options["seed"]}
                 spatial = bool(space) or room is not None
                 how["tail_db"] = None if spatial else level.tail_db
                 if of_scene:
@@ -80,7 +80,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
                     scored = score_animation(animation, microphones=options["microphones"] or SCORE_MICROPHONE, **how)
                 result = scored
                 if spatial:
-                    wish = Wish(None, None, (), None, WantedMaterials(), None, None, progress, tell)
+                    wish = Wish(None, None, (), None, WantedMaterials(), None, None)
                     wish = replace(wish, tail_db=level.tail_db, room=room)
                     result = rendered_again(scored, wish, space, animation)
             if contacts_to is not None:
@@ -93,7 +93,7 @@ def score(animation: str, output: str, json_to: str | None, contacts: str | None
         report = replace(write_at_level(str(to), result.sound, sr, found), path=output)
         notes = (*result.notes, *level_warnings(report))
         rendered = RenderReport(result.log, report, notes)
-        print_report(rendered, say)
+        print_report(rendered, echo)
         scale = level.say(str(to), found, report.peak_pa, result.log, report.clipped)
         for note in notes:
             print(f"sonic-bullet: note: {note}", file=sys.stderr)

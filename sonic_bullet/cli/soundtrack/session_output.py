@@ -7,7 +7,6 @@ SessionWish (options) -> checked -> mix, stems (soundtrack_outputs) and film in 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,7 +100,6 @@ class SessionWish:
         made: Soundtrack,
         mix: AudioReport,
         standing: list[Standing],
-        progress: Callable[[float], None],
     ) -> tuple[str, dict[str, Any]]:
         """Write film and projects after mix and stems; return a description and JSON values.
 
@@ -114,7 +112,7 @@ class SessionWish:
         from sonic_bullet.soundtrack.sound_events import cues_of
 
         folder = Path(self.folder or "")
-        film = self._film(result, level, standing, progress)
+        film = self._film(result, level, standing)
         name_of = {f"{stem.name}.wav": result.log.bodies[stem.index].name for stem in made.stems}
         stems = [SoundItem(name, path, mix.frames, mix.channels) for path, name in name_of.items()]
         timeline = Timeline(
@@ -147,7 +145,6 @@ class SessionWish:
         result: RenderResult | Replay,
         level: FileLevel,
         standing: list[Standing],
-        progress: Callable[[float], None],
     ) -> FilmItem | None:
         if self.film_fps is None:
             return None
@@ -164,6 +161,5 @@ class SessionWish:
             look=look,
             standing=standing,
             level=level,
-            progress=progress,
         )
         return FilmItem(SESSION_FILE.film, report.pictures, report.fps)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -102,8 +102,6 @@ class SoundtrackWish:
         self,
         result: RenderResult | Replay,
         events_to: str | None,
-        progress: Callable[[float], None],
-        say: Callable[[str], None],
         *,
         drawn: bool = False,
     ) -> Soundtrack | None:
@@ -119,12 +117,11 @@ class SoundtrackWish:
 
         log, sr = result.log, result.sr
         if self.stems is None:
-            events = find_sound_events(log, sr=sr, progress=progress, say=say)
+            events = find_sound_events(log, sr=sr)
             return Soundtrack(self, log, sr, (), events, events_to)
         observer = EventObserver(log) if wanted else None
         stems = render_stems(
             log, sr=sr, frames=result.sound.shape[1], observer=observer, plan=getattr(result, "plan", None),
-            progress=progress, say=say,
         )  # fmt: skip
         return Soundtrack(self, log, sr, stems, observer.events() if observer is not None else (), events_to)
 

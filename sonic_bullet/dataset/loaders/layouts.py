@@ -12,7 +12,7 @@ from sonic_bullet.dataset.loaders.lerobot_rows import write_lerobot
 from sonic_bullet.dataset.loaders.maniwav import write_replay_buffers
 from sonic_bullet.dataset.loaders.tar_shards import write_tar_shards
 from sonic_bullet.dataset.sample_folder import LabelledSounds, SampleFolder
-from sonic_bullet.machine.progress import Say
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records.coerce import nearest
 from sonic_bullet.records.errors import FileError
 from sonic_bullet.storage.atomic import replacing_folder
@@ -51,7 +51,7 @@ def check_formats(names: Iterable[str]) -> None:
         FORMATS[name].check_library()
 
 
-def write_layout(name: str, kept: SampleFolder, numbers: range, say: Say) -> Path:
+def write_layout(name: str, kept: SampleFolder, numbers: range) -> Path:
     """Write the samples of these numbers in a format, in place of older ones, and return its folder.
 
     Raises
@@ -65,7 +65,7 @@ def write_layout(name: str, kept: SampleFolder, numbers: range, say: Say) -> Pat
         for labels in kept.labels(numbers):
             yield labels, kept.root / labels["audio"]
 
-    say(name)
+    report_progress(name)
     with replacing_folder(to) as partial:
         FORMATS[name].write(samples, partial)
     return to

@@ -165,7 +165,7 @@ class Hooks:
         stepped.hooks = self  # type: ignore[attr-defined]
         return stepped
 
-    def _telling(self, name: str, client: Any, tell: Callable[[Watcher, int], None]) -> Callable[..., Any]:
+    def _telling(self, name: str, client: Any, notify: Callable[[Watcher, int], None]) -> Callable[..., Any]:
         below = self._below(client, name)
         below = remembering(name, below, self._client_id, self._client) if name in ENDERS else below
         of_body = name == "removeBody" or name in self.POSE_SETTERS
@@ -178,7 +178,7 @@ class Hooks:
             elif name == "resetSimulation":
                 self.set_values.forget()
             for one in self.listening[:]:
-                tell(one.world, body)
+                notify(one.world, body)
             return result
 
         return reporting

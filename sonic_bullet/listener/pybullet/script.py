@@ -25,6 +25,7 @@ from pybullet_utils.bullet_client import BulletClient
 from sonic_bullet.listener.pybullet.clients import disconnect as end
 from sonic_bullet.listener.pybullet.colliding.given_bodies import ENDERS, MAKERS, begin, remembering
 from sonic_bullet.listener.quiet import quiet_stdout
+from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.machine.worker import mark_step, stop_word
 from sonic_bullet.records.errors import SceneError, SonicBulletError, exception_words
 from sonic_bullet.storage.reading import refuse_lfs_pointer
@@ -70,7 +71,6 @@ def run_script(
     seconds: float,
     *,
     names: dict[str, Any] | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> dict[str, Any]:
     """Run a script for at most ``seconds`` of physics time.
 
@@ -82,8 +82,6 @@ def run_script(
         (before, after) each step, or after alone, called with the client id of the first client that steps.
     names
         A dictionary to receive the script's top-level names, also where it fails.
-    progress
-        Called with the fraction of ``seconds`` that is done.
 
     Returns
     -------
@@ -110,7 +108,7 @@ def run_script(
     names = {} if names is None else names
     names |= {"__name__": "__main__", "__file__": str(path), "__builtins__": __builtins__}
     with (
-        _stage(before, after, seconds, progress) as observed,
+        _stage(before, after, seconds) as observed,
         patch.object(sys, "argv", [str(path)]),
         patch.object(sys, "path", [str(path.resolve().parent), *sys.path]),
     ):
@@ -134,9 +132,7 @@ def run_script(
 
 
 @contextmanager
-def _stage(
-    before: ClientHook | None, after: ClientHook | None, seconds: float, progress: Callable[[float], None] | None
-) -> Iterator[list[int]]:
+def _stage(before: ClientHook | None, after: ClientHook | None, seconds: float) -> Iterator[list[int]]:
     """Replace PyBullet's functions; yield a list that gets the client's id once it steps."""
     real_connect, real_step = pybullet.connect, pybullet.stepSimulation
     opened: set[int] = set()
@@ -174,8 +170,7 @@ def _stage(
         elapsed_s += dt
         if after is not None:
             after(physicsClientId)
-        if progress is not None:
-            progress(min(elapsed_s / seconds, 1.0))
+        report_fraction(min(elapsed_s / seconds, 1.0))
         if elapsed_s >= seconds - 1e-9:
             raise _TimeIsUp
         return result

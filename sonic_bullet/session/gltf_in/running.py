@@ -6,21 +6,18 @@ file -> RigidScene -> bodies of a simulator -> models and materials to the liste
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from sonic_bullet.listener import direct_client, is_static, watch_settings
-from sonic_bullet.machine.progress import Say
+from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records.rigid_scene import RigidScene
 from sonic_bullet.session.gltf_in.scene_reader import read_rigid_scene
 from sonic_bullet.session.links_of_script import add_links, named_links
 from sonic_bullet.session.scene_steps import DEFAULT_SECONDS, SceneStage
 
 
-def run_gltf(
-    stage: SceneStage, seconds: float | None, progress: Callable[[float], None] | None, say: Say | None
-) -> tuple[str, ...]:
+def run_gltf(stage: SceneStage, seconds: float | None) -> tuple[str, ...]:
     """Run it for so many seconds of physics time; notes a user should read. Raises SonicBulletError."""
     gltf_microphone = (0.0, -1.0, 0.5)
     from sonic_bullet.listener.pybullet.rigid.rigid_world import build_rigid_scene
@@ -34,20 +31,19 @@ def run_gltf(
     stage.listener = listener = stage.attached(client, places)
     for body_id, body in zip(ids, scene.bodies, strict=True):
         listener.world.call(body_id, -1, body.name)
-    listener.add_all(_cast(scene, ids), progress=say)
+    listener.add_all(_cast(scene, ids))
     _add_partners(stage, scene, ids)
     said: tuple[str, ...] = ()
     if stage.choice:
         stage.check_names()
         static = partial(is_static, client._client)
-        said = add_links(listener, named_links(listener.world, stage.choice), static, say)
+        said = add_links(listener, named_links(listener.world, stage.choice), static)
     stage.ready()
     total = seconds if seconds is not None else DEFAULT_SECONDS
     while listener.time_s < total - 1e-9:
         act()
         client.stepSimulation()
-        if progress is not None:
-            progress(min(listener.time_s / total, 1.0))
+        report_fraction(min(listener.time_s / total, 1.0))
     return (*scene.notes, *notes, *said, *_ultrasonic(scene, listener.sr))
 
 

@@ -10,7 +10,7 @@ did: those rows are dropped (listener), and bodies of mass 0 make none with each
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -87,7 +87,6 @@ def scored_by_hand(
     log: ContactLog,
     shapes: Mapping[int, tuple[Shape, ...]],
     moves: Sequence[Moves],
-    progress: Callable[[float], None] | None = None,
 ) -> ContactLog:
     """Add the contacts of driven bodies to the log. shapes: of bodies by their index.
 
@@ -119,7 +118,7 @@ def scored_by_hand(
         found: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
         try:
-            fit_steps(animation, stage, found, progress, known=np.stack(known), only=driven)
+            fit_steps(animation, stage, found, known=np.stack(known), only=driven)
         except KeyboardInterrupt as error:
             stopped = error
         world = AnimatedWorld(stage, found, steps[0].dt_s)

@@ -15,13 +15,14 @@ min |W(A f - r)|², f >= 0, W the inverse square root of mass and inertia: the r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Sequence, Set
 
 import numpy as np
 
 from sonic_bullet.listener.animated import PoseStage, matrices
 from sonic_bullet.listener.frames import turned
 from sonic_bullet.listener.polling import NO_RAW
+from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 
@@ -63,7 +64,6 @@ def fit_steps(
     animation: Animation,
     stage: PoseStage,
     found: list[tuple[Array, Array]],
-    progress: Callable[[float], None] | None = None,
     *,
     known: Array | float = 0.0,
     only: Set[int] | None = None,
@@ -97,8 +97,7 @@ def fit_steps(
             raw = raw[_can_touch(raw, motion[k], after, step_s, stage, touch_m)]
             raw = loaded(animation, motion[k], raw, change[k], stage)
         found.append((motion[k], raw))
-        if progress is not None:
-            progress((k + 1) / len(animation))
+        report_fraction((k + 1) / len(animation))
 
 
 def speeds(motion: Array, reach_m: Array) -> Array:

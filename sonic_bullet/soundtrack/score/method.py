@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import ceil
 
 from sonic_bullet.listener.animated import PoseStage
@@ -24,7 +23,6 @@ def find_steps(
     animation: Animation,
     stage: PoseStage,
     found: list[tuple[Array, Array]],
-    progress: Callable[[float], None] | None = None,
     *,
     hidden_m_s: float = 0.0,
 ) -> None:
@@ -33,6 +31,6 @@ def find_steps(
     hidden_m_s: the change of speed from frame to frame that noise in the poses hides.
     """
     if animation.fps >= FIT_FROM_FPS:
-        fit_steps(animation, stage, found, progress, hidden_m_s=hidden_m_s)
+        fit_steps(animation, stage, found, hidden_m_s=hidden_m_s)
     else:
-        Shooting(animation, stage, substeps_of(animation.fps), hidden_m_s).find_steps(found, progress)
+        Shooting(animation, stage, substeps_of(animation.fps), hidden_m_s).find_steps(found)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,13 @@ import numpy as np
 
 from sonic_bullet.files import check_sr
 from sonic_bullet.listener.animated import AnimatedBody, PoseStage
-from sonic_bullet.machine.progress import says_so
+from sonic_bullet.machine.progress import (
+    progress_part,
+    report_fraction,
+    report_progress,
+    show_progress,
+    without_progress,
+)
 from sonic_bullet.records import Array, Shape
 from sonic_bullet.records.coerce import as_number, as_path, quote
 from sonic_bullet.records.errors import AnimationError, FileError, MeshError, SceneWarning, SonicBulletError, interrupts
@@ -65,7 +71,7 @@ def read_animation(path: str | os.PathLike[str], fps: float | None = None, scale
     return read_keyframes(place, fps, scale)
 
 
-@says_so(text="say", fraction="progress")
+@show_progress(in_percent=True)
 def score_animation(
     animation: str | os.PathLike[str] | Animation,
     *,
@@ -76,8 +82,6 @@ def score_animation(
     sr: int = 48_000,
     seed: int = 0,
     microphones: MicrophoneLike = SCORE_MICROPHONE,
-    progress: Callable[[float], None] | None = None,
-    say: Callable[[str], None] | None = None,
     tail_db: float | None = None,
 ) -> RenderResult:
     """Compute the sound of a baked animation, its contact log, and notes for the user.
@@ -102,8 +106,6 @@ def score_animation(
         animation, notes = assembled(read_animation(animation, fps, scale), rules, material)
     from sonic_bullet.listener.pybullet.staged.animated_world import AnimatedStage, AnimatedWorld
 
-    say = say or (lambda text: None)
-    half = (lambda share: progress(0.7 * share)) if progress is not None else None
     with interrupts(), AnimatedStage(animation.bodies, animation.gravity_m_s2) as stage:
         apart = alone(animation, stage)
         noise_m = pose_noise_m(animation, apart)
@@ -117,12 +119,13 @@ def score_animation(
             stage.bodies = bodies
             stage.held |= driven
             noise_m = pose_noise_m(animation, apart)  # driven motion is no noise
-        say("who touches whom")
+        report_progress("who touches whom")
         steps: list[tuple[Array, Array]] = []
         stopped: KeyboardInterrupt | None = None
         try:
             hidden_m_s = 0.0 if noise_m is None else hidden_n_s(1.0, noise_m, animation.fps)
-            find_steps(animation, stage, steps, half, hidden_m_s=hidden_m_s)
+            with progress_part(0.0, 0.7):
+                find_steps(animation, stage, steps, hidden_m_s=hidden_m_s)
             steps = _forced(animation, stage, steps, unforced(animation, noise_m))
         except KeyboardInterrupt as error:  # steps so far are played and kept
             stopped = error
@@ -134,12 +137,12 @@ def score_animation(
             warnings.simplefilter("ignore", SceneWarning)
             listener = attach(AnimatedWorld(stage, steps, dt_s), sr=sr, seed=seed, microphone=microphones)
             ids = dict(zip((one.name for one in animation.bodies), stage.ids, strict=True))
-            listener.add_all({ids[name]: made for name, made in animation.materials.items()}, progress=say)
+            listener.add_all({ids[name]: made for name, made in animation.materials.items()})
             try:
                 for number in range(len(steps)):
                     listener.step()
-                    if progress is not None and number % 16 == 0:
-                        progress(0.7 + 0.3 * number / len(steps))
+                    if number % 16 == 0:
+                        report_fraction(0.7 + 0.3 * number / len(steps))
             except (SonicBulletError, KeyboardInterrupt) as error:
                 error.partial = _result(listener, notes)  # type: ignore[union-attr]
                 raise
@@ -149,13 +152,7 @@ def score_animation(
         return _result(listener, notes, tail_db)
 
 
-def score_scene(
-    path: str | Path,
-    *,
-    progress: Callable[[float], None] | None = None,
-    tail_db: float | None = None,
-    **options: Any,
-) -> RenderResult:
+def score_scene(path: str | Path, *, tail_db: float | None = None, **options: Any) -> RenderResult:
     """Compute a scene's sound with that of its kinematic bodies (by_hand.py). options: of `scene.render_scene`.
 
     Raises what `render_scene` does, AnimationError where it drives no body or its driven bodies cannot be scored;
@@ -171,10 +168,8 @@ def score_scene(
             with suppress(MeshError):
                 shapes[body.body_id, body.link] = listener.world.shapes_of(body.body_id, body.link)
 
-    def part(begin: float, end: float) -> Callable[[float], None] | None:
-        return (lambda share: progress(begin + (end - begin) * share)) if progress is not None else None
-
-    result = render_scene(path, progress=part(0, 0.5), at_end=look, **options)
+    with progress_part(0.0, 0.5):
+        result = render_scene(path, at_end=look, **options)
     moves = moves_of(result.log)
     if not any(one.drives for one in moves):
         raise AnimationError(f"{path} drives no body by hand", "render it: contacts are simulated")
@@ -190,12 +185,15 @@ def score_scene(
     log = result.log
     try:
         with interrupts():
-            log = scored_by_hand(result.log, known, moves, part(0.5, 0.8))
-            sound = render_kept(log, tail_db=tail_db, progress=part(0.8, 1.0))
+            with progress_part(0.5, 0.8):
+                log = scored_by_hand(result.log, known, moves)
+            with progress_part(0.8, 1.0):
+                sound = render_kept(log, tail_db=tail_db)
     except (SonicBulletError, KeyboardInterrupt) as error:
         log = getattr(error, "log", log)
         if hasattr(error, "kept") or hasattr(error, "log"):
-            kept = error.kept if hasattr(error, "kept") else render_kept(log)
+            with without_progress():
+                kept = error.kept if hasattr(error, "kept") else render_kept(log)
             error.partial = RenderResult(kept, log, result.sr, notes)  # type: ignore[union-attr]
         raise
     return RenderResult(sound, log, result.sr, (*notes, *render_notes(sound, log)))

@@ -13,12 +13,12 @@ radius of gyration. Islands that do not meet are searched in the same shots. Imp
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sonic_bullet.listener.animated import PoseStage, Rollout, rotation
+from sonic_bullet.machine.progress import report_fraction
 from sonic_bullet.records import Array
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.impulse_fit import whitening
@@ -75,7 +75,7 @@ class Shooting:
         self._prior[self._free, :3] -= lag * animation.gravity_m_s2
         self._trust_m_s = first_speed_m_s
 
-    def find_steps(self, found: list[tuple[Array, Array]], progress: Callable[[float], None] | None = None) -> None:
+    def find_steps(self, found: list[tuple[Array, Array]]) -> None:
         """Append MOTION (b,) and loaded RAW rows of each step."""
         before: Rollout | None = None
         owed = np.zeros_like(self._prior)
@@ -90,8 +90,7 @@ class Shooting:
             self._start = self._followed(last, self._motion[k + 1], np.asarray(shot.touching.any(axis=1)))
             self._prior = np.concatenate([last["velocity_m_s"], last["spin_rad_s"]], axis=1)
             self._trust_m_s = self._speed_m_s
-            if progress is not None:
-                progress((k + 1) / len(self._motion))
+            report_fraction((k + 1) / len(self._motion))
         if before is not None:
             found += self._corrected(before, owed)
 

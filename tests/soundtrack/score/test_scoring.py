@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.machine.progress import progress_to
 from sonic_bullet.soundtrack.score.animation import Animation
 from sonic_bullet.soundtrack.score.export import assembled
 from sonic_bullet.soundtrack.score.scoring import score_animation
@@ -29,8 +30,8 @@ def test_what_is_stopped_is_kept_as_far_as_it_was_found(animation: Animation) ->
             raise KeyboardInterrupt
 
     whole = score_animation(animation, sr=8000)
-    with pytest.raises(KeyboardInterrupt) as caught:
-        score_animation(animation, sr=8000, progress=stop)
+    with pytest.raises(KeyboardInterrupt) as caught, progress_to(fraction=stop):
+        score_animation(animation, sr=8000)
     part = caught.value.partial  # type: ignore[attr-defined]
     assert 0.2 < part.log.duration_s < 0.5 * whole.log.duration_s + 0.05
     sound = part.sound.samples()
