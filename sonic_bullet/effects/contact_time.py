@@ -125,7 +125,7 @@ def _table(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array, Array]
     good = np.isfinite(expected) & np.isfinite(observed) & np.isfinite(h.impulse_n_s)[:, None] & (expected > 0)
     most = np.broadcast_to(expected.max(axis=0, keepdims=True), expected.shape)
     freq = np.broadcast_to(freq, expected.shape)
-    level = np.broadcast_to(np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None], expected.shape)
+    level = np.broadcast_to(h.level_n_s[:, None], expected.shape)
     return freq[good], level[good], expected[good], observed[good], sd[good], most[good]
 
 
@@ -136,9 +136,8 @@ def _unobserved(h: ObjectEvidence) -> tuple[Array, Array, Array]:
     """
     near = 0.01  # of ln f: a line that near may be that mode
     assert h.model is not None
-    observed = np.concatenate([h.freq_hz, h.foreign_hz])
     alone = np.setdiff1d(np.arange(len(h.all_hz)), np.concatenate([*h.mode, np.zeros(0, int)]))
-    alone = alone[np.abs(np.log(h.all_hz[alone, None] / observed)).min(axis=1) > near]
+    alone = alone[np.abs(np.log(h.all_hz[alone, None] / h.every_hz)).min(axis=1) > near]
     hidden = (
         ROLL_OFF.silent * h.noise[:, None] * np.sqrt(4 * h.model.decay_per_s[alone] / h.sr)
         + ROLL_OFF.hidden * np.abs(h.amplitude).max(axis=1)[:, None]

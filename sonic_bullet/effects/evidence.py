@@ -167,6 +167,47 @@ class ObjectEvidence:
         """Compute the undamped angular frequencies (k,) of the lines in rad/s."""
         return np.asarray(np.hypot(2 * np.pi * self.freq_hz, np.nan_to_num(self.decay_per_s)))
 
+    @property
+    def level_n_s(self) -> Array:
+        """Return the strikes' impulses (s,), 1 where unknown."""
+        return np.where(np.isfinite(self.impulse_n_s), self.impulse_n_s, 1.0)
+
+    @property
+    def every_hz(self) -> Array:
+        """Return the frequencies (k + f,) of all lines: those that are modes, then foreign ones."""
+        return np.concatenate([self.freq_hz, self.foreign_hz])
+
+    @property
+    def every_decay_per_s(self) -> Array:
+        """Return the decays (k + f,) of all lines."""
+        return np.concatenate([self.decay_per_s, self.foreign_decay_per_s])
+
+    @property
+    def every_amplitude(self) -> Array:
+        """Return the amplitudes (s, k + f) of all lines."""
+        return np.concatenate([self.amplitude, self.foreign_amplitude], axis=1)
+
+    @property
+    def places(self) -> Array:
+        """Return the vertices (s + 1,) of the strikes and the sensor."""
+        return np.append(self.strike_vertex, self.sensor_vertex)
+
+    def participation(self, shape: Array) -> tuple[Array, Array]:
+        """Compute how much of each mode the strikes drive and the sensor observes.
+
+        Parameters
+        ----------
+        shape : (s + 1, 3, m)
+            Mode shapes φ at the strikes and the sensor: ``model.shape[self.places]``.
+
+        Returns
+        -------
+        into, out : (s, m), (m,)
+            J φ(p)·e of the strikes, φ(q)·n of the sensor.
+        """
+        into = np.einsum("sxm,sx->sm", shape[:-1].astype(float), self.strike_direction) * self.level_n_s[:, None]
+        return into, np.einsum("xm,x->m", shape[-1].astype(float), self.sensor_direction)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:

@@ -88,7 +88,7 @@ def _steady(h: ObjectEvidence) -> list[tuple[float, float, float, float]]:
     steady = 0.12  # relative scatter of |A|/J over the strikes, rms
     if len(h.foreign_hz) == 0 or len(h.impulse_n_s) < 2 or h.signal is None:
         return []
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    level = h.level_n_s
     per = h.foreign_amplitude / level[:, None]
     size = np.abs(per)
     weight = (level[:, None] / np.maximum(h.foreign_sd, 1e-12)) ** 2

@@ -9,14 +9,24 @@ their distance ε.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from sonic_bullet.effects.common.axes import AXES_PAIR, about_axes, pair_at
-from sonic_bullet.effects.protocol import Evidence, Number, Numbers, ObjectEvidence, Owner, SplitsPairs, Stage, Traits
+from sonic_bullet.effects.protocol import (
+    Evidence,
+    Number,
+    Numbers,
+    ObjectEvidence,
+    Owner,
+    SplitsPairs,
+    Stage,
+    Traits,
+    ascending,
+)
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -62,8 +72,7 @@ class ModeSplitting(SplitsPairs):
             middle = (x.freq_hz[a] + x.freq_hz[b]) / 2
             freq[a], freq[b] = middle * (1 - split / 2), middle * (1 + split / 2)
             shape[:, :, [a, b]] = about_axes(x.shape[:, :, [a, b]], turn)
-        order = np.argsort(freq, kind="stable")
-        return replace(x, freq_hz=freq[order], decay_per_s=x.decay_per_s[order], shape=shape[:, :, order])
+        return ascending(x, freq, x.decay_per_s, shape)
 
     def observed_correction(self, freq_hz: Array) -> Array:
         """Compute by how much, relative, modes differ from the middles of the observed pairs.
@@ -118,8 +127,9 @@ def _pairs(h: ObjectEvidence, scale: float) -> list[tuple[float, ...]]:
     mostly = 0.5  # of the pairs must be more than that
     most = 7
     assert h.plain is not None  # the mesh's own order: corrections may have turned a pair's about
-    every, decay, amplitude, strike, sensor = _lines(h)
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
+    every, decay, amplitude = h.every_hz, h.every_decay_per_s, h.every_amplitude
+    strike, sensor = h.participation(h.plain.shape[h.places])
+    level = h.level_n_s[:, None]
     even, evenly = strike / level, amplitude / level  # one loud strike is alike with anything
     model_hz = h.plain.freq_hz
     size = np.abs(amplitude).max(axis=0)
@@ -185,7 +195,8 @@ def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
     Two lines that only the excluded strike excited strongly are still no single mode.
     """
     assert h.plain is not None
-    every, _, amplitude, strike, sensor = _lines(h)
+    every, amplitude = h.every_hz, h.every_amplitude
+    strike, sensor = h.participation(h.plain.shape[h.places])
     found: list[tuple[float, ...]] = []
     for f, split in zip(known.freq_hz, known.split, strict=True):
         a, b = pair_at(h.plain.freq_hz, f)
@@ -199,23 +210,6 @@ def _again(h: ObjectEvidence, known: ModeSplitting) -> list[tuple[float, ...]]:
         turn, _ = _turn(strike[:, [a, b]], sensor[[a, b]], amplitude[:, line], h.signed)
         found.append((float(every[line].mean()), float(np.ptp(every[line]) / every[line].mean()), turn))
     return found
-
-
-def _lines(h: ObjectEvidence) -> tuple[Array, Array, Array, Array, Array]:
-    """Return f, d (k,) and amplitudes (s, k) of all lines, and the modes' excitation (s, m) and gain at the sensor."""
-    assert h.plain is not None
-    every = np.concatenate([h.freq_hz, h.foreign_hz])
-    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
-    amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    strike = np.einsum("sxm,sx->sm", h.plain.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
-    return (
-        every,
-        decay,
-        amplitude,
-        strike,
-        np.einsum("xm,x->m", h.plain.shape[h.sensor_vertex].astype(float), h.sensor_direction),
-    )
 
 
 def _turn(strike: Array, sensor: Array, amplitude: Array, signed: bool) -> tuple[float, float]:

@@ -27,6 +27,7 @@ from sonic_bullet.effects.protocol import (
     Traits,
     ascending,
 )
+from sonic_bullet.geometry import area_vectors_m2
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.robust import fit_nonnegative
 
@@ -124,7 +125,7 @@ class Radiation(Effect):
 def areas(x: ModalModel) -> Array:
     """Compute A = ∮(φ·n)² dS (m,) in m²/kg of a model's modes."""
     corner = x.vertex_m[x.face]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2
+    normal = area_vectors_m2(x.vertex_m, x.face)
     size = np.linalg.norm(normal, axis=1)
     direction = np.broadcast_to(
         (normal / np.maximum(3 * size, 1e-300)[:, None])[:, None], corner.shape

@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from sonic_bullet.effects.protocol import Effect, Number, Numbers, Owner, Stage, Traits
-from sonic_bullet.geometry import outward_normals
+from sonic_bullet.geometry import face_areas_m2, outward_normals
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.records.counts import format_count
 from sonic_bullet.records.errors import RecordError
@@ -83,8 +83,7 @@ class RecordedLines(Effect):
 
 def _vertex_normals(x: ModalModel) -> tuple[Array, Array]:
     """Compute unit normals (v, 3) and the part of the surface in m² (v,) of each vertex."""
-    corner = x.vertex_m[x.face]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+    area = face_areas_m2(x.vertex_m, x.face)
     normal, share = np.zeros((len(x.vertex_m), 3)), np.zeros(len(x.vertex_m))
     weighted = outward_normals(x.vertex_m, x.face) * area[:, None]
     for i in range(3):

@@ -21,19 +21,20 @@ of 4 mm the second.
 CREASE_RAD = np.deg2rad(30.0)
 
 
-def _area_vectors(vertex_m: Array, face: Array) -> Array:
+def area_vectors_m2(vertex_m: Array, face: Array) -> Array:
+    """Compute normals (f, 3) as long as the faces' areas, outward where the faces are."""
     a, b, c = (vertex_m[face[:, k]] for k in range(3))
     return np.asarray(np.cross(b - a, c - a) / 2)
 
 
 def face_areas_m2(vertex_m: Array, face: Array) -> Array:
     """Compute the area (f,) of each face."""
-    return np.asarray(np.linalg.norm(_area_vectors(vertex_m, face), axis=1))
+    return np.asarray(np.linalg.norm(area_vectors_m2(vertex_m, face), axis=1))
 
 
 def outward_normals(vertex_m: Array, face: Array) -> Array:
     """Compute unit normals (f, 3), outward where the faces are; zero for a face without area."""
-    vector = _area_vectors(vertex_m, face)
+    vector = area_vectors_m2(vertex_m, face)
     length = np.linalg.norm(vector, axis=1)
     return np.asarray(vector / np.where(length > 0, length, 1)[:, None])
 

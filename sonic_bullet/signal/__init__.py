@@ -2,6 +2,7 @@
 
     short_time       windows; a signal, whole or in frames -> spectra, powers
     spectrogram      frames with zeros around a signal, float32 -> transform -> inverse
+    peaks            a curve -> its peaks
     octave_bands     powers over frequency -> powers of octaves
     exponential_law  quantiles of noise's powers -> their means
     log_spectral     stationary noise floors; distance of two sounds where they stand above the noise

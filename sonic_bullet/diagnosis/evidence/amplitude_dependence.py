@@ -13,7 +13,7 @@ import numpy as np
 
 from sonic_bullet.diagnosis.prediction.hypothesis import bends
 from sonic_bullet.diagnosis.prediction.prediction import Prediction
-from sonic_bullet.effects.common.envelope import Envelopes, alone, falls, shifted
+from sonic_bullet.effects.common.envelope import Envelopes, alone, common_fall, falls, shifted
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 
@@ -76,15 +76,13 @@ def beats(e: Envelopes, made: Envelopes, q: int, decay_per_s: float) -> float:
         Decay in the synthesis, returned where too little is clear in both.
     """
     least_frames = 8  # frames
-    top = bottom = 0.0
+    rows = []
     for s in range(len(e.z)):
         use = e.good[s, q] & made.good[s, q]
         if use.sum() < least_frames:
             continue
-        t, w = e.time_s[q, use], e.worth(s, q)[use]
         left = np.log(np.abs(e.z[s, q, use]) / np.abs(made.z[s, q, use]))
-        t = t - np.average(t, weights=w)
-        top, bottom = top - float((w * t * left).sum()), bottom + float((w * t * t).sum())
-    lacks = top / bottom if bottom > 0 else 0.0
+        rows.append((e.time_s[q, use], left, e.worth(s, q)[use]))
+    lacks = common_fall(rows, 0.0)
     most_lacking = 0.5  # of a decay, at most
     return decay_per_s + float(np.clip(lacks, -most_lacking * decay_per_s, most_lacking * decay_per_s))

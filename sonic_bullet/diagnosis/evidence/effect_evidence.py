@@ -17,7 +17,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis, moves
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, in_band, predict, predict_fitted
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
 from sonic_bullet.effects.protocol import Dereverberates, Evidence, ObjectEvidence, RingsAlong, Sound, Stage
-from sonic_bullet.estimator.fit.pairing import PAIRING
+from sonic_bullet.estimator.fit.pairing import degenerate_runs
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.lines.joint_lines import Lines, noise_rms
 from sonic_bullet.records import Array
@@ -193,7 +193,7 @@ def _nearest(p: Prediction, known: Array) -> tuple[Array, tuple[Array, ...]]:
     price[known] = 0.0
     row, column = pairs_of_least_price(price)
     # degenerate modes that nothing has set apart are one line
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > PAIRING.degenerate_split)
+    group = degenerate_runs(model.freq_hz)
     taken, mode = set(column.tolist()), []
     for c in column:
         like = np.abs(np.log(np.maximum(model.decay_per_s, 1e-9) / max(float(model.decay_per_s[c]), 1e-9))) < together

@@ -24,7 +24,7 @@ from sonic_bullet.diagnosis.prediction.hypothesis import Hypothesis
 from sonic_bullet.diagnosis.prediction.prediction import Prediction, predict
 from sonic_bullet.diagnosis.prediction.score import AudioObservation, Comparable, mean_db, predict_takes
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.estimator.fit.pairing import PAIRING
+from sonic_bullet.estimator.fit.pairing import degenerate_runs
 from sonic_bullet.records import Array
 from sonic_bullet.signal.log_spectral import with_noise
 
@@ -70,7 +70,7 @@ def _outside(start: Hypothesis, h: Hypothesis, body: Struck, problem: DiagnosisP
     p = predict(h, body)
     model, order = p.model, p.order
     old, most, top = (start.correction or {})[body.name], 0.0, body.band_hz[1]
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > PAIRING.degenerate_split)
+    group = degenerate_runs(model.freq_hz)
     free = (body.line[order] < 0) & (old[order] == (h.correction or {})[body.name][order])
     near = free & (model.freq_hz <= top) & (model.freq_hz * (1 + FAR_FOR_MESH) > top)
     if not near.any():
@@ -97,7 +97,7 @@ def _put(p: Prediction) -> tuple[Array, float]:
     row = p.pattern()[body.fitted[: len(observed)]]
     matched = body.line[order] >= 0
     upper = np.median(model.freq_hz[matched]) if matched.any() else np.inf
-    group = np.cumsum(np.diff(np.log(model.freq_hz), prepend=-np.inf) > PAIRING.degenerate_split)
+    group = degenerate_runs(model.freq_hz)
     found, most = correction.copy(), 0.0
     for k in sorted(
         set(range(len(lines.freq_hz))) - set(body.line.tolist()), key=lambda k: -float(observed[:, k].max())

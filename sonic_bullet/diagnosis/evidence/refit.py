@@ -30,7 +30,7 @@ from sonic_bullet.effects.protocol import (
     SplitsPairs,
     Stage,
 )
-from sonic_bullet.estimator.fit.pairing import PAIRING
+from sonic_bullet.estimator.fit.pairing import PAIRING, degenerate_runs
 from sonic_bullet.estimator.fit.rayleigh import rayleigh
 from sonic_bullet.estimator.lines.joint_lines import noise_rms
 from sonic_bullet.records import Array, ModalModel
@@ -182,7 +182,7 @@ def _alike(freq_hz: Array, correction: Array) -> Array:
 
     Otherwise they would change places.
     """
-    run = np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > PAIRING.degenerate_split * PAIRING.meshed)
+    run = degenerate_runs(freq_hz, PAIRING.degenerate_split * PAIRING.meshed)
     return np.asarray((np.bincount(run, correction) / np.maximum(np.bincount(run), 1))[run])
 
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from sonic_bullet.effects.protocol import Elastic, Poisson
 from sonic_bullet.estimator.fit.case_fit import POISSON, CaseFit, ObjectFit
+from sonic_bullet.estimator.fit.observation import surface_normal
 from sonic_bullet.estimator.fit.radiation_share import into_air
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.recorded import body_family, guess_of
@@ -240,7 +241,7 @@ def modal_model(
             continue
         rows, _ = family.points(np.tile(position, (3, 1)), axes)
         extra.append(rows @ vector / scale)
-        direction.append(np.array(along, float) if along is not None else inward(family, position))
+        direction.append(np.array(along, float) if along is not None else -surface_normal(family, position))
         place.append(np.array(position, float))
     freq = np.sqrt(value) / (2 * np.pi)
     if case.sensor != "velocity":
@@ -265,15 +266,6 @@ def modal_model(
         note=family.note,
     )
     return model, np.array(direction)
-
-
-def inward(family: Family, position: tuple[float, float, float]) -> Array:
-    """Compute the unit vector (3,) into the body at a surface point."""
-    from sonic_bullet.geometry import outward_normals
-    from sonic_bullet.geometry.nearest_point import closest_point
-
-    face, _, _ = closest_point(family.vertex_m, family.face, np.array([position]))
-    return -np.asarray(outward_normals(family.vertex_m, family.face[face])[0])
 
 
 def shapeless(found: CaseFit, recorded: Recorded) -> Struck:

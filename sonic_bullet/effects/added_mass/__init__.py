@@ -104,7 +104,7 @@ class AddedMass(ChangesBaseline, ActsAtPlaces):
                 return known  # beside what moves modes too, no other ν is at hand
             start = (0.0, near, known.mass_kg, (up, side), known.stretch, trial.fitted if ratio is None else ratio)
             return cls._at(x, trial.refined(start, MASS_SEARCH.widths[-1:]), observed.poisson is not None)
-        plain = patterns(observed, x)
+        plain = patterns(observed, x.shape[observed.places])
         none = min(
             (
                 agreed(

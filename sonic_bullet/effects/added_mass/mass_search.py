@@ -14,11 +14,12 @@ import numpy as np
 
 from sonic_bullet.effects.added_mass.free_body import FreeBody
 from sonic_bullet.effects.added_mass.mass_loaded_modes import attached, loaded
-from sonic_bullet.effects.common.pairs import agreed, every_line
+from sonic_bullet.effects.common.pairs import agreed, patterns, strongest_lines
 from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array, ModalModel
 from sonic_bullet.signal.matching import cosines
+from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import cauchy_weight
 
 
@@ -97,11 +98,11 @@ class MassFit:
     def of(cls, observed: ObjectEvidence) -> MassFit:
         """Prepare the fit of an object."""
         assert observed.plain is not None
-        line, size, _, _ = every_line(observed)
+        line = strongest_lines(observed)
         return cls(
             observed,
-            line,
-            size,
+            observed.every_hz[line],
+            np.abs(observed.every_amplitude[:, line]),
             observed.plain,
             _at_points(observed.plain, observed),
             vertex_normals(observed.plain),
@@ -165,10 +166,7 @@ class MassFit:
         phi = self.bare.shape[vertex].astype(float)
         phi = attached(phi if sums is None else phi @ sums, self.normal[vertex], along, small)
         x = loaded(small, phi, mass, self.bare.vertex_m[vertex], self.free)
-        s, observed = len(self.observed.strike_vertex), self.observed
-        level = np.where(np.isfinite(observed.impulse_n_s), observed.impulse_n_s, 1.0)
-        push = np.einsum("sxm,sx->sm", x.shape[:s].astype(float), observed.strike_direction) * level[:, None]
-        return x.freq_hz, np.abs(push * np.einsum("xm,x->m", x.shape[s].astype(float), observed.sensor_direction))
+        return x.freq_hz, patterns(self.observed, x.shape)
 
     def shifts(self, freq_hz: Array, pattern: Array) -> list[float]:
         """Find common shifts of ln f at which most lines and modes of like patterns (s, m) agree, and none.
@@ -185,7 +183,7 @@ class MassFit:
         edge = np.arange(reach[0] - bins, reach[1] + 2 * bins, bins)
         count = np.histogram(gap, edge, weights=np.broadcast_to(alike, gap.shape))[0]
         count = np.convolve(count, (0.5, 1.0, 0.5), "same")
-        peak = np.flatnonzero((count[1:-1] >= count[:-2]) & (count[1:-1] > count[2:])) + 1
+        peak = local_peaks(count)
         best = peak[np.argsort(-count[peak])][:peaks]
         return [0.0, *(float(edge[i] + bins / 2) for i in best)]
 

@@ -74,7 +74,7 @@ def about(h: ObjectEvidence, k: int, measure: str, angle: Array) -> tuple[Array,
     amplitude, level : (p, s, j)
         Amplitudes at the sensor up to one factor, and levels.
     """
-    impulse = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)[:, None]
+    impulse = h.level_n_s[:, None]
     if h.model is None:
         pressed = h.pressed[:, h.mode[k]].max(axis=1)[None, :, None]
         return impulse[None] * pressed, impulse[None] * pressed

@@ -175,9 +175,8 @@ def alone(h: ObjectEvidence) -> tuple[list[int], list[int]]:
     if h.signal is None:
         return [], []
     n, sr = h.signal.shape[1], h.sr
-    every = np.concatenate([h.freq_hz, h.foreign_hz])
-    decay = np.nan_to_num(np.concatenate([h.decay_per_s, h.foreign_decay_per_s]))
-    strength = np.concatenate([np.abs(h.amplitude).max(axis=0), np.abs(h.foreign_amplitude).max(axis=0)])
+    every, decay = h.every_hz, np.nan_to_num(h.every_decay_per_s)
+    strength = np.abs(h.every_amplitude).max(axis=0)
     chain, foreign = _chains(every, decay), np.arange(len(every)) >= len(h.freq_hz)
     selected, window = [], []
     for k in range(len(h.freq_hz)):
@@ -222,7 +221,7 @@ def levels(h: ObjectEvidence) -> dict[str, Array]:
     dict of (s, k)
         The impulse that the pulse leaves of the impact, peak velocity and peak displacement at the body's surface.
     """
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    level = h.level_n_s
     found = {"impulse": level[:, None] * np.stack([h.pressed[:, m].max(axis=1) for m in h.mode], axis=1)}
     if h.model is None:
         return found
@@ -252,7 +251,7 @@ def falls(e: Envelopes, q: int, fitted: float) -> float:
         Decay by a linear fit, returned where too few frames are clear.
     """
     held = 0.8  # of 2/L to both sides, at most: what the window holds of a drifting frequency
-    top = bottom = 0.0
+    rows = []
     for s in range(len(e.z)):
         use = e.good[s, q]
         if use.sum() < 8:
@@ -264,7 +263,22 @@ def falls(e: Envelopes, q: int, fitted: float) -> float:
             continue
         off = np.clip(off, -held, held)
         # while its frequency drifts, it is observed through the window's skirt
-        level = np.log(size * (1 - off**2) / np.sinc(off))
-        t = t - np.average(t, weights=w)
-        top, bottom = top - float((w * t * level).sum()), bottom + float((w * t * t).sum())
-    return max(top / bottom if bottom > 0 else fitted, 1e-3)
+        rows.append((t, np.log(size * (1 - off**2) / np.sinc(off)), w))
+    return max(common_fall(rows, fitted), 1e-3)
+
+
+def common_fall(rows: list[tuple[Array, Array, Array]], unknown: float) -> float:
+    """Fit one rate in 1/s to the fall of ln levels, each strike's from a level of its own, by weighted least squares.
+
+    Parameters
+    ----------
+    rows : list of ((n,), (n,), (n,))
+        Times in s, ln levels and weights, a strike each.
+    unknown : float
+        Returned where no times differ.
+    """
+    top = bottom = 0.0
+    for t, level, w in rows:
+        since = t - np.average(t, weights=w)
+        top, bottom = top - float((w * since * level).sum()), bottom + float((w * since * since).sum())
+    return top / bottom if bottom > 0 else unknown

@@ -12,29 +12,21 @@ from __future__ import annotations
 import numpy as np
 
 from sonic_bullet.effects.protocol import ObjectEvidence
-from sonic_bullet.records import Array, ModalModel
+from sonic_bullet.records import Array
 from sonic_bullet.signal.matching import cosines, pairs_of_least_price
 
 
-def every_line(h: ObjectEvidence) -> tuple[Array, Array, Array, Array]:
-    """Return the strongest lines of an object, ascending: f (k,), |A| (s, k), d (k,), and spread of f (k,)."""
+def strongest_lines(h: ObjectEvidence) -> Array:
+    """Select the strongest of all lines of an object, ascending in frequency: indices (k,)."""
     most_lines = 48
-    freq = np.concatenate([h.freq_hz, h.foreign_hz])
-    size = np.abs(np.concatenate([h.amplitude, h.foreign_amplitude], axis=1))
-    decay = np.concatenate([h.decay_per_s, h.foreign_decay_per_s])
-    sd = np.concatenate([h.freq_sd_hz, np.zeros(len(h.foreign_hz))])
-    strong = np.argsort(-np.nan_to_num(size).max(axis=0))[:most_lines]
-    strong = strong[np.argsort(freq[strong])]
-    return freq[strong], size[:, strong], decay[strong], sd[strong]
+    strong = np.argsort(-np.nan_to_num(np.abs(h.every_amplitude)).max(axis=0))[:most_lines]
+    return np.asarray(strong[np.argsort(h.every_hz[strong])])
 
 
-def patterns(h: ObjectEvidence, model: ModalModel) -> Array:
-    """Compute |J φ(p)·e φ(q)·n| (s, m) of the strikes."""
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-    push = np.einsum("sxm,sx->sm", model.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
-    return np.asarray(
-        np.abs(push * np.einsum("xm,x->m", model.shape[h.sensor_vertex].astype(float), h.sensor_direction))
-    )
+def patterns(h: ObjectEvidence, shape: Array) -> Array:
+    """Compute |J φ(p)·e φ(q)·n| (s, m) of the strikes by shapes (s + 1, 3, m) at strikes and sensor."""
+    into, out = h.participation(shape)
+    return np.asarray(np.abs(into * out))
 
 
 def worth_of(level: Array, loudest: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sonic_bullet.geometry import area_vectors_m2
 from sonic_bullet.records import Array, ModalModel
 
 
@@ -49,9 +50,7 @@ def places_alike(x: ModalModel, place: tuple[float, float, float]) -> Array:
 def vertex_normals(model: ModalModel) -> Array:
     """Compute outward unit normals (v, 3), means of the faces around a vertex weighted with their areas."""
     v, f = model.vertex_m, model.face
-    corner = v[f]
-    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal = np.zeros_like(v)
+    vector, normal = area_vectors_m2(v, f), np.zeros_like(v)
     for i in range(3):
-        np.add.at(normal, f[:, i], cross)
+        np.add.at(normal, f[:, i], vector)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300))

@@ -19,8 +19,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.effects.common.ringing import sounded
-from sonic_bullet.effects.protocol import Impact, ObjectEvidence, Ring
+from sonic_bullet.effects.common.ringing import single_hits
+from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
 from sonic_bullet.signal.short_time import positive_hann
 
@@ -151,7 +151,7 @@ def dereverberated(h: ObjectEvidence, delta: float) -> ObjectEvidence:
     )
     if not len(h.foreign_hz):
         return dry
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    level = h.level_n_s
     alone = np.repeat(level[:, None], len(h.foreign_hz), axis=1).astype(complex)
     r = read(h, np.array([delta]), h.foreign_hz, alone, [np.zeros(0, int)] * len(h.foreign_hz))
     amplitude, _ = _rescaled(r, alone, h.foreign_amplitude, h.foreign_sd)
@@ -182,18 +182,12 @@ def _rescaled(r: Read, own: Array, amplitude: Array, sd: Array) -> tuple[Array, 
 
 def direct(h: ObjectEvidence, delta: float) -> Array:
     """Synthesize the strikes (s, n) without the tail: lines' modes as estimated, others as the nearest of those."""
-    assert h.signal is not None
     r = through(h, delta)
     near = np.abs(np.log(h.all_hz[:, None] / h.freq_hz)).argmin(axis=1)
     shift = np.zeros(len(h.all_hz))
     for k, members in enumerate(h.mode):
         near[members], shift[members] = k, h.freq_hz[k] + r.shift_hz[0, k] - h.all_hz[members]
-    none = np.zeros(len(near))
-    once = Impact(1.0, np.zeros(1), np.ones(1))
-    rings = (
-        Ring(h.all_hz + shift, r.decay_per_s[0, near], row * r.amplitude[0, near], none, none, none) for row in h.push
-    )
-    return np.stack([sounded(ring, once, h.signal.shape[1], h.sr) for ring in rings])
+    return single_hits(h, h.all_hz + shift, r.decay_per_s[0, near], h.push * r.amplitude[0, near])
 
 
 def _frames(h: ObjectEvidence) -> tuple[Array, Array]:

@@ -112,14 +112,14 @@ def walls(vertex_m: Array, face: Array) -> tuple[Array, Array]:
 def _unit_walls(vertex_bytes: bytes, face_bytes: bytes) -> tuple[Array, Array]:
     """Return `walls` of a surface of extent 1, by steps as long as the surface is far [sphere tracing, Hart 1996]."""
     from sonic_bullet.geometry.nearest_point import nearest, surface_index
+    from sonic_bullet.geometry.triangles import area_vectors_m2
 
     most, begin, close = 200, 1e-4, 1e-5  # steps; the first; where the ray has ended
     vertex = np.frombuffer(vertex_bytes).reshape(-1, 3)
     face = np.frombuffer(face_bytes, np.int64).reshape(-1, 3)
     index = surface_index(vertex, face)
-    corner = vertex[face]
-    middle = corner.mean(axis=1)
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle = vertex[face].mean(axis=1)
+    normal = area_vectors_m2(vertex, face)
     size = np.linalg.norm(normal, axis=1)
     inward = -normal / np.maximum(size, 1e-300)[:, None]
     depth = np.full(len(face), begin)

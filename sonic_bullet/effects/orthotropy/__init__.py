@@ -14,9 +14,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, ringing
+from sonic_bullet.effects.orthotropy.tensor_lines import LINE_CAP, body_lines_of, ringing, weigh_lines
 from sonic_bullet.effects.orthotropy.tensor_search import Tensor, fitted, isotropic_p, search
-from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, TENSOR_SEARCH, p_of
+from sonic_bullet.effects.orthotropy.tensors import NAMES, SYMMETRIES, TENSOR_SEARCH, isotropic_shear, p_of
 from sonic_bullet.effects.protocol import Cost, Effect, Evidence, ObjectEvidence, Owner, Stage, Traits
 from sonic_bullet.records import ORTHOTROPIC, Array, Material
 
@@ -119,8 +119,7 @@ class Orthotropy(Effect):
 def departure(tensor: Tensor) -> float:
     """Compute the distance from isotropy: the largest of |ln E_i/E_j| and |ln G_ij/(√(E_i E_j)/2(1+n_ij))|."""
     p = tensor.p
-    goes = 0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]]) - np.log(2 * (1 + p[3:6]))
-    return float(max(np.ptp(p[:3]), np.abs(p[6:] - goes).max()))
+    return float(max(np.ptp(p[:3]), np.abs(p[6:] - isotropic_shear(p)).max()))
 
 
 def _fits(h: ObjectEvidence) -> bool:
@@ -137,14 +136,7 @@ def _fits(h: ObjectEvidence) -> bool:
         modes = model.freq_hz if model is not None else h.all_hz
         strange = np.abs(np.log(h.foreign_hz[own][:, None] / modes[None, :]) - shift).min(axis=1)
         left = np.concatenate([left, np.minimum(strange, LINE_CAP)])
-    size = np.concatenate(
-        [np.linalg.norm(np.nan_to_num(a), axis=0) for a in (h.amplitude, h.foreign_amplitude[:, own])]
-    )
-    worth = (
-        np.clip(0.5 + 0.06 * np.log10(np.maximum(size / max(size.max(initial=0), 1e-300), 1e-12)), 0.05, 1)
-        if size.any()
-        else np.ones(len(left))
-    )
+    worth = weigh_lines(np.concatenate([h.amplitude, h.foreign_amplitude[:, own]], axis=1))
     return bool(np.sqrt((worth * left**2).sum() / worth.sum()) < suffices)
 
 

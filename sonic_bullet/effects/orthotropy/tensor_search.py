@@ -31,6 +31,7 @@ from sonic_bullet.effects.orthotropy.tensors import (
     constants,
     cubes,
     expanded,
+    isotropic_shear,
     reduced,
     sound,
     stiffness,
@@ -38,6 +39,7 @@ from sonic_bullet.effects.orthotropy.tensors import (
 from sonic_bullet.effects.protocol import Elastic, Evidence
 from sonic_bullet.parallel import parallel_map
 from sonic_bullet.records import Array
+from sonic_bullet.signal.peaks import local_peaks
 
 TENSOR_STEP = np.array([0.3] * 3 + [0.08] * 3 + [0.3] * 3)
 
@@ -190,7 +192,7 @@ def _agreement(lines: BodyLines, seen: Seen, first: Array, shift: Array) -> Arra
 
 def _peaks(score: Array) -> list[int]:
     """Return the indices of a curve's peaks, the highest first."""
-    inner = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
+    inner = local_peaks(score)
     return [int(i) for i in inner[np.argsort(-score[inner])]] or [int(np.argmax(score))]
 
 
@@ -260,9 +262,7 @@ def _prior(guess: Array) -> Callable[[Array], Array]:
     prior_n, prior_g = 0.1, 0.7  # of n about the guess' ν, of ln G about √(E_i E_j)/2(1+n)
 
     def of(p: Array) -> Array:
-        e = p[:3]
-        goes = 0.5 * np.array([e[1] + e[2], e[0] + e[2], e[0] + e[1]]) - np.log(2 * (1 + p[3:6]))
-        return np.concatenate([(p[3:6] - guess[3:6]) / prior_n, (p[6:] - goes) / prior_g])
+        return np.concatenate([(p[3:6] - guess[3:6]) / prior_n, (p[6:] - isotropic_shear(p)) / prior_g])
 
     return of
 

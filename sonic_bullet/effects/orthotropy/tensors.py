@@ -43,20 +43,29 @@ class _TensorSearch(NamedTuple):
 TENSOR_SEARCH = _TensorSearch()
 
 
+def _normal_compliance(p: Array) -> Array:
+    """Compute √(E_i E_j) S_ij (3, 3) of p (9,): 1, and −n_ij between axes."""
+    return np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
+
+
+def isotropic_shear(p: Array) -> Array:
+    """Compute ln √(E_i E_j)/2(1 + n_ij) (3,) of p (9,): ln G_ij of a body whose planes were each isotropic."""
+    e = p[:3]
+    return np.asarray(0.5 * np.array([e[1] + e[2], e[0] + e[2], e[0] + e[1]]) - np.log(2 * (1 + p[3:6])))
+
+
 def stiffness(p: Array) -> Array:
     """Compute C/ρ (6, 6) of p (9,) in m²/s²."""
     root = np.exp(-0.5 * p[:3])
-    normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
     found = np.zeros((6, 6))
-    found[:3, :3] = np.linalg.inv(normal * np.outer(root, root))
+    found[:3, :3] = np.linalg.inv(_normal_compliance(p) * np.outer(root, root))
     found[range(3, 6), range(3, 6)] = np.exp(p[6:])
     return found
 
 
 def sound(p: Array) -> bool:
     """Decide whether the tensor of p is positive definite."""
-    normal = np.array([[1, -p[5], -p[4]], [-p[5], 1, -p[3]], [-p[4], -p[3], 1]])
-    return bool(np.linalg.eigvalsh(normal)[0] > 0.02)
+    return bool(np.linalg.eigvalsh(_normal_compliance(p))[0] > 0.02)
 
 
 def constants(p: Array) -> Array:
@@ -126,10 +135,6 @@ def bricks(start: Array, ratios: tuple[float, ...] = RATIOS) -> list[Array]:
                 e = np.log(np.array([1.0, y, z]))
                 p = np.array(start)
                 p[:3] += e - e.mean()
-                p[6:] = (
-                    0.5 * np.array([p[1] + p[2], p[0] + p[2], p[0] + p[1]])
-                    - np.log(2 * (1 + start[3:6]))
-                    + np.log(soft)
-                )
+                p[6:] = isotropic_shear(p) + np.log(soft)
                 found.append(p)
     return found

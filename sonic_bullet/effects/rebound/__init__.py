@@ -168,7 +168,7 @@ def _refined(start: Rebound, h: ObjectEvidence, *, known: bool = False) -> tuple
     # the bins that hold the modes
     loud = np.sort(loud[: 1 + int(np.searchsorted(np.cumsum(own.sum(axis=0)[loud]), held * own.sum()))])
     both, own, cycles = both[:, loud], own[:, loud], np.fft.rfftfreq(size, 1 / h.sr)[loud]
-    level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
+    level = h.level_n_s
     total = ((h.signal[:, :n] * window) ** 2).sum(axis=1) * size / 2
 
     def of(x: Array) -> dict[str, Any]:

@@ -131,15 +131,7 @@ class Room(Dereverberates):
             or observed.signal.shape[1] < reverberant_tail.LEAST * reverberant_tail.FRAME_S * observed.sr
         ):
             return None
-        sizes = np.concatenate([observed.amplitude, observed.foreign_amplitude], axis=1)
-        if (
-            copied(
-                np.concatenate([observed.freq_hz, observed.foreign_hz]),
-                np.concatenate([observed.decay_per_s, observed.foreign_decay_per_s]),
-                sizes,
-            )
-            is not None
-        ):
+        if copied(observed.every_hz, observed.every_decay_per_s, observed.every_amplitude) is not None:
             return None  # something moves
         found = late(observed, RT60 / evidence.known.rt60_s if isinstance(evidence.known, cls) else None)
         if found is None:
@@ -150,10 +142,8 @@ class Room(Dereverberates):
             ForeignMode.propose(replace(evidence, observed=(reverberant_tail.dereverberated(observed, delta),))),
         )
         if along is not None:  # what rings along is heard in the room too
-            level = np.where(np.isfinite(observed.impulse_n_s), observed.impulse_n_s, 1.0)
-            sound = np.stack(
-                [along.apply(Sound(x, observed.sr, float(j))).sample for x, j in zip(sound, level, strict=True)]
-            )
+            strikes = zip(sound, observed.level_n_s, strict=True)
+            sound = np.stack([along.apply(Sound(x, observed.sr, float(j))).sample for x, j in strikes])
         return cls(RT60 / delta, reverberant_level).identified_from(observed.signal, sound, observed.noise, observed.sr)
 
 

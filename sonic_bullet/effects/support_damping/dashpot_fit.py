@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sonic_bullet.effects.common.dashpots import coupled, split_into_runs
-from sonic_bullet.effects.common.pairs import every_line, worth_of
+from sonic_bullet.effects.common.pairs import strongest_lines, worth_of
 from sonic_bullet.effects.common.points import vertex_normals
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.effects.support_damping.dashpot_numbers import DASHPOTS
@@ -109,21 +109,15 @@ class DashpotFit:
         weak, half = 0.05, 0.5
         x = h.model
         assert x is not None
-        lone = np.zeros(len(h.foreign_hz))
-        freq, size, decay, _ = every_line(h)
-        sd = np.concatenate([h.decay_sd_per_s, lone])
-        every = np.concatenate([h.freq_hz, h.foreign_hz])
-        index = np.array([int(np.flatnonzero(every == f)[0]) for f in freq], int)
-        good = np.isfinite(decay) & (decay > 0)
-        freq, size, decay, index = freq[good], size[:, good], decay[good], index[good]
+        sd = np.concatenate([h.decay_sd_per_s, np.zeros(len(h.foreign_hz))])
+        index, rings = strongest_lines(h), h.every_decay_per_s
+        index = index[np.isfinite(rings[index]) & (rings[index] > 0)]
+        freq, amplitude, decay = h.every_hz[index], h.every_amplitude[:, index], rings[index]
         is_mode = index < len(h.freq_hz)
         at_home = np.abs(np.log(freq[:, None] / x.freq_hz)).min(axis=1) < DASHPOTS.width
-        strength = np.nan_to_num(size).max(axis=0)
+        strength = np.nan_to_num(np.abs(amplitude)).max(axis=0)
         worth = worth_of(strength, strength.max(initial=0.0)) * np.where(is_mode, 1, np.where(at_home, half, weak))
-        amplitude = np.concatenate([h.amplitude, h.foreign_amplitude], axis=1)[:, index]
-        level = np.where(np.isfinite(h.impulse_n_s), h.impulse_n_s, 1.0)
-        into = np.einsum("sxm,sx->sm", x.shape[h.strike_vertex].astype(float), h.strike_direction) * level[:, None]
-        out = np.einsum("xm,x->m", x.shape[h.sensor_vertex].astype(float), h.sensor_direction)
+        into, out = h.participation(x.shape[h.places])
         known = into.any(axis=1)  # strikes of unknown place tell decays, no pattern
         amplitude, into = (amplitude[known], into[known]) if known.any() else (amplitude, into)
         through = np.nan_to_num(np.abs(h.push).max(axis=0) / np.maximum(np.abs(into * out).max(axis=0), 1e-300))
@@ -136,8 +130,8 @@ class DashpotFit:
             np.hypot(np.nan_to_num(sd[index], posinf=1e9), DASHPOTS.law * decay) + 1e-3,
             amplitude,
             worth,
-            every,
-            np.concatenate([h.decay_per_s, h.foreign_decay_per_s]),
+            h.every_hz,
+            rings,
             through / max(through.max(initial=0.0), 1e-300),
             h.signed,
             x,

@@ -76,11 +76,11 @@ def observation(
     for i, (position, direction, impulse) in enumerate(strikes):
         if position is None:
             continue
-        unit = np.array(direction, float) if direction is not None else -_normal(family, position)
+        unit = np.array(direction, float) if direction is not None else -surface_normal(family, position)
         rows[i] = _row(family, position, unit, f"strike {i + 1}") * (1.0 if impulse is None else impulse)
     sensor = None
     if kind == "velocity" and sensor_m is not None:
-        unit = np.array(sensor_direction, float) if sensor_direction is not None else _normal(family, sensor_m)
+        unit = np.array(sensor_direction, float) if sensor_direction is not None else surface_normal(family, sensor_m)
         sensor = _row(family, sensor_m, unit / np.linalg.norm(unit), "sensor")
     level = np.array([impulse is not None for _, _, impulse in strikes])
     return Observation(rows, sensor, known, level, kind, 1 / (density_kg_m3 * family.length_m**3))
@@ -116,7 +116,8 @@ def check_strikes(shape: Shape, positions_m: list[tuple[float, float, float] | N
     return len(known)
 
 
-def _normal(family: Family, position: tuple[float, float, float]) -> Array:
+def surface_normal(family: Family, position: tuple[float, float, float]) -> Array:
+    """Compute the unit normal (3,), out of the body, at the surface point nearest to a position in m."""
     from sonic_bullet.geometry import outward_normals
     from sonic_bullet.geometry.nearest_point import closest_point
 

@@ -25,6 +25,7 @@ from sonic_bullet.estimator.lines.shared_poles import FASTEST_PER_S
 from sonic_bullet.modal.isotropic_family import Family
 from sonic_bullet.records import Array
 from sonic_bullet.signal.matching import cosines, pairs_of_least_price
+from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import cauchy_weight
 
 
@@ -193,7 +194,7 @@ def best_pairs(
                 if total > 0
                 else 0.0
             )
-        peak = np.flatnonzero((score[1:-1] >= score[:-2]) & (score[1:-1] > score[2:])) + 1
+        peak = local_peaks(score)
         found += [(float(score[i]), float(grid[i]), float(nu)) for i in peak]
     found.sort(reverse=True)
     chosen: list[tuple[float, float]] = []
@@ -203,6 +204,11 @@ def best_pairs(
         if len(chosen) == candidates:
             break
     return chosen
+
+
+def degenerate_runs(freq_hz: Array, split: float = PAIRING.degenerate_split) -> Array:
+    """Count the runs (m,) of ascending modes that lie no farther apart than degenerate ones, in ln f."""
+    return np.asarray(np.cumsum(np.diff(np.log(freq_hz), prepend=-np.inf) > split))
 
 
 def assign(group: Group, lines: Lines, seen: Observation, width: float) -> tuple[Array, Array, float]:

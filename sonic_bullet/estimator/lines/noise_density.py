@@ -21,6 +21,7 @@ import numpy as np
 
 from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median
+from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.short_time import positive_hann, power_spectrum
 
 FRAME = 256
@@ -139,7 +140,8 @@ def matched(
         score[i] = 2 * power_spectrum(left, fade, size) / (sigma2 * (share[i] * float(fade @ fade)))
     score[:, (freq < band_hz[0]) | (freq > band_hz[1])] = 0
     best = score.max(axis=0)
-    peak = np.flatnonzero((best[1:-1] > needed(freq)[1:-1]) & (best[1:-1] >= best[:-2]) & (best[1:-1] > best[2:])) + 1
+    peak = local_peaks(best)
+    peak = peak[best[peak] > needed(freq)[peak]]
     chosen: list[complex] = []
     for at in peak[np.argsort(-best[peak], kind="stable")]:
         d, f = decay[int(np.argmax(score[:, at]))], freq[at]
