@@ -18,7 +18,7 @@ from scipy.ndimage import convolve1d
 
 from sonic_bullet.records import Array
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
-from sonic_bullet.signal.short_time import short_time_power, window_energy
+from sonic_bullet.signal.short_time import filtered, short_time_power, window_energy
 
 
 class _SpectralDistance(NamedTuple):
@@ -170,8 +170,8 @@ def spectra_distance_db(
 
 def with_noise(sound: Array, floor: Floor, seed: int) -> Array:
     """Return the sound (n,) plus Gaussian noise like ``floor``."""
-    spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal(len(sound)))
-    return np.asarray(sound + np.fft.irfft(spectrum * np.sqrt(floor.at(len(spectrum))), len(sound)))
+    noise = np.random.default_rng(seed).standard_normal(len(sound))
+    return np.asarray(sound + filtered(noise, np.sqrt(floor.at(len(sound) // 2 + 1))))
 
 
 def noise_floor_db(

@@ -30,6 +30,27 @@ def power_spectrum(signal: Array, window: Array | None = None, size: int | None 
     return np.asarray(np.abs(np.fft.rfft(signal if window is None else signal * window, size, axis=-1)) ** 2)
 
 
+def filtered(signal: Array, gain: Array, size: int | None = None) -> Array:
+    """Filter whole signals by a gain over frequency, circularly over N samples.
+
+    Parameters
+    ----------
+    signal : (…, n)
+        The signals.
+    gain : (…, N/2 + 1)
+        Factors of the spectrum, complex where they delay.
+    size : int
+        N, zeros after the signal; n where None. What a filter of t taps adds wraps around where N < n + t − 1.
+
+    Returns
+    -------
+    (…, N) array
+        y, of Y[k] = G[k] X[k]                                             [Oppenheim & Schafer 2010, sec. 8.7.2].
+    """
+    size = signal.shape[-1] if size is None else size
+    return np.asarray(np.fft.irfft(np.fft.rfft(signal, size) * gain, size))
+
+
 def short_time_spectra(signal: Array, window: int | Array, hop: int) -> Array:
     """Compute the spectra of frames that lie wholly inside a signal.
 

@@ -7,8 +7,9 @@ import pytest
 
 from sonic_bullet.signal.exponential_law import mean_by_median, mean_by_quartile
 from sonic_bullet.signal.matching import cosines, pairs_of_least_price
+from sonic_bullet.signal.peaks import local_peaks
 from sonic_bullet.signal.robust import cauchy_loss, cauchy_weight, fit_nonnegative, normal_sd, weighted_median
-from sonic_bullet.signal.short_time import positive_hann, power_spectrum, raised_cosine, short_time_spectra
+from sonic_bullet.signal.short_time import filtered, positive_hann, power_spectrum, raised_cosine, short_time_spectra
 
 
 def test_a_weight_is_the_losses_slope_over_the_residual() -> None:
@@ -66,3 +67,15 @@ def test_power_is_parsevals_and_a_window_may_be_any() -> None:
 def test_a_fade_and_its_reverse_sum_to_one() -> None:
     t = np.linspace(-0.2, 1.2, 200)
     assert raised_cosine(t) + raised_cosine(1 - t) == pytest.approx(np.ones(200))
+
+
+def test_a_filter_is_its_taps_convolution_where_zeros_leave_room() -> None:
+    rng = np.random.default_rng(3)
+    x, taps, size = rng.standard_normal(300), rng.standard_normal(40), 340
+    assert filtered(x, np.fft.rfft(taps, size), size)[:339] == pytest.approx(np.convolve(x, taps), abs=1e-12)
+
+
+def test_peaks_are_those_of_a_cosine_and_the_ends_are_none() -> None:
+    t = np.arange(0, 401) / 100
+    assert local_peaks(np.cos(2 * np.pi * t)).tolist() == [100, 200, 300]
+    assert local_peaks(np.array([0.0, 1.0, 1.0, 0.0])).tolist() == [2]

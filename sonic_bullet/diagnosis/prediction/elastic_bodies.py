@@ -17,7 +17,7 @@ import numpy as np
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck, modal_model
 from sonic_bullet.effects.protocol import Elastic
 from sonic_bullet.estimator.fit.case_fit import CaseFit
-from sonic_bullet.estimator.fit.observation import surface_normal
+from sonic_bullet.estimator.fit.observation import direction_at
 from sonic_bullet.estimator.fit.recorded import guess_of
 from sonic_bullet.files.cases import Case, CaseRecording
 from sonic_bullet.modal import read_mesh
@@ -122,14 +122,12 @@ def elastic_of(
         strike = np.full((len(recordings), body.skin.shape[2]), np.nan)
         for i, r in enumerate(recordings):
             if r.position_m is not None:
-                direction = (
-                    np.array(r.direction, float) if r.direction is not None else -surface_normal(body, r.position_m)
-                )
+                direction = direction_at(body, r.position_m, r.direction, inward=True)
                 strike[i] = body.points(np.array([r.position_m]), direction[None])[0][0] * level_n_s[i]
         at, along = (None if spots is None else spots.get(name) for spots in (case.sensor_m, case.sensor_direction))
         if case.sensor != "velocity" or at is None:
             return strike, None
-        direction = np.array(along, float) if along is not None else surface_normal(body, at)
+        direction = direction_at(body, at, along, inward=False)
         return strike, body.points(np.array([at]), direction[None])[0][0]
 
     def look(stiffness_m2_s2: Array) -> tuple[Array, Callable[[Array], Array], Array]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from sonic_bullet.effects.protocol import Elastic, Poisson
 from sonic_bullet.estimator.fit.case_fit import POISSON, CaseFit, ObjectFit
-from sonic_bullet.estimator.fit.observation import surface_normal
+from sonic_bullet.estimator.fit.observation import direction_at
 from sonic_bullet.estimator.fit.radiation_share import into_air
 from sonic_bullet.estimator.fit.recorded import RecordedObject as Recorded
 from sonic_bullet.estimator.fit.recorded import body_family, guess_of
@@ -241,7 +241,7 @@ def modal_model(
             continue
         rows, _ = family.points(np.tile(position, (3, 1)), axes)
         extra.append(rows @ vector / scale)
-        direction.append(np.array(along, float) if along is not None else -surface_normal(family, position))
+        direction.append(direction_at(family, position, along, inward=True))
         place.append(np.array(position, float))
     freq = np.sqrt(value) / (2 * np.pi)
     if case.sensor != "velocity":

@@ -15,6 +15,7 @@ import numpy as np
 from sonic_bullet.effects.common.ringing import direct_as_expected
 from sonic_bullet.effects.protocol import ObjectEvidence
 from sonic_bullet.records import Array
+from sonic_bullet.signal.short_time import filtered
 
 
 class _LaterHits(NamedTuple):
@@ -166,7 +167,7 @@ def _delayed(x: Array, lag_s: float, sr: int) -> Array:
     n = len(x)
     size = 2 * n
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(size, 1 / sr) * lag_s)
-    return np.asarray(np.fft.irfft(np.fft.rfft(x, size) * turn, size)[:n])
+    return filtered(x, turn, size)[:n]
 
 
 def _solved(x: Array, y: Array, lags: list[float], sr: int) -> tuple[Array, Array]:

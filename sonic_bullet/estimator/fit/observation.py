@@ -76,11 +76,11 @@ def observation(
     for i, (position, direction, impulse) in enumerate(strikes):
         if position is None:
             continue
-        unit = np.array(direction, float) if direction is not None else -surface_normal(family, position)
+        unit = direction_at(family, position, direction, inward=True)
         rows[i] = _row(family, position, unit, f"strike {i + 1}") * (1.0 if impulse is None else impulse)
     sensor = None
     if kind == "velocity" and sensor_m is not None:
-        unit = np.array(sensor_direction, float) if sensor_direction is not None else surface_normal(family, sensor_m)
+        unit = direction_at(family, sensor_m, sensor_direction, inward=False)
         sensor = _row(family, sensor_m, unit / np.linalg.norm(unit), "sensor")
     level = np.array([impulse is not None for _, _, impulse in strikes])
     return Observation(rows, sensor, known, level, kind, 1 / (density_kg_m3 * family.length_m**3))
@@ -116,10 +116,15 @@ def check_strikes(shape: Shape, positions_m: list[tuple[float, float, float] | N
     return len(known)
 
 
-def surface_normal(family: Family, position: tuple[float, float, float]) -> Array:
-    """Compute the unit normal (3,), out of the body, at the surface point nearest to a position in m."""
+def direction_at(
+    family: Family, position: tuple[float, float, float], given: tuple[float, float, float] | None, *, inward: bool
+) -> Array:
+    """Return the given direction (3,), or the unit normal at the surface point nearest to a position in m."""
+    if given is not None:
+        return np.array(given, float)
     from sonic_bullet.geometry import outward_normals
     from sonic_bullet.geometry.nearest_point import closest_point
 
     face, _, _ = closest_point(family.vertex_m, family.face, np.array([position]))
-    return np.asarray(outward_normals(family.vertex_m, family.face[face])[0])
+    normal = np.asarray(outward_normals(family.vertex_m, family.face[face])[0])
+    return -normal if inward else normal

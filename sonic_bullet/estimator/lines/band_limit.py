@@ -9,7 +9,7 @@ import numpy as np
 
 from sonic_bullet.estimator.lines.linear_prediction import predicted_on
 from sonic_bullet.records import Array
-from sonic_bullet.signal.short_time import raised_cosine
+from sonic_bullet.signal.short_time import filtered, raised_cosine
 
 LOWEST_AUDIBLE_HZ = 20.0  # of what is heard
 
@@ -33,7 +33,7 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     """
     periods, band_order = 8.0, 64  # of the lower edge that a recording goes on for at its ends; terms that say how
     fall = (0.92, 1.05)  # of the lower edge, of the upper: where the filter is silent
-    from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.fft import next_fast_len
 
     low, high = band_hz
     reach = min(len(signal), round(periods / max(low, 1.0) * sr))
@@ -46,7 +46,7 @@ def limit_band(signal: Array, sr: int, band_hz: tuple[float, float]) -> Array:
     gain = raised_cosine((freq - fall[0] * low) / (low - fall[0] * low))
     if high * fall[1] < sr / 2:
         gain *= 1 - raised_cosine((freq - high) / (fall[1] * high - high))
-    return np.asarray(irfft(rfft(whole, size) * gain, size)[reach : reach + len(signal)])
+    return filtered(whole, gain, size)[reach : reach + len(signal)]
 
 
 def without_drift(signal: Array, sr: int) -> tuple[Array, str]:

@@ -18,6 +18,7 @@ import numpy as np
 from sonic_bullet.records import Array, Head
 from sonic_bullet.records.coerce import as_path
 from sonic_bullet.records.errors import FileError
+from sonic_bullet.signal.short_time import filtered
 
 
 def read_head(path: str | os.PathLike[str]) -> Head:
@@ -101,7 +102,7 @@ def _delayed(response: Array, delay: Array) -> Array:
     turn = np.exp(-2j * np.pi / size * delay[..., None] * np.arange(size // 2 + 1))
     whole = np.zeros((*response.shape[:2], size))
     exact = delay == np.round(delay)
-    shifted = np.fft.irfft(np.fft.rfft(response, size) * turn, size)
+    shifted = filtered(response, turn, size)
     for i, ear in zip(*np.nonzero(exact), strict=True):
         at = int(delay[i, ear])
         whole[i, ear, at : at + response.shape[2]] = response[i, ear]
