@@ -45,7 +45,7 @@ def fork_on_board() -> Iterator[Line]:
         taken = taken_per_s(placed, k)
         for how in (placed.newton, placed.runs):
             own = one.resonator.weight[0, 0]
-            whole = own + transmitted_weight(on.resonator, how.transmissions[0], how.omega_rad_s)[0, 0]
+            whole = own + transmitted_weight(on.resonator, how, 0)[0, 0]
             louder.append(20 * np.log10(abs(whole) / abs(own)))
             grown.append((how.decay_per_s[0] - one.mobility.decay_per_s[0]) / taken)
         name = f"fork {one.hz[0]:.0f} Hz, its foot's motion {foot_over_tip(one):.2%} of its tip's, on 24 mm of wood"

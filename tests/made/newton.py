@@ -79,6 +79,7 @@ def _described(
         s.imag,
         decay,
         turn,
+        np.eye(m),
         tuple(transmitted[:, a : b - 6].T for a, b in pairwise(ends)),
         np.abs(force).T,
         _shares(x, m, s.imag, decay, v, force),

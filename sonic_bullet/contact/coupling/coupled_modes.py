@@ -51,7 +51,8 @@ class CoupledModes:
         The identity where they do not mix. State z, gains Uᵀj and shapes of the free modes become turnᵀ z, turnᵀ Uᵀj,
         Φ turn: ½|z|² stays what it is.
     omega_rad_s, decay_per_s : (m,) poles of the new modes; no decay is below 0
-    transmissions : for each partner (m_p, m) complex, its modes' velocity per velocity of each new mode
+    motion : (m, m) real: the part of each old mode, turned, in each new mode's motion, by columns
+    moved : for each partner (m_p, m) complex, its modes' velocity per velocity of each motion
         At most ½ in all: of two that meet at one frequency, each has the other's half.
     force_n_s : (c, m) amplitude of the normal force at each touch in N, for a velocity amplitude z of 1 of a new mode
         Where Σ|force z| exceeds the load the contact separates.
@@ -62,10 +63,20 @@ class CoupledModes:
     omega_rad_s: Array
     decay_per_s: Array
     turn: Array
-    transmissions: tuple[Array, ...]
+    motion: Array
+    moved: tuple[Array, ...]
     force_n_s: Array
     shares: Array
     newton: Array
+
+    @property
+    def transmissions(self) -> tuple[Array, ...]:
+        """For each partner (m_p, m) complex, its modes' velocity per velocity of each new mode."""
+        return tuple(moved @ self.motion.T for moved in self.moved)
+
+    def transmitted_weight(self, partner: int, weight: Array) -> Array:
+        """Compute weights (w, m) of the new modes in what a partner's modes with weights (w, m_p) make heard."""
+        return np.asarray((weight @ self.moved[partner]) @ self.motion.T)
 
 
 class CoupledSystem(NamedTuple):
@@ -98,6 +109,7 @@ def uncoupled_modes(
     return CoupledModes(
         body.omega_rad_s,
         body.decay_per_s,
+        np.eye(m),
         np.eye(m),
         tuple(np.zeros((len(p.omega_rad_s), m), complex) for p in partners),
         np.zeros((len(touches), m)),

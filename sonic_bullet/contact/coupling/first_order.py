@@ -20,14 +20,13 @@ from itertools import pairwise
 import numpy as np
 
 from sonic_bullet.contact.coupling.coupled_modes import (
-    STIFFEST_RATIO,
-    STOPPED_RATIO,
     ContactPoint,
     CoupledModes,
     collect_springs,
     uncoupled_modes,
 )
 from sonic_bullet.contact.coupling.mobility import BodyMobility
+from sonic_bullet.contact.coupling.motion_poles import Motions, choose_motions, couple, solve_motions
 from sonic_bullet.records import Array
 
 
@@ -51,62 +50,22 @@ def first_order(
     if not m or not any(t.spring.normal_n_m or t.spring.tangential_n_m for t in touches):
         return uncoupled_modes(body, partners, touches)
     x, row = collect_springs(body, partners, touches)
-    light = np.flatnonzero((x.other_lam == 0) & x.other.any(axis=0))
-    yields = np.flatnonzero(x.other_lam > 0)
-    modes = x.other[:, yields]
-    both = np.hstack([x.own, -x.other[:, light]])
-    spring = x.spring.real
-    stiff = both.T @ (spring[:, None] * both)
-    stiff[np.diag_indices(len(x.lam))] += x.lam
+    both, stiff = couple(x)
     value, vector = np.linalg.eigh(stiff)
-    chosen, turn = _choose(vector, body.pairs, np.eye(m) if before is None else before)
-    vector[:m], both[:, :m] = turn.T @ vector[:m], both[:, :m] @ turn
-    q, omega = vector[:, chosen], np.sqrt(np.maximum(value[chosen], 0.0))
-    every = spring[:, None] * (both @ vector)
-    force = every[:, chosen]
-    s = 1j * omega
-    along = modes.T @ force
-    yielding = 1 / (x.other_lam[yields, None] + 2 * x.other_decay[yields, None] * s + s**2)
-    moved = along * yielding
-    plate = (x.plate[:, None] - x.half_space[:, None] * s**2) / np.where(s == 0, 1, s)
-    lossy, gives = (1 / x.spring - 1 / spring)[:, None] * force, times(modes, moved) + plate * force
-    contact, partner = (force * lossy).sum(axis=0), (force * gives).sum(axis=0)
-    held_against = _held_against(spring, every, value, chosen, lossy + gives)
-    yielded = contact + partner
-    part = 1 / (1 + held_against / np.where(np.abs(yielded) > 0, yielded, 1))
-    shift = part * yielded
-    slope = -(part**2) * (moved**2).sum(axis=0)
-    shift *= 2 / (1 + np.sqrt(1 - 4 * slope))
-    shift = shift.real + 1j * np.minimum(shift.imag, 0)  # no mode gains
-    own = (q[:m] ** 2).T @ x.decay[:m]
-    new = -own + 1j * np.sqrt(omega**2 - shift - own**2)
-    held = (
-        (omega > STIFFEST_RATIO * np.sqrt(x.lam[:m].max()))
-        | (-new.real > STOPPED_RATIO * np.abs(new))
-        | ~(new.imag > 0)
-    )
-    root = np.sqrt(x.lam[:m])
-    new = np.where(held, root * (-STOPPED_RATIO + 1j * np.sqrt(1 - STOPPED_RATIO**2)), new)
-    force = np.where(held, 0, force * part) / np.where(s == 0, 1, s)
-    lifts = np.zeros((3 * len(touches), m))
-    lifts[row] = np.abs(times_real(force, q[:m].T))
-    transmitted = np.where(held, 0, moved * part / (1 + shift * part * yielding))
-    transmitted /= 1 + size_squared(transmitted).sum(axis=0)
-    transmitted = times_real(transmitted, q[:m].T)
+    vector = np.ascontiguousarray(vector)
+    chosen = choose_motions(vector, m, body.pairs)
+    if chosen[0] < 0:
+        chosen = _share_motions(vector[:m], body.pairs)
+    earlier = np.zeros((0, 0)) if before is None else before
+    found = solve_motions(x, Motions(value, vector, both, chosen, body.pairs, earlier))
+    normal = np.flatnonzero(row % 3 == 0)
+    lifts = np.zeros((len(touches), m))
+    real, imaginary = found.force[:, normal] @ found.motion.T
+    lifts[row[normal] // 3] = np.sqrt(real**2 + imaginary**2)
     ends = np.cumsum([0, *(len(p.omega_rad_s) for p in partners)])
-    decay = np.maximum(-new.real, 0.0)
-    power = np.stack([own, -contact.imag, -partner.imag], axis=1)
-    power[:, 1:] *= (np.abs(part) ** 2 / np.maximum(2 * omega, 1e-300))[:, None]
-    power = np.maximum(power, 0.0)
-    whole = np.maximum(power.sum(axis=1, keepdims=True), 1e-300)
+    moved = tuple(found.moved[a:b] for a, b in pairwise(ends))
     return CoupledModes(
-        new.imag,
-        decay,
-        turn,
-        tuple(transmitted[a:b] for a, b in pairwise(ends)),
-        lifts[::3],
-        decay[:, None] * power / whole,
-        ~held,
+        found.omega_rad_s, found.decay_per_s, found.turn, found.motion, moved, lifts, found.shares, found.newton
     )
 
 
@@ -120,39 +79,14 @@ def assign_columns(share: Array) -> Array:
     return chosen
 
 
-def _choose(vector: Array, pairs: Array, before: Array) -> tuple[Array, Array]:
-    """Choose a motion, a column of vector (≥ m, n), for each mode (m,), and turn (m, m) the pairs to theirs.
+def _share_motions(motion: Array, pairs: Array) -> Array:
+    """Choose a motion, a column of motion (m, n), for each mode (m,) where two have most of the same one.
 
-    Of each pair the turn is the orthogonal matrix nearest to its part of the two motions [Schönemann 1966], columns in
-    the order, and with the sign, in which they resemble those before.
+    The two of a pair count as one.
     """
-    m = len(before)
-    share, turn = vector[:m] ** 2, np.eye(m)
+    share = motion**2
     share[pairs] = share[pairs + 1] = 0.5 * (share[pairs] + share[pairs + 1])
-    chosen = assign_columns(share)
-    both = np.stack([pairs, pairs + 1], axis=1)
-    block = both[:, :, None], both[:, None]
-    left, _, right = np.linalg.svd(vector[both[:, :, None], chosen[both][:, None]])
-    made = left @ right
-    along = before[block].transpose(0, 2, 1) @ made
-    crossed = np.abs(along[:, 0, 1]) + np.abs(along[:, 1, 0]) > np.abs(along[:, 0, 0]) + np.abs(along[:, 1, 1])
-    made[crossed], along[crossed] = made[crossed, :, ::-1], along[crossed, :, ::-1]
-    chosen[both[crossed]] = chosen[both[crossed]][:, ::-1]
-    turn[block] = made * np.where(np.diagonal(along, axis1=1, axis2=2) < 0, -1.0, 1.0)[:, None]
-    return chosen, turn
-
-
-def _held_against(spring: Array, every: Array, value: Array, chosen: Array, gives: Array) -> Array:
-    """Compute gᵀRg (m,) of forces F (r, n) of all motions and compliant motion of the chosen ones, g (r, m).
-
-    Two motions of nearly one frequency would each need the other's: their mutual term is bounded by their product.
-    """
-    product = times(every.T, gives)  # F_nᵀ g_k
-    product[chosen, np.arange(len(chosen))] = 0
-    apart = value[:, None] - value[chosen]
-    bound = apart**2 + size_squared(product)
-    others = (product**2 * (apart / np.where(bound > 0, bound, 1))).sum(axis=0)
-    return np.asarray(spring @ gives**2 - others)
+    return assign_columns(share)
 
 
 def times_real(z: Array, matrix: Array) -> Array:
@@ -164,8 +98,3 @@ def times(matrix: Array, z: Array) -> Array:
     """Multiply a real matrix by a complex one, in half the time."""
     both: Array = matrix @ np.ascontiguousarray(z).view(float)
     return both.view(complex)
-
-
-def size_squared(z: Array) -> Array:
-    """Compute |z|²."""
-    return np.asarray(z.real**2 + z.imag**2)

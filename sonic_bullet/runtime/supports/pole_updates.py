@@ -31,6 +31,7 @@ from sonic_bullet.contact.coupling import (
     contact_spring,
     first_order,
 )
+from sonic_bullet.contact.coupling.first_order import times_real
 from sonic_bullet.contact.coupling.mobility import BodyMobility
 from sonic_bullet.contact.coupling.springs import ContactSide
 from sonic_bullet.contact.load_splitting import SPAN
@@ -134,25 +135,28 @@ def _transmitted_weights(
     """
     least_transmitted = 0.3  # of a mode's own weight: a weaker transmission would add 0.4 dB to it, and is left out
     faintest = 1e-3  # of a body's loudest mode: 60 dB below, it is what is left when all else has decayed
-    own = np.abs(state.resonators[b].weight[0] @ placed.turn) / state.resonators[b].body.gain
+    own = np.abs(times_real(state.resonators[b].weight[:1], placed.turn)[0]) / state.resonators[b].body.gain
     least = np.maximum(least_transmitted * own, faintest * own.max(initial=0.0))
-    for p, rate in zip(partners, placed.transmissions, strict=True):
+    for i, p in enumerate(partners):
+        if not state.resonators[p].weight.shape[1]:
+            continue
         weight = np.zeros((len(state.bank.observed), columns), complex)
-        weight[:, : rate.shape[1]] = transmitted_weight(state.resonators[p], rate, placed.omega_rad_s)
+        weight[:, : len(own)] = transmitted_weight(state.resonators[p], placed, i)
         transmitted = np.abs(weight[0, : len(own)]) / state.resonators[p].body.gain
         if (transmitted > least).any() or np.abs(weight[1:]).max(initial=0.0) > 0:
             yield p, weight
 
 
-def transmitted_weight(partner: Resonator, rate: Array, omega_rad_s: Array) -> Array:
-    """Compute weights (W, m) of another body's modes, at omega_rad_s (m,), in the sound of a partner.
+def transmitted_weight(partner: Resonator, placed: CoupledModes, number: int) -> Array:
+    """Compute weights (W, m) of a body's coupled modes in the sound of a partner, ``number`` of its partners.
 
-    rate (m_p, m): motion of the partner's own modes per motion of them. Pressure is iωρ₀ times velocity: it is
-    proportional to the frequency at which a mode is moved; its other radiation is taken at the mode's own.
+    Pressure is iωρ₀ times velocity: it is proportional to the frequency at which a mode is moved; its other radiation
+    is taken at the mode's own.
     """
-    rate = np.nan_to_num(rate)
-    weight: Array = partner.weight @ rate
-    weight[0] = (partner.weight[0] / partner.omega_rad_s) @ rate * omega_rad_s
+    weight = partner.weight.copy()
+    weight[0] /= partner.omega_rad_s
+    weight = placed.transmitted_weight(number, weight)
+    weight[0] *= placed.omega_rad_s
     return weight
 
 

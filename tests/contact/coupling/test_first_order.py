@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from sonic_bullet.contact.coupling import BodyMobility, BodyPoint, ContactPoint, ContactSpring, first_order
+from sonic_bullet.contact.coupling.coupled_modes import collect_springs
 from sonic_bullet.contact.coupling.first_order import assign_columns
+from sonic_bullet.contact.coupling.motion_poles import choose_motions
 from sonic_bullet.records import Array
 from tests.made.newton import newton_modes
 
@@ -50,6 +52,77 @@ def test_it_is_near_the_exact_poles_where_contacts_are_as_stiff_as_contacts_are(
     off = np.abs(np.log(np.concatenate(decay)))
     assert np.quantile(off, 0.75) < 0.01
     assert np.quantile(np.abs(np.log(np.concatenate(omega))), 0.9) < 1e-3
+
+
+def written_out(
+    one: BodyMobility, partners: list[BodyMobility], touches: list[ContactPoint]
+) -> tuple[Array, Array, Array, Array]:
+    """s (m,), velocities of the partners' modes, forces at the touches, all as `first_order` states them; which turn.
+
+    Of a body without pairs.
+    """
+    x, row = collect_springs(one, partners, touches)
+    m, light = len(one.omega_rad_s), (x.other_lam == 0) & x.other.any(axis=0)
+    both, spring = np.hstack([x.own, -x.other[:, light]]), x.spring.real
+    value, vector = np.linalg.eigh(np.diag(np.append(x.lam, np.zeros(light.sum()))) + both.T * spring @ both)
+    chosen = assign_columns(vector[:m] ** 2)
+    force, q = spring[:, None] * (both @ vector), vector[:m, chosen]
+    square, s = value[chosen], 1j * np.sqrt(np.maximum(value[chosen], 0))
+    modes, f = x.other_lam > 0, force[:, chosen]
+    gain = 1 / (x.other_lam[modes, None] + 2 * x.other_decay[modes, None] * s + s**2)
+    moved = (x.other[:, modes].T @ f) * gain
+    g = (1 / x.spring - 1 / spring)[:, None] * f + x.other[:, modes] @ moved
+    work = (f * g).sum(axis=0)
+    product, apart = force.T @ g, value[:, None] - square
+    product[chosen, np.arange(m)] = 0
+    bound = apart**2 + np.abs(product) ** 2
+    rho = (spring @ g**2 - (product**2 * apart / np.where(bound > 0, bound, 1)).sum(axis=0)) / work
+    delta, slope = work / (1 + rho), -(moved**2).sum(axis=0) / (1 + rho) ** 2
+    delta = 2 * delta / (1 + np.sqrt(1 - 4 * slope))
+    delta = delta.real + 1j * np.minimum(delta.imag, 0)
+    own = (q**2).T @ one.decay_per_s
+    new = -own + 1j * np.sqrt(square - delta - own**2)
+    turns = ~((s.imag > 2 * np.sqrt(x.lam.max())) | (-new.real > 0.99 * np.abs(new)))
+    velocity = np.where(turns, moved / (1 + rho) / (1 + delta / (1 + rho) * gain), 0)
+    velocity /= 1 + (np.abs(velocity) ** 2).sum(axis=0)
+    lifts = np.zeros((3 * len(touches), m))
+    lifts[row] = np.abs(np.where(turns, f / (1 + rho) / s, 0) @ q.T)
+    return new, velocity @ q.T, lifts[::3], turns
+
+
+@pytest.mark.parametrize("spring_n_m", [1e2 * (1 + 0.1j), 3e5 * (1 + 0.03j), 1e8 * (1 + 0.01j)])
+def test_the_kernels_compute_what_the_equations_say(spring_n_m: complex) -> None:
+    for seed in range(5):
+        given = scene(seed, spring_n_m)
+        found, (new, velocity, lifts, turns) = first_order(*given), written_out(*given)
+        assert (found.newton == turns).all() and turns.any()
+        made = -found.decay_per_s + 1j * found.omega_rad_s
+        np.testing.assert_allclose(made[turns], new[turns], rtol=1e-11)
+        np.testing.assert_allclose(found.decay_per_s[turns], -new.real[turns], rtol=1e-9)
+        np.testing.assert_allclose(np.concatenate(found.transmissions), velocity, atol=1e-9 * np.abs(velocity).max())
+        np.testing.assert_allclose(found.force_n_s, lifts, atol=1e-9 * lifts.max())
+        weight = np.random.default_rng(seed).normal(size=(2, 24)) + 1j
+        np.testing.assert_allclose(found.transmitted_weight(0, weight), weight @ found.transmissions[0], rtol=1e-9)
+
+
+def test_motions_are_chosen_as_the_assignment_with_the_largest_sum_has_them() -> None:
+    """Each mode its own best where those differ; where two want the same one, the kernel says so."""
+    rng, told = np.random.default_rng(0), 0
+    for strength in (0.1, 0.3, 1.0):
+        vector = np.linalg.qr(np.eye(12) + strength * rng.normal(size=(12, 12)) / np.sqrt(12))[0]
+        chosen = choose_motions(vector, 10, np.array([2, 6]))
+        if chosen[0] < 0:
+            continue
+        share = vector[:10] ** 2
+        for pair in (2, 6):
+            share[pair] = share[pair + 1] = 0.5 * (share[pair] + share[pair + 1])
+        most = share[np.arange(10), assign_columns(share)].sum()
+        assert share[np.arange(10), chosen].sum() == pytest.approx(most, rel=1e-12)
+        told += 1
+    assert told >= 1
+    twice = np.full((3, 3), 0.1)
+    twice[:, 1] = 0.9
+    assert choose_motions(twice, 3, np.zeros(0, np.int64))[0] == -1
 
 
 def test_a_spring_of_nothing_leaves_a_body_free() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 import sonic_bullet as sb
 from sonic_bullet.bank.transmission import PHASE
+from sonic_bullet.contact.coupling import CoupledModes
 from sonic_bullet.files import ContactLog, read_log
 from sonic_bullet.records import Array, Material
 from sonic_bullet.records.contacts import Contacts
@@ -201,8 +202,10 @@ def test_a_partner_is_heard_for_one_mode_alone() -> None:
     state: Any = SimpleNamespace(resonators=[fork, on], bank=SimpleNamespace(observed=np.ones((1, 2))))
 
     def heard(share: float) -> list[tuple[int, Array]]:
-        transmissions = (np.array([[share, 1e-4]]),)
-        placed: Any = SimpleNamespace(transmissions=transmissions, omega_rad_s=fork.omega_rad_s, turn=np.eye(2))
+        placed = CoupledModes(
+            fork.omega_rad_s, np.zeros(2), np.eye(2), np.eye(2), (np.array([[share, 1e-4]], complex),),
+            np.zeros((1, 2)), np.zeros((2, 3)), np.ones(2, bool),
+        )  # fmt: skip
         return list(pole_updates._transmitted_weights(state, 0, [1], placed, 2))
 
     assert not heard(1e-4)
