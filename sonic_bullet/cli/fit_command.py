@@ -228,6 +228,11 @@ class FitReport:
             return f"{value:.6g}", known
 
         rows = [("alpha in 1/s", *shown(damping.alpha_per_s, sd[0])), ("beta in s", *shown(damping.beta_s, sd[1]))]
+        if np.isnan(sd[:2]).all():
+            rows = [(name, value, "not identifiable: the guess's") for name, value, _ in rows]
+        elif np.isnan(sd[:2]).any():  # the pair meets the decays that were heard, whichever of them tells
+            open_one = int(np.isnan(sd[1]))
+            rows[open_one] = (*rows[open_one][:2], f"not identifiable: fitted with {('beta', 'alpha')[open_one]}")
         rows += [
             ("E/density in m²/s²", *shown(elasticity.youngs_pa / self.found.density_kg_m3, sd[2])),
             ("E in Pa", *shown(elasticity.youngs_pa, sd[2])),

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sonic_bullet.cli.fit_command import FitReport
 from sonic_bullet.estimator.fit.case_fit import CaseFit
+from sonic_bullet.estimator.fit.fitted_preset import preset_of
 from sonic_bullet.estimator.fit.material_fit import fit_case
 from sonic_bullet.estimator.fit.takes.next_measurement import next_measurement
 from sonic_bullet.estimator.fit.takes.plausible_preset import with_shipped_damping
@@ -60,6 +62,25 @@ def test_no_constant_is_printed_that_nobody_gave(
 def changed(found: CaseFit, **lines: Any) -> CaseFit:
     (e,) = found.evidence
     return replace(found, evidence=(replace(e, lines=replace(e.lines, **lines)),))
+
+
+@pytest.mark.parametrize("open_ones", [(), (0,), (1,), (0, 1)])
+def test_damping_is_the_guess_s_only_where_the_decays_tell_neither_number(
+    bar: CaseFit, open_ones: tuple[int, ...]
+) -> None:
+    """With one of the two told the pair still meets the decays that were heard."""
+    covariance = bar.fit.covariance.copy()
+    for one in open_ones:
+        covariance[one, :] = covariance[:, one] = np.nan
+    found = replace(bar, fit=replace(bar.fit, covariance=covariance))
+    preset = preset_of(found)
+    fitted = (bar.fit.alpha_per_s, bar.fit.beta_s)
+    assert ((preset.damping.alpha_per_s, preset.damping.beta_s) == fitted) == (len(open_ones) < 2)
+    for i, row in enumerate(("alpha in 1/s", "beta in s")):
+        (line,) = (x for text in FitReport(found, preset).lines() for x in text.splitlines() if x.startswith(row))
+        assert ("not identifiable" in line) == (i in open_ones)
+        assert ("the guess's" in line) == (len(open_ones) == 2)
+        assert ("fitted with " in line) == (open_ones == (i,))
 
 
 @pytest.mark.slow

@@ -66,6 +66,7 @@ def preset_of(found: CaseFit) -> Preset:
     known = guess is not None and guess.lower() in material_names()
     base = load_material(guess.lower() if known and guess is not None else "steel")
     alpha, beta, total = fit.alpha_per_s, fit.beta_s, found.radiation == "damping"
+    # one of the two alone may be told: then both are fitted, for the pair is what meets the decays
     if np.isnan(sd[:2]).all() and base.alpha_per_s is not None and base.beta_s is not None:
         alpha, beta, total, assumed = (
             base.alpha_per_s,
