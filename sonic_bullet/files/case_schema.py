@@ -90,7 +90,7 @@ def case_schema() -> dict[str, Any]:
                 "material": "a name that `sonic-bullet materials` lists, as a guess",
                 "elastic_guess": "in SI units, good to 30 %",
                 "dimension_tolerance": "of the mesh's dimensions, relative, one standard deviation, 0 to 0.2; absent: "
-                "the case's. It enters the spread of E/ρ twice",
+                "the case's. It enters the spread of E/ρ twice, and that of ν",
             },
         ),
         "Elastic": (
