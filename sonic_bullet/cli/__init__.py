@@ -250,7 +250,7 @@ def residual(**options: Any) -> None:
     "--next",
     "propose",
     is_flag=True,
-    help="Also propose the strike that would separate the two best models most, and how far they lie apart there.",
+    help="Also propose the strike that would separate the two best models that are still open most, and by how much.",
 )
 @click.option(
     "--seed",

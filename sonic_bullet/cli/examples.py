@@ -59,7 +59,7 @@ Examples:
 Examples:
   sonic-bullet diagnose my_case/
   sonic-bullet diagnose my_case/ --json verdict.json --predict predicted/ --report page.html
-  sonic-bullet diagnose my_case/ --next           (which strike would tell the two best models apart)
+  sonic-bullet diagnose my_case/ --next           (which strike tells models apart that are still open)
   sonic-bullet diagnose my_case/ -o preset.json   (what belongs to material and object sounds in every scene)
   sonic-bullet diagnose cases/*/ -o out --workers 4 --report page.html
 A verdict is none, explained, unexplained or worse-than-silence (exit 1).""",

@@ -96,7 +96,7 @@ def _is_open(c: Candidate, named: Sequence[Candidate]) -> bool:
 
 
 def separating_strike(end: Closed | NothingCompared) -> SeparatingStrike | None:
-    """Find the strike that would separate the two best models most; None without two that are open, or recordings."""
+    """Find the strike that would separate the two best open models most; None without two, or without recordings."""
     models = two_best(end)
     if models is None or not isinstance(end, Closed):
         return None
