@@ -167,7 +167,9 @@ class World(ABC):
         """
         raise SceneError("this simulator's bodies bring their names", "leave name out")
 
-    def hold_joints(self, body: int, springs: Mapping[int | str, tuple[float, float]], factor: float = 1) -> None:
+    def hold_joints(
+        self, body: int, springs: Mapping[int | str, tuple[float, float]] | None = None, factor: float = 1
+    ) -> None:
         """Let springs hold joints of a body at audio rate, in place of earlier ones: gears and belts, not controllers.
 
         Parameters
@@ -176,7 +178,7 @@ class World(ABC):
             The id that loading it returned.
         springs
             By the name or number of the link that a joint moves, "all" for each: stiffness in N·m/rad (of a sliding
-            joint N/m) and loss factor.
+            joint N/m) and loss factor. There are none by default: an id alone is an error that names them.
         factor
             Of each stiffness, such as one that is drawn.
 
@@ -188,14 +190,14 @@ class World(ABC):
             A number is not what it may be.
         """
         held: dict[int, tuple[float, float]] = {}
-        as_kind(springs, dict, "springs of joints", 'give {"all": (2e4, 0.05)}, or link by link')
+        springs = as_kind(springs, dict, "springs of joints", 'give {"all": (2e4, 0.05)}, or link by link')
         more = as_number(factor, "factor of a joint's stiffness", "give a number above 0", above=0)
         for link, pair in springs.items():
             found, links = self.links_called(body, link)
             name, remedy = f"spring of joint {link}", "give stiffness in N·m/rad and loss factor, such as (2e4, 0.05)"
             two = as_items(pair, name, remedy)
             stiffness, loss = (
-                as_number(x, name, remedy, least=0, most=1e15) for x in (two if len(two) == 2 else (None, None))
+                as_number(x, name, remedy, least=0, most=1e15) for x in (two if len(two) == 2 else (pair, pair))
             )
             held.update({one: (more * stiffness, loss) for one in links if one >= 0})
             self.joint_springs = {**self.joint_springs, found: held}
