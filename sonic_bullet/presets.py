@@ -182,9 +182,12 @@ def warn_of_units(material: Material) -> None:
 def _wrong_units(youngs_pa: float, density_kg_m3: float) -> Iterator[str]:
     """Yield a line for each number that no solid has.
 
-    Sound runs in no solid faster than 36 km/s [Trachenko et al. 2020, eq. 1].
+    Sound runs in no solid faster than 36 km/s [Trachenko et al. 2020, eq. 1]. What is denser than foams, woods,
+    plastics and rubbers is a metal, a ceramic or a glass, and stiff [Ashby, Materials Selection in Mechanical Design,
+    4th ed. 2011, fig. 4.3].
     """
-    solid_pa = (1e5, 1.3e12)  # soft foam, diamond
+    light_kg_m3 = 2500.0  # the densest of those, filled plastics left out
+    solid_pa = (1e5 if density_kg_m3 <= light_kg_m3 else 1e9, 1.3e12)  # soft foam, softer than lead; diamond
     solid_kg_m3 = (1.0, 23_000.0)  # aerogel, osmium
     fastest_m_s = 36_100.0
     factors = {"GPa": 9, "MPa": 6}

@@ -12,6 +12,7 @@ from tests.cli.called_here import call_here
 from tests.made.case import write_box
 
 GIGA = "E = 214.6 Pa: is that GPa? give 214.6e9"
+MEGA = "E = 210000 Pa: is that MPa? give 210000e6"
 SHELL = "open surface: a wall of"
 GRAM = "density = 7.85 kg/m³: is that g/cm³? give 7850"
 TAP = "--strike 0,0,0.003"
@@ -44,6 +45,8 @@ def place(tmp_path: Path) -> Path:
     [
         ("modes bar.obj --count 3 --material pre.json", 0, [GIGA]),
         (f"modes bar.obj --count 3 {' '.join(BARE)} 7.85", 0, [GIGA, GRAM]),
+        ("modes bar.obj --count 3 --young 2.1e5 --poisson 0.3 --density 7850", 0, [MEGA]),
+        ("modes bar.obj --count 3 --young 2.1e5 --poisson 0.45 --density 1000", 0, []),
         ("modes bar.obj --count 3 --material steel", 0, []),
         ("modes cm.obj --count 3 --material steel", 0, ["--scale 0.001", "0.01 if they are centimetres"]),
         ("fit bar.obj -o p.json --mesh bar.obj --material pre.json", 2, ["--strike missing; give it,"]),
@@ -61,4 +64,4 @@ def test_it_is_told_in_one_line(place: Path, words: str, code: int, told: list[s
     assert ended.returncode == code, ended.stderr
     for one in told:
         assert sum(one in line for line in ended.stderr.splitlines()) == 1, ended.stderr
-    assert ("warning" in ended.stderr) == any(one in (GIGA, GRAM, SHELL) or "scale" in one for one in told)
+    assert ("warning" in ended.stderr) == any(one in (GIGA, MEGA, GRAM, SHELL) or "scale" in one for one in told)
