@@ -1,7 +1,8 @@
 """Audible differences of two sounds: first sample, levels by band and time, onsets, decay, loudness.
 
 level_dB(band) = 10 lg ∫ |B|² df / ∫ |A|² df over an octave band [IEC 61260-1]
-T60: the slope of the backward integral of p² between −5 and −25 dB [Schroeder, J. Acoust. Soc. Am. 37 (1965) 409]
+T60: the slope of the backward integral of p² between −5 and −25 dB [Schroeder, J. Acoust. Soc. Am. 37 (1965) 409], and
+    of what would follow the recording's end, at the rate at which it falls there [ISO 3382-1:2009, 5.3.3]
 """
 
 from __future__ import annotations
@@ -146,17 +147,40 @@ def _onsets(a: Array, b: Array, sr: int) -> Consequence | None:
 
 
 def t60_s(x: Array, sr: int) -> float | None:
-    """Return the time in which the sound after its loudest moment falls by 60 dB; None: it does not fall by 25."""
+    """Return the time in which the sound after its loudest moment falls by 60 dB; None: it does not fall by 25.
+
+    Where the recording ends has no part in it. Noise and what rolls on have none.
+    """
     square = np.square(x).sum(axis=0)
     if not square.any():
         return None
-    left = np.cumsum(square[int(np.argmax(square)) :][::-1])[::-1]
+    square = square[int(np.argmax(square)) :]
+    after = _after_the_end(square)
+    if after is None:
+        return None
+    left = np.cumsum(square[::-1])[::-1] + after
     level = 10 * np.log10(left / left[0] + 1e-300)
     i, j = (int(np.argmax(level <= db)) for db in (-5.0, -25.0))
     if not 0 < i < j:
         return None
     slope = np.polyfit(np.arange(i, j) / sr, level[i:j], 1)[0]
     return float(-60 / slope) if slope < 0 else None
+
+
+def _after_the_end(square: Array) -> float | None:
+    """Return the sum that would follow squares (n,) which fall as their last two quarters do: E₂²/(E₁ − E₂).
+
+    None where they do not fall: noise, or what rolls on. 0 where that is so faint that −25 dB are reached before.
+    """
+    size = len(square) // 4
+    if not size:
+        return 0.0
+    before, last = (float(part.sum()) for part in (square[-2 * size : -size], square[-size:]))
+    falls_db = 3.0  # from one quarter to the next: what falls by less may be noise, and its sum is anything
+    if before > last * 10 ** (falls_db / 10):
+        return last**2 / (before - last)
+    faint_db = -35.0  # of the whole: what moves the level at −25 dB by less than 2 dB
+    return 0.0 if last <= float(square.sum()) * 10 ** (faint_db / 10) else None
 
 
 def _decay(a: Array, b: Array, sr: int) -> Consequence | None:
