@@ -108,8 +108,9 @@ class DiagnosisReport:
 
     def lines(self) -> list[str]:
         """Return verdict, effects with their numbers, distances, and what to measure next."""
+        from sonic_bullet.diagnosis.baseline_words import describe_baseline
         from sonic_bullet.diagnosis.deciding_measurement import next_measurement
-        from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
+        from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table, explain_chance
         from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
         from sonic_bullet.diagnosis.unexplained import NOTHING
 
@@ -133,6 +134,9 @@ class DiagnosisReport:
                 f"  {c.id} ({c.effect.owner.value}): {numbers}; {c.mean_db:.2f} dB nearer on strikes left out, "
                 f"chance {c.control_db:.2f} dB"
             )
+        level = self.found.errors["before"].get("fit")
+        far = "" if level is None else f"; {level:.2f} dB from the fitted strikes"
+        text.append(f"baseline, before anything is added: {describe_baseline(self.found)}{far}")
         rows = [
             (
                 split,
@@ -150,7 +154,7 @@ class DiagnosisReport:
         if self.found.errors["floor"] is not None:
             text.append(f"noise alone: {self.found.errors['floor']:.2f} dB")
         if tried := effect_table(self.found.closed):
-            text.append(table(HEAD, [row.cells() for row in tried]))
+            text += [table(HEAD, [row.cells() for row in tried]), explain_chance()]
         if self.found.unexplained:
             text.append(f"left: {self.found.unexplained['words']}")
         if said := next_measurement(self.found.found, self.found.closed, self.found.unexplained):

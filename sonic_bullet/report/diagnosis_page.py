@@ -16,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from sonic_bullet.diagnosis.baseline_words import describe_baseline
 from sonic_bullet.diagnosis.deciding_measurement import next_measurement
 from sonic_bullet.diagnosis.diagnose import Diagnosis
 from sonic_bullet.diagnosis.evidence.effect_evidence import object_evidence
 from sonic_bullet.diagnosis.prediction.prediction import predict
 from sonic_bullet.diagnosis.prediction.score import predict_takes
-from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table
+from sonic_bullet.diagnosis.selection.effect_table import HEAD, effect_table, explain_chance
 from sonic_bullet.diagnosis.selection.stepwise import NothingCompared
 from sonic_bullet.effects.protocol import Effect
 from sonic_bullet.files import replacing
@@ -42,9 +43,10 @@ def write_report(path: str, d: Diagnosis, proposal: str = "") -> None:
 
 def page(d: Diagnosis, proposal: str = "") -> str:
     """Render the page's text; proposal: the strike that would tell most, in words, where it was asked for."""
+    named = ", ".join(f"{c.id} ({c.effect.owner.value})" for c in d.closed.added)
     words = {
         "none": "The model suffices: no known effect brings it nearer to strikes it was not fitted to.",
-        "explained": "The model lacks something, and what it lacks has a name."
+        "explained": f"What the model lacks has a name: {named}."
         + (" It does not lack that alone." if d.unexplained else ""),
         "unexplained": "Something is left that none of the known effects accounts for.",
         "worse-than-silence": "What was fitted is farther from the recordings than silence, with every effect.",
@@ -73,7 +75,7 @@ def _effects(d: Diagnosis) -> str:
         (
             c.id,
             c.effect.owner.value,
-            ", ".join(f"{k} = {_number(v)}" for k, v in c.effect.parameters().items()),
+            ", ".join(_parameter(name, value) for name, value in c.effect.parameters().items()),
             f"{c.mean_db:.2f} dB ± {c.sd_db:.2f}",
             f"{c.control_db:.2f} dB",
             c.effect.reference,
@@ -84,6 +86,7 @@ def _effects(d: Diagnosis) -> str:
     return (
         "<h2>What was added</h2>"
         + _table(("effect", "belongs to", "parameters", "nearer on strikes left out", "chance", "source"), rows)
+        + f"<p>{explain_chance()}</p>"
         + formulas
         if rows
         else ""
@@ -174,27 +177,13 @@ def _candidates(d: Diagnosis) -> str:
     rows = [(*row.cells(), drop[row.id]) for row in effect_table(d.closed)]
     head = (*HEAD, "strike by strike, each left out in turn")
     silent = "<p>Candidates that do not stand here found nothing of theirs in the recordings.</p>"
-    return "<h2>Candidate effects</h2>" + (_table(head, rows) if rows else "") + silent
+    return "<h2>Candidate effects</h2>" + (f"{_table(head, rows)}<p>{explain_chance()}</p>" if rows else "") + silent
 
 
 def _notes(d: Diagnosis) -> str:
     items = "".join(f"<li>{html.escape(w)}</li>" for w in d.warnings)
-    text = f"Baseline: {baseline_words(d)}."
+    text = f"Baseline: {describe_baseline(d)}."
     return f"<h2>Notes</h2><p>{text}</p><ul>{items}</ul>"
-
-
-def baseline_words(d: Diagnosis) -> str:
-    """Format the baseline's numbers; "not fitted" of those that have no part in it, or are the guess's."""
-    base, fit, identified = d.closed.before, d.found.fit, np.isfinite(np.diag(d.found.fit.covariance))
-    damped = any(body.own_decay_per_s is None and body.recorded is not None for body in d.bodies)
-    shaped = any(body.family is not None and body.recorded is not None for body in d.bodies)
-    numbers = (
-        ("α", f"{base.alpha_per_s:.4g} 1/s", damped and identified[0]),
-        ("β", f"{base.beta_s:.4g} s", damped and identified[1]),
-        ("E/ρ", f"{fit.gamma_m2_s2:.5g} m²/s²", shaped and identified[2]),
-        ("ν", f"{fit.poisson_ratio:.3f}", shaped and identified[4]),
-    )
-    return ", ".join(f"{name} = {text}" if fitted else f"{name} not fitted" for name, text, fitted in numbers)
 
 
 def _next_strike(d: Diagnosis, proposal: str) -> str:
@@ -206,6 +195,16 @@ def _next_strike(d: Diagnosis, proposal: str) -> str:
 def _table(head: tuple[str, ...], rows: list[Any]) -> str:
     body = "".join("<tr>" + "".join(f"<td>{html.escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><tr>{''.join(f'<th>{html.escape(h)}</th>' for h in head)}</tr>{body}</table>"
+
+
+def _parameter(name: str, value: Any) -> str:
+    """Format a parameter with its unit behind the number, where its name ends in one."""
+    units = {
+        "per_n_s": "1/(N·s)", "n_s_m": "N·s/m", "per_s": "1/s", "n_s": "N·s", "m_s": "m/s", "n_m": "N/m", "hz": "Hz",
+        "pa": "Pa", "db": "dB", "kg": "kg", "s": "s", "m": "m",
+    }  # fmt: skip
+    end = next((end for end in units if name.endswith(f"_{end}")), "")
+    return f"{name.removesuffix(f'_{end}')} = {_number(value)} {units[end]}" if end else f"{name} = {_number(value)}"
 
 
 def _number(value: Any) -> str:

@@ -100,10 +100,14 @@ def test_every_verdict_can_be_written(
         assert row["standard_error_db"] > 0 and row["numbers"] == -1 and row["strikes"] == len(takes)
     said = capsys.readouterr().out
     assert ("named, or why not" in said) == bool(written["candidates"])
+    assert "baseline, before anything is added: α not fitted" in said
+    assert ("below 0 it leads away" in said) == bool(written["candidates"])
     if page is not None:  # every strike is heard thrice, and the effect's equation and the table are read
         text = page.read_text(encoding="utf-8")
         assert "no two models that these strikes leave open" in text[text.index("<h2>Next strike</h2>") :]
         assert "α not fitted, β not fitted, E/ρ not fitted, ν not fitted" in text  # their spreads are not finite
+        verdict_line = text[text.index("<p class=verdict>") :].split("</p>")[0]
+        assert "has a name: damping-law (material)" in verdict_line and "below 0 it leads away" in text
         assert text.count("<audio") == 3 * len(takes) and "d = ηω/2" in text and "named, or why not" in text
     assert "next strike: no two models that these strikes leave open" in said  # what is named was told from nothing
     assert written["next_strike"] is None

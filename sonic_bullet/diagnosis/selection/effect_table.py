@@ -63,3 +63,11 @@ def effect_table(end: Closed | NothingCompared) -> tuple[Row, ...]:
         word = NAMED if c.id in named else f"withheld: {why}" if c.id in withheld else c.why_not
         made.append(Row(c.id, parameter_count(c.effect), c.mean_db, c.sd_db, c.control_db, len(c.drop_db), word))
     return tuple(sorted(made, key=lambda row: (row.word != NAMED, -row.nearer_db)))
+
+
+def explain_chance() -> str:
+    """Return what the column of chance holds, for those who read the table."""
+    return (
+        "Chance: what a control effect of as many numbers, which mean nothing, gains on the same strikes; "
+        "below 0 it leads away from them."
+    )
