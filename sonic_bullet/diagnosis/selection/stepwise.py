@@ -225,6 +225,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
     passed: list[tuple[Candidate, ...]] = []
     first: list[Candidate] = []
     last: dict[str, Candidate] = {}
+    open_db: dict[str, float] = {}
     weak = False
     for turn in range(len(problem.effects)):
         report_progress(
@@ -238,7 +239,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         other = reidentified(h, problem.bodies)
         full = now if other is h else replace(now, distance_db=problem.distance_db(other))
         costly = full.gap_db > RULES.little_share * (before_db - now.floor_db)
-        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full)
+        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, open_db)
         last |= {c.id: c for c in found}
         pair, acceptable = None, [c for c in found if not c.why_not]
         if not added:
@@ -253,7 +254,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         pair = pair or _room_anew(h, acceptable, found, problem)
         if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
             late_ones = cross_validated(h, drawn.only(*late), evidence, costly=costly)
-            found = examined(late_ones, problem, now, full)
+            found = examined(late_ones, problem, now, full, open_db)
             last |= {c.id: c for c in found}
             acceptable = [c for c in found if not c.why_not]
             pair = _room_anew(h, acceptable, found, problem)
@@ -266,6 +267,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
             break
         best = simplest(acceptable, problem.bodies, evidence)
         last |= {c.id: replace(c, why_not=f"{best.id} was taken first") for c in acceptable if c is not best}
+        open_db |= {c.id: now.gap_db for c in acceptable if c is not best and c.id not in open_db}
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
         if isinstance(best.effect, Dereverberates) and problem.distance_db(h) > now.distance_db:
             h = reidentified(h, problem.bodies)  # a room's response by lines so far off that it sounds worse than none
