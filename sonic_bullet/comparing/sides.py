@@ -189,8 +189,8 @@ def run(
     watch = _Run(side, plan, like)
     watch.calls = Interception(side, plan, watch.look)
     clear_file_cache()
-    heard = progress_to(progress_listener())  # else nobody's run would show its own
-    with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch), heard:
+    same_listener = progress_to(progress_listener())  # else nobody's run would show its own
+    with noted_files() as files, own_modules(scene.revision), watch.calls.watching(), directed(watch), same_listener:
         result = render_scene(
             scene.path, seconds=scene.seconds, sr=scene.sr, seed=scene.seed or 0, microphones=scene.microphones,
             material=scene.material, residual=scene.residual,
