@@ -165,10 +165,10 @@ def _touches(state: State, b: int, quaternion: Array) -> tuple[list[int], list[C
     partners: list[int] = []
     touches, loads = [], []
     pairs = state.pairs
-    for slot in pairs.active[: pairs.count[0]].tolist():
+    active = pairs.active[: pairs.count[0]]
+    touching = (pairs.pair["body"][active] == b).any(axis=1) & (pairs.patch["count"][active] > 0)
+    for slot in active[touching].tolist():
         patch, both = pairs.patch[slot], pairs.pair["body"][slot].tolist()
-        if b not in both or not patch["count"]:
-            continue
         side = both.index(b)
         other = both[1 - side]
         if other not in partners:

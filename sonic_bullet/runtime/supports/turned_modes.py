@@ -35,7 +35,7 @@ def turn_modes(state: State, b: int, turn: Array | None) -> None:
     same_turn = 0.05  # largest element, in radians about, of a turn that is left out: cos² of it is 1 within 0.3 %
     m = state.resonators[b].mode_count
     old = state.table.turn_of(b)
-    if turn is None and old is None:
+    if (turn is None and old is None) or not len(state.resonators[b].mobility.pairs):
         return
     before, after = (np.eye(m) if one is None else one for one in (old, turn))
     pairs = np.flatnonzero((np.diag(before, 1) != 0) | (np.diag(after, 1) != 0))
