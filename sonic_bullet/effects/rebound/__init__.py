@@ -28,7 +28,8 @@ class _Rebound(NamedTuple):
     most: float = 0.6
     few: float = 0.05
     fade: float = 2.0  # nepers over what is looked at
-    # of what one hit leaves of all strikes: said by a second one, over the next best exponent, and left by all hits
+    # of what one hit leaves of all strikes: said by a second one, by the best exponent over others that are not
+    # followed, and left by all hits
     all: float = 0.25
     clearly: float = 1.35
     half: float = 0.5
@@ -73,14 +74,15 @@ class Rebound(Effect):
 
     @classmethod
     def propose(cls, evidence: Evidence) -> Self | None:
-        """Look for later hits strike by strike, else in all strikes at once; None where there are none."""
+        """Look for later hits strike by strike, and in all strikes at once; None where there are none."""
         h = max((h for h in evidence.observed if h.signal is not None), key=lambda h: len(h.freq_hz), default=None)
         if h is None or len(h.freq_hz) < 3:
             return None
         if isinstance(evidence.known, cls):
             again = _refined(evidence.known, h, known=True)[1]
             return replace(evidence.known, **again) if again["restitution"] > LATER_HITS.least else None
-        return cls._one_by_one(h) or cls._of_all(h)
+        found = [one for one in (cls._one_by_one(h), cls._of_all(h)) if one is not None]
+        return min(found, key=lambda one: _refined(one, h, known=True)[0], default=None)
 
     @classmethod
     def _of_all(cls, h: ObjectEvidence) -> Self | None:
@@ -94,11 +96,18 @@ class Rebound(Effect):
         if len(level) < 2 or level.max() < apart * level.min():
             return None
         reference = float(np.exp(np.log(level).mean()))
-        (said, gap, exponent), (next_best, _, _), *_ = sorted(second_hit(h, level / reference), reverse=True)
-        if not (said > REBOUND.all and said > REBOUND.clearly * next_best):
+        found = second_hit(h, level / reference)
+        most = max(said for said, _, _ in found)
+        # a second hit alone says about as much at other exponents by chance; with the later ones that is no longer so
+        starts = [
+            cls(gap, reference, RESTITUTIONS[1], exponent, None, hits)
+            for said, gap, exponent in found
+            if said > max(REBOUND.all, most / REBOUND.clearly)
+            for hits in (2, *HITS)
+        ]
+        if not starts:
             return None
-        start = cls(gap, reference, RESTITUTIONS[1], exponent, None, 2)
-        left, best = min((_refined(replace(start, hits=k), h) for k in (2, *HITS)), key=lambda end: end[0])
+        (left, best), start = min(((_refined(one, h), one) for one in starts), key=lambda end: end[0][0])
         alone, count = _refined(replace(start, hits=1), h)[0], len(level)
         return (
             replace(start, **best)
