@@ -39,13 +39,13 @@ def test_a_nearer_candidate_is_compared_with_an_accepted_one(accepts_one: bool) 
         found.append(Candidate(effect.id, effect, h, drop_db, float(drop_db.mean()), 0.0, {}))
     problem = posed((body,), takes_of((body,)))
     now = problem.score(plain)
-    able = [c for c in examined(found, problem, now, now, {}) if not c.why_not]
+    able = [c for c in examined(found, problem, now, now, now.gap_db) if not c.why_not]
     assert [c.id for c in able] == (["contact-time", "measurement-chain"] if accepts_one else [])
     if able:
         assert simplest(able, (body,), told).id == "contact-time"
 
 
-def test_what_was_passed_over_must_close_a_share_of_what_was_open_then() -> None:
+def test_a_name_closes_a_tenth_of_the_whole_gap() -> None:
     body = recorded(ContactTime(9e-4, 0.02, -0.2))
     plain = refitted(truth(), (body,))
     effect = ContactTime.propose(evidence_of(plain, (body,), BAND))
@@ -54,6 +54,6 @@ def test_what_was_passed_over_must_close_a_share_of_what_was_open_then() -> None
     one = Candidate(effect.id, effect, h, ALIKE, float(ALIKE.mean()), 0.0, {})
     problem = posed((body,), takes_of((body,)))
     now = problem.score(plain)
-    for open_db, accepted in (({}, True), ({"contact-time": 40.0}, True), ({"contact-time": 60.0}, False)):
-        (made,) = examined([one], problem, now, now, open_db)
+    for whole_db, accepted in ((40.0, True), (60.0, False)):
+        (made,) = examined([one], problem, now, now, whole_db)
         assert (not made.why_not) == accepted

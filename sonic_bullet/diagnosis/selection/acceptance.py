@@ -5,9 +5,9 @@ every gap, chance none:
 
     2 Δ ln L = n ln(Σ g² / Σ (g − R G)²),   R = Σ g G / Σ G²        (normal errors of unknown variance)
 
-Accepted is what speaks so much for itself as strong_evidence, gains more than least_drop_db and same_share of the gap,
-and more than a control effect of as many numbers, which means nothing. A strike is one observation, however many cells
-its spectrum has: cells of one strike err together.
+Accepted is what speaks so much for itself as strong_evidence, gains more than least_drop_db and same_share of the whole
+gap, and more than a control effect of as many numbers, which means nothing. A strike is one observation, however many
+cells its spectrum has: cells of one strike err together.
 """
 
 from __future__ import annotations

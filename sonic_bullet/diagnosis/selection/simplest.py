@@ -6,7 +6,7 @@ every candidate of a round -> why it is not accepted, if it is not; on all strik
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,17 +26,16 @@ from sonic_bullet.effects.protocol import Evidence
 
 
 def examined(
-    found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, open_db: Mapping[str, float]
+    found: Sequence[Candidate], problem: DiagnosisProblem, now: Score, full: Score, whole_db: float
 ) -> list[Candidate]:
     """Return a round's candidates, each with why it is not accepted; else lines may favour one. full: a room anew.
 
     Where one is accepted, something acts on the sound. Which, is asked of those, too, that come nearer than it but say
-    too little by themselves, as their gains go with the strike. One that was passed over must close same_share of what
-    was open then (open_db, by id): beside what was taken in its place it says the same, else.
+    too little by themselves, as their gains go with the strike. whole_db: what was open before anything was added.
     """
 
     def why_not(c: Candidate, **least: float) -> str:
-        why = refusal(c, max(now.gap_db, open_db.get(c.id, 0.0), 0.0), **least)
+        why = refusal(c, whole_db, **least)
         return why or ("" if helps(c, problem, now, full) else "all strikes together come no nearer")
 
     made = [replace(c, why_not=why_not(c)) for c in found]

@@ -33,7 +33,7 @@ from sonic_bullet.diagnosis.prediction.score import (
     predict_takes,
 )
 from sonic_bullet.diagnosis.prediction.struck_bodies import Struck
-from sonic_bullet.diagnosis.selection.acceptance import Candidate
+from sonic_bullet.diagnosis.selection.acceptance import Candidate, needed
 from sonic_bullet.diagnosis.selection.band_levels import BandOff, bands_off
 from sonic_bullet.diagnosis.selection.coherent_residual import incoherent_fraction
 from sonic_bullet.diagnosis.selection.cross_validation import cross_validated
@@ -225,21 +225,21 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
     passed: list[tuple[Candidate, ...]] = []
     first: list[Candidate] = []
     last: dict[str, Candidate] = {}
-    open_db: dict[str, float] = {}
     weak = False
     for turn in range(len(problem.effects)):
         report_progress(
             f"round {turn + 1}: {now.distance_db:.2f} dB from the recordings, noise alone {now.floor_db:.2f} dB"
         )
-        if now.gap_db < RULES.least_drop_db:
+        whole_db = max(before_db - now.floor_db, 0.0)
+        if now.gap_db < needed(whole_db):
             break
         drawn = replace(problem, seed=problem.seed + turn)
         evidence = evidence_of(h, problem.bodies, problem.band_hz, seed=problem.seed)
         # a room's response is the lines' so far, which leaves open more than there is
         other = reidentified(h, problem.bodies)
         full = now if other is h else replace(now, distance_db=problem.distance_db(other))
-        costly = full.gap_db > RULES.little_share * (before_db - now.floor_db)
-        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, open_db)
+        costly = full.gap_db > RULES.little_share * whole_db
+        found = examined(cross_validated(h, drawn, evidence, costly=costly), problem, now, full, whole_db)
         last |= {c.id: c for c in found}
         pair, acceptable = None, [c for c in found if not c.why_not]
         if not added:
@@ -254,7 +254,7 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
         pair = pair or _room_anew(h, acceptable, found, problem)
         if not (pair or acceptable) and costly and (late := _deferred(found, evidence, problem.effects)):
             late_ones = cross_validated(h, drawn.only(*late), evidence, costly=costly)
-            found = examined(late_ones, problem, now, full, open_db)
+            found = examined(late_ones, problem, now, full, whole_db)
             last |= {c.id: c for c in found}
             acceptable = [c for c in found if not c.why_not]
             pair = _room_anew(h, acceptable, found, problem)
@@ -267,7 +267,6 @@ def _one_by_one(start: Hypothesis, now: Score, problem: DiagnosisProblem) -> Rou
             break
         best = simplest(acceptable, problem.bodies, evidence)
         last |= {c.id: replace(c, why_not=f"{best.id} was taken first") for c in acceptable if c is not best}
-        open_db |= {c.id: now.gap_db for c in acceptable if c is not best and c.id not in open_db}
         h, added, passed = best.hypothesis, [*added, best], [*passed, rivals(acceptable, best)]
         if isinstance(best.effect, Dereverberates) and problem.distance_db(h) > now.distance_db:
             h = reidentified(h, problem.bodies)  # a room's response by lines so far off that it sounds worse than none
