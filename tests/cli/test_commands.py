@@ -26,6 +26,7 @@ import sonic_bullet.scene
 from sonic_bullet.cli import main
 from sonic_bullet.files import read_audio, read_log, write_log
 from sonic_bullet.files.contact_log import ContactLog
+from sonic_bullet.machine.progress import report_progress
 from sonic_bullet.records import Body, Microphone, ModalModel
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.records.errors import SceneError
@@ -449,7 +450,7 @@ def test_doctor_prints_findings_with_remedies(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     finding = sonic_bullet.scene.Finding("sub-steps", "error", "numSubSteps is 4", "set it to 1")
-    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds, say: (finding,))
+    monkeypatch.setattr(sonic_bullet.scene, "examine_scene", lambda path, seconds: (finding,))
     assert run("doctor", "scene.py") == 0
     said = capfd.readouterr().out
     assert "error: sub-steps: numSubSteps is 4" in said
@@ -474,7 +475,7 @@ def test_a_terminal_is_told_which_body_is_analysed_and_a_pipe_nothing(
     monkeypatch.delenv("SONIC_BULLET_PROGRESS", raising=False)
 
     def render_scene(path: object, **options: Any) -> RenderResult:
-        options["say"]("modes of cup (body 3): assembling")
+        report_progress("modes of cup (body 3): assembling")
         return RenderResult(KeptSound.of(sound()), log(), SR)
 
     monkeypatch.setattr(sonic_bullet.scene, "render_scene", render_scene)
