@@ -102,7 +102,7 @@ def test_a_swing_is_no_meshs_however_wrong_a_mesh_is(
     body = swung(depth)
     off = replace(fitted(body), correction={"plate": np.full(18, 1e-3)})
     monkeypatch.setattr(loop, "refitted", lambda h, _: h)
-    monkeypatch.setattr(loop, "beyond", lambda h, *_: (h, 0.0))
+    monkeypatch.setattr(loop, "with_unmatched_modes_moved", lambda h, *_: (h, 0.0))
     end = loop.select_effects(off, (body,), takes_of((body,)), (), BAND)
     assert end.before_db - end.floor_db > RULES.suffices_db
     assert end.verdict == verdict

@@ -273,6 +273,7 @@ def test_dashpots_are_asked_after_a_tensor_that_came_to_nothing(monkeypatch: pyt
     monkeypatch.setattr(loop, "pairwise", lambda *_, **__: None)
     # however little the room leaves
     monkeypatch.setattr(loop, "RULES", replace(RULES, same_share=1e-9, little_share=1e-9))
+    monkeypatch.setattr(loop, "needed", lambda _: RULES.least_drop_db)
     monkeypatch.setattr(loop, "reidentified", lambda h, *_, **__: h)  # which leaves less than noise does
     end = loop.select_effects(fitted(body), (body,), takes, EFFECTS, BAND)
     every = [kind.id for kind in EFFECTS]

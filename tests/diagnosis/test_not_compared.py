@@ -48,9 +48,12 @@ def test_no_distance_has_a_number_to_fall_back_on() -> None:
     found = []
     for file in files:
         text = file.read_text()
-        found += [f"{file.name}: or 0.0"] if "or 0.0" in text else []
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.Or):
+                zero = any(
+                    isinstance(v, ast.Constant) and isinstance(v.value, float) and not v.value for v in node.values
+                )
+                found += [f"{file.name}:{node.lineno}: or 0.0"] if zero else []
                 called = [c.func for v in node.values for c in ast.walk(v) if isinstance(c, ast.Call)]
                 names = [f.attr if isinstance(f, ast.Attribute) else getattr(f, "id", "") for f in called]
                 number = any(isinstance(v, ast.Constant | ast.Attribute) for v in node.values[1:])
