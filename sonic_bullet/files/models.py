@@ -276,7 +276,7 @@ def _unpack_model(header: ModelEntry, arrays: Mapping[str, Array], index: int, p
         note=header.note,
         damping_growth_power=header.damping_growth_power,
         includes_radiation=header.includes_radiation,
-        assumed_wall_m=header.assumed_wall_m or 0.0,
+        assumed_wall_m=0.0 if header.assumed_wall_m is None else header.assumed_wall_m,
     )
 
 
