@@ -35,7 +35,7 @@ def describe_unexplained(end: Closed | NothingCompared, takes: Sequence[AudioObs
     """
     if isinstance(end, WorseThanSilence):
         words = (
-            f"what was fitted is {end.before_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
+            f"what was fitted is {end.end_db:.1f} dB from the recordings, silence {end.silence_db:.1f} dB: "
             "no effect brings it nearer"
         )
         return {"left_db": None, "words": words}

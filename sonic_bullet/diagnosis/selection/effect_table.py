@@ -60,7 +60,13 @@ def effect_table(end: Closed | NothingCompared) -> tuple[Row, ...]:
     withheld, why = end.withheld if isinstance(end, Closed) else ((), "")
     made = []
     for c in (*end.added, *(c for c in end.tried if c.id not in named)):
-        word = NAMED if c.id in named else f"withheld: {why}" if c.id in withheld else c.why_not
+        word = (
+            NAMED
+            if c.id in named
+            else f"withheld: {why}"
+            if c.id in withheld
+            else c.why_not or "accepted alone, not beside the others"
+        )
         made.append(Row(c.id, parameter_count(c.effect), c.mean_db, c.sd_db, c.control_db, len(c.drop_db), word))
     return tuple(sorted(made, key=lambda row: (row.word != NAMED, -row.nearer_db)))
 

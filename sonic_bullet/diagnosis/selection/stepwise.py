@@ -102,7 +102,7 @@ class NothingCompared:
 class WorseThanSilence(NothingCompared):
     """A selection whose end is no nearer to the recordings than silence: its gains mean nothing."""
 
-    before_db: float
+    end_db: float
     silence_db: float
     verdict: ClassVar[str] = "worse-than-silence"
 
@@ -128,7 +128,7 @@ def select_effects(
     band_hz, seed : (2,), int
         Of the recordings; of control effects and folds.
     against_silence : sequence of Take
-        Takes by which the baseline is compared with silence; the fitted ones where there are none.
+        Takes by which the end is compared with silence; the fitted ones where there are none.
     """
     start = refitted(base, bodies)
     made = predict_each(start, (take.body for take in takes))
@@ -149,11 +149,11 @@ def _worse_than_silence(
     held = comparable(takes, made)
     if isinstance(held, Incomparable):
         return None
-    before = mean_db(held.takes, made)
+    end_db = mean_db(held.takes, made)
     silence = float(
         np.mean([t.apart_db(np.zeros(len(t.sample))) for t in held.takes if isinstance(t, AudioObservation)])
     )
-    return WorseThanSilence(start, left_out, before, silence) if before >= silence else None
+    return WorseThanSilence(start, left_out, end_db, silence) if end_db >= silence else None
 
 
 def _closed(start: Hypothesis, made: Predictions, problem: DiagnosisProblem, left_out: tuple[LeftOut, ...]) -> Closed:
