@@ -107,5 +107,6 @@ class CaseFields(msgspec.Struct, frozen=True):
     sensor: SensorFields | None = None
     band_hz: tuple[Hertz, Hertz] | None = None
     onset: str | Number | None = None
+    response_hz: tuple[Hertz, Hertz] | None = None
     medium: str | None = None
     dimension_tolerance: float | None = None

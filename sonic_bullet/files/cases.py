@@ -110,6 +110,8 @@ class Case:
         As declared, in words; clamps are in the objects.
     medium
         What the object radiates into: "air", "none" or "unknown"; by default air for a microphone or a vibrometer.
+    response_hz
+        Where frequency responses were measured, of which each file is the inverse transform; None: recordings.
     warnings
         One line for each field that is not read.
     """
@@ -125,6 +127,7 @@ class Case:
     onset_s: float | None = None
     support: str = ""
     medium: str = "unknown"
+    response_hz: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -189,7 +192,12 @@ def _case(raw: CaseFields, path: Path, unread: tuple[str, ...]) -> Case:
             f"case {path}: medium '{shorten(raw.medium)}' is not known (known: {', '.join(MEDIA)}): damping is "
             "fitted as a whole",
         )
-    where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed)
+    measured = raw.response_hz
+    if measured is not None and not 0 <= measured[0] < measured[1]:
+        raise FileError(
+            f"case {path}: response_hz is {measured[0]:g} to {measured[1]:g}", "give a low and a high frequency"
+        )
+    where = _onset(raw.onset), _support_name(raw.support), medium_of(raw.medium, observed), measured
     return Case(
         raw.case or folder.name, folder, objects, recordings, observed, places, directions, (low, high), *where, unread
     )
