@@ -59,14 +59,15 @@ class RecordedObject:
 class Sounds(NamedTuple):
     """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them.
 
-    before: part of each recording's energy that lies before its onset, from where it begins to sound.
+    kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from where it begins to sound.
     """
 
     signals: Array
     sr: int
     remarks: list[str]
     before: list[float]
-    responses: Responses | None = None
+    responses: Responses | None
+    kept: tuple[int, ...]
 
 
 class Responses(NamedTuple):
@@ -150,7 +151,8 @@ def gather(
             sounds = _sounds(case, thing, played, clipped)
         body = body_family(case, thing, guess, cache) if thing.mesh is not None else None
         if sounds is not None:
-            signals, sr, remarks, before, responses = sounds
+            signals, sr, remarks, before, responses, kept = sounds
+            played = tuple(played[i] for i in kept)
             seen = observed(case, thing, guess, played, body) if body is not None else None
             report_progress(f"listening to {format_count(len(played), 'recording')} of {name or 'the object'}")
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
@@ -246,7 +248,7 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     """Read what is heard of an object's strikes. Raises FileError, AudioError."""
     if case.response_hz is not None:
         return _measured_responses(thing, recordings, case.response_hz)
-    shorter = 0.5  # of the usual length: that much shorter is worth a word
+    shorter = 0.5  # of the usual length: lines that are read no farther than that would lose more than one take gives
     sounds, limited, rates, remarks, hums, begun = [], [], [], [], [], []
     several: dict[str, list[str]] = {}
     for r in recordings:
@@ -290,16 +292,21 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     sr = rates[0]
     starts = [round(case.onset_s * sr) if case.onset_s is not None else onset_sample(sound, sr) for sound in limited]
     lengths = [len(sound) - start for sound, start in zip(sounds, starts, strict=True)]
-    length, which = min(lengths), str(recordings[int(np.argmin(lengths))].file)
-    refuse_short(length, sr, which)
-    if length < shorter * np.median(lengths):
-        remarks.append(f"all recordings of {thing.name} are read for {length / sr:.3g} s, as far as {which} goes")
-    signals = np.stack([(x - hum)[start : start + length] for x, hum, start in zip(sounds, hums, starts, strict=True)])
+    kept = [i for i, length in enumerate(lengths) if length >= shorter * np.median(lengths)]
+    length = min(lengths[i] for i in kept)
+    shortest = next(i for i in kept if lengths[i] == length)
+    refuse_short(length, sr, recordings[shortest].file)
+    for i in sorted({*range(len(lengths))} - {*kept}):
+        remarks.append(
+            f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for {length / sr:.3g} s "
+            "and more: the lines are read without it (--split cuts takes)"
+        )
+    signals = np.stack([(sounds[i] - hums[i])[starts[i] : starts[i] + length] for i in kept])
     before = [
         float(x[first:start] @ x[first:start]) / max(float(x[first:] @ x[first:]), 1e-300)
-        for x, first, start in zip(limited, begun, starts, strict=True)
+        for x, first, start in ((limited[i], begun[i], starts[i]) for i in kept)
     ]
-    return Sounds(signals, sr, remarks, before)
+    return Sounds(signals, sr, remarks, before, None, tuple(kept))
 
 
 def _measured_responses(
@@ -317,6 +324,7 @@ def _measured_responses(
         [f"{r.file}: {which}" for r, (_, _, which) in zip(recordings, read, strict=True) if which],
         [0.0] * len(read),
         Responses(np.stack([value for value, _ in spectra]), spectra[0][1]),
+        tuple(range(len(read))),
     )
 
 
