@@ -19,6 +19,7 @@ from sonic_bullet.estimator.fit.takes.impact_check import describe_no_impacts
 from sonic_bullet.estimator.fit.takes.usable_take import refuse_clipped, refuse_short
 from sonic_bullet.estimator.lines.band_limit import LOWEST_AUDIBLE_HZ, limit_band, without_drift
 from sonic_bullet.estimator.lines.joint_lines import Lines, joint_lines, noise_rms
+from sonic_bullet.estimator.lines.line_values import lines_at
 from sonic_bullet.estimator.lines.onset import describe_doubts, span, until_next_hit
 from sonic_bullet.estimator.lines.response_lines import response_lines
 from sonic_bullet.estimator.lines.standing_hum import describe_hum, find_standing_hum
@@ -158,6 +159,8 @@ def gather(
             modes = _modes_observed(body, guess, case.band_hz) if clipped and body is not None else None
             if responses is not None:
                 lines = response_lines(responses.value, responses.at_hz, sr)
+                if body is not None:  # whose modes are told in the case's band alone
+                    lines = lines_at(lines, np.flatnonzero(lines.freq_hz < case.band_hz[1]))
             else:
                 still = without_hum(signals, noise_rms(signals, sr), sr)
                 lines = joint_lines(still, sr, band_hz=case.band_hz, signed=case.onset_s is not None, modes=modes)

@@ -249,7 +249,9 @@ def _polished(signals: Array, noise: Array, pole: Array, sr: int, low: float, hi
         reach = 0.3 * -pole.real + 1.0
         move = np.clip(step[:k], -reach, reach) * 1j - np.clip(step[k:], -reach, reach)
         trial = pole + move
-        trial = np.clip(trial.real, -FASTEST_PER_S, -JOINT.slowest_per_s) + 1j * np.clip(trial.imag, 2 * np.pi * low, 2 * np.pi * high)
+        trial = np.clip(trial.real, -FASTEST_PER_S, -JOINT.slowest_per_s) + 1j * np.clip(
+            trial.imag, 2 * np.pi * low, 2 * np.pi * high
+        )
         found = normal_equations(signals, noise, trial, sr)
         if found[2] <= cost:
             done = cost - found[2] < 1e-3

@@ -45,7 +45,8 @@ class _Responses:
 class _Solution:
     """Amplitudes (s, k) over the scale at given poles, what is left (s, n), its sum of squares.
 
-    matrix (2k, 2k), gradient (2k,): of a step of Gauss and Newton in Re p and Im p. amplitude_sd (k,): per unit of noise.
+    matrix (2k, 2k), gradient (2k,): of a step of Gauss and Newton in Re p and Im p.
+    amplitude_sd (k,): per unit of noise.
     """
 
     amplitude: Array
@@ -110,7 +111,9 @@ def _over_noise(value: Array, at_hz: Array, left: Array) -> _Responses:
     from scipy.ndimage import median_filter
 
     near = max(25, value.shape[1] // 30)  # lines of a neighbourhood
-    rounding = 1e-9  # of the largest value: below any analyser's, and what samples in single precision round
+    # of the largest value, below any analyser's noise: ten times what samples in single precision round, which is not
+    # noise of one level
+    rounding = 1e-8
     # noise of an integrated response goes with a power of the frequency, steep where a neighbourhood spans octaves
     seen = np.log(np.maximum(np.abs(left).mean(axis=0), 1e-300))
     law = at_hz ** np.polyfit(np.log(at_hz), seen, 1)[0]
@@ -226,7 +229,7 @@ def _apart(pole: Array) -> bool:
 
 
 def _taken(seen: _Responses, pole: Array, left: Array, free: Array) -> Array:
-    """What each of the free poles (k,) would take of what is left, next to those that are there."""
+    """Return what each of the free poles (k,) would take of what is left, next to those that are there."""
     base = _orthonormal(_columns(seen, pole))
     taken = np.zeros(len(free))
     flat = _real(left)
