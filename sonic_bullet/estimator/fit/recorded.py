@@ -60,7 +60,8 @@ class RecordedObject:
 class Sounds(NamedTuple):
     """Strikes of one object: signals (s, n) from the onset, without hum, their rate, what is odd about them.
 
-    kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from where it begins to sound.
+    kept: which of the recordings they are. before: part of each recording's energy that lies before its onset, from
+    where it begins to sound. responses: what was measured, where that was over frequency.
     """
 
     signals: Array
@@ -301,8 +302,8 @@ def _sounds(case: Case, thing: CaseObject, recordings: tuple[CaseRecording, ...]
     refuse_short(length, sr, recordings[shortest].file)
     for i in sorted({*range(len(lengths))} - {*kept}):
         remarks.append(
-            f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for {length / sr:.3g} s "
-            "and more: the lines are read without it (--split cuts takes)"
+            f"{recordings[i].file} goes for {lengths[i] / sr:.3g} s, the others of {thing.name} for "
+            f"{length / sr:.3g} s and more: the lines are read without it (--split cuts takes)"
         )
     signals = np.stack([(sounds[i] - hums[i])[starts[i] : starts[i] + length] for i in kept])
     before = [
