@@ -161,4 +161,4 @@ def matched(
         others = chosen[:count]
         if (np.abs(p.imag - others.imag) > 4 * np.maximum(-p.real, -others.real)).all():
             chosen[count], count = p, count + 1
-    return chosen[:count]
+    return np.asarray(chosen[:count])
