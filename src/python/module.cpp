@@ -4,7 +4,18 @@
 #include "arrays.hpp"
 
 namespace engine {
+void bind_math(nb::module_& m);
 void bind_geometry(nb::module_& m);
+void bind_contact(nb::module_& m);
+void bind_bank(nb::module_& m);
+void bind_path(nb::module_& m);
+void bind_runtime(nb::module_& m);
+void bind_listener(nb::module_& m);
+void bind_modal(nb::module_& m);
+void bind_radiation(nb::module_& m);
+void bind_residual(nb::module_& m);
+void bind_effects(nb::module_& m);
+void bind_signal(nb::module_& m);
 }  // namespace engine
 
 static int import_numpy() {
@@ -24,5 +35,16 @@ NB_MODULE(_engine, m) {
             engine::force_vector_level(static_cast<engine::VectorLevel>(level));
         },
         nanobind::arg("level"), "Use other vector instructions than the best; the bits are the same. For tests.");
+    engine::bind_math(m);
     engine::bind_geometry(m);
+    engine::bind_contact(m);
+    engine::bind_bank(m);
+    engine::bind_path(m);
+    engine::bind_runtime(m);
+    engine::bind_listener(m);
+    engine::bind_modal(m);
+    engine::bind_radiation(m);
+    engine::bind_residual(m);
+    engine::bind_effects(m);
+    engine::bind_signal(m);
 }
