@@ -35,8 +35,8 @@ ONE = [
     ("expm1", _engine.expm1_into, mpmath.expm1, [(1e-20, 1e-3), (-1e-3, 0), (-1, 1), (-30, 60), (60, 700)]),
     ("log", _engine.log_into, mpmath.log, [(0.5, 2), (0.9999, 1.0001), (1e-300, 1e300), (1e-320, 1e-308)]),
     ("log1p", _engine.log1p_into, mpmath.log1p, [(-0.999, -0.3), (-1e-3, 1e-3), (0.1, 10), (1e-18, 1e300)]),
-    ("sin", _engine.sin_into, mpmath.sin, [(-0.7, 0.7), (-10, 10), (-1e4, 1e4), (1e5, 1e7), (1e7, 1e18), (1e18, 1e300)]),
-    ("cos", _engine.cos_into, mpmath.cos, [(-0.7, 0.7), (-10, 10), (-1e4, 1e4), (1e5, 1e7), (1e7, 1e18), (1e18, 1e300)]),
+    ("sin", _engine.sin_into, mpmath.sin, [(-0.7, 0.7), (-10, 10), (-1e4, 1e4), (1e5, 1e7), (1e7, 1e300)]),
+    ("cos", _engine.cos_into, mpmath.cos, [(-0.7, 0.7), (-10, 10), (-1e4, 1e4), (1e5, 1e7), (1e7, 1e300)]),
     ("cbrt", _engine.cbrt_into, mpmath.cbrt, [(1, 8), (1e-300, 1e300), (1e-320, 1e-308)]),
 ]  # fmt: skip
 
