@@ -16,6 +16,7 @@
 #endif
 #include <numpy/arrayobject.h>
 
+#include <complex>
 #include <string>
 #include <type_traits>
 
@@ -40,6 +41,7 @@ constexpr int typenum() {
     if constexpr (std::is_same_v<T, int64_t>) return NPY_INT64;
     if constexpr (std::is_same_v<T, int32_t>) return NPY_INT32;
     if constexpr (std::is_same_v<T, std::uint64_t>) return NPY_UINT64;
+    if constexpr (std::is_same_v<T, std::complex<double>>) return NPY_CDOUBLE;
     return NPY_NOTYPE;
 }
 
