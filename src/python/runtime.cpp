@@ -7,10 +7,10 @@ namespace engine {
 
 namespace {
 
-// A run time whose tables are arrays of Python's: `owner` keeps them as long as they are bound.
+// A run time whose tables are arrays of Python's: `owner` keeps these as long as they are bound.
 struct BoundRunTime {
     RunTime run;
-    nb::tuple owner;
+    nb::list owner;
 };
 
 void check_steps(const StepTables& given, const DriverCall& call, const Frames& frames, const RunTime& run) {
@@ -80,19 +80,22 @@ void bind_runtime(nb::module_& m) {
         .def(nb::init<>())
         .def(
             "bind",
-            [](BoundRunTime& self, nb::tuple tables) {
-                RunTime& run = self.run;
-                read_group(tables[0], run.window);
-                read_group(tables[1], run.table);
-                read_group(tables[2], run.pairs);
-                read_group(tables[3], run.supports);
-                read_group(tables[4], run.bank);
-                read_group(tables[5], run.scratch);
-                read_group(tables[6], run.path);
-                check_tables(run);
-                self.owner = tables;
+            [](BoundRunTime& self, nb::handle window, nb::handle table, nb::handle pairs, nb::handle supports,
+               nb::handle bank, nb::handle scratch, nb::handle path) {
+                nb::list owner;
+                read_group(window, self.run.window, &owner);
+                read_group(table, self.run.table, &owner);
+                read_group(pairs, self.run.pairs, &owner);
+                read_group(supports, self.run.supports, &owner);
+                read_group(bank, self.run.bank, &owner);
+                read_group(scratch, self.run.scratch, &owner);
+                read_group(path, self.run.path, &owner);
+                check_tables(self.run);
+                self.owner = owner;
             },
-            "tables"_a, "Take the groups of `runtime.groups.Groups`, in their order, until others are bound.")
+            nb::kw_only(), "window"_a, "table"_a, "pairs"_a, "supports"_a, "bank"_a, "scratch"_a, "path"_a,
+            "Take the tables from objects, or tuples of objects, that have them as attributes, until others are "
+            "bound.")
         .def(
             "advance_steps",
             [](BoundRunTime& self, int64_t first, int64_t taken, bool pause, int64_t resume, double sr,
