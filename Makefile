@@ -47,10 +47,15 @@ test: .venv/dev.stamp
 	$(BIN)/ruff check --quiet .
 	@echo "checking types beside the tests"
 	@$(BIN)/mypy --no-error-summary >.venv/types.txt 2>&1 & types=$$!; \
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow"; tests=$$?; \
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow" && \
+	$(BIN)/python -m tools.installed_tests build/wheel tests/engine; tests=$$?; \
 	wait $$types || { cat .venv/types.txt; exit 1; }; exit $$tests
 
+# the engine's tests again, from an installed wheel, and with sanitizers
+ENGINE_TESTS := tests/engine tests/bank tests/contact tests/path tests/runtime tests/geometry
+
 test-all: check .venv/lerobot.stamp
+	$(BIN)/python -m tools.installed_tests build/sanitized --sanitized $(ENGINE_TESTS)
 	@$(PIP) 'datasets>=4'
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
