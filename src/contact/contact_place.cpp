@@ -19,7 +19,7 @@ void find_contact_point(ContactRow& row, const BodyTables& table) {
         row.face[side] = -1;
         for (double& weight : row.barycentric[side]) weight = 0.0;
         if (body.faces > 0) {
-            const double(&outward)[3] = row.outward[side];
+            const double (&outward)[3] = row.outward[side];
             const Face* faces = table.faces.data + body.face_at;
             const Surface surface{faces, table.nodes.data + body.node_at, body.wall_m, body.tie_m};
             const SurfacePoint at = nearest_point(surface, row.point_m[side], outward);
@@ -27,7 +27,7 @@ void find_contact_point(ContactRow& row, const BodyTables& table) {
             for (int i = 0; i < 3; ++i) row.barycentric[side][i] = at.barycentric[i];
             if (!std::isfinite(bent_per_m)) {
                 const Face& here = faces[at.face];
-                const double(&normal)[3] = here.normal;
+                const double (&normal)[3] = here.normal;
                 const bool leans =
                     normal[0] * outward[0] + normal[1] * outward[1] + normal[2] * outward[2] < CREASE_COS;
                 bent_per_m = leans ? body.edge_per_m : here.curvature_per_m;
@@ -89,7 +89,7 @@ static double rotary_mobility(const Body& body, const double* q, const double (&
     double turned[3];
     turn_back(q, moment, turned);
     const double a = turned[0], b = turned[1], c = turned[2];
-    const double(&m)[3][3] = body.inertia_kg_m2;
+    const double (&m)[3][3] = body.inertia_kg_m2;
     const double xx = m[0][0], xy = m[0][1], xz = m[0][2], yy = m[1][1], yz = m[1][2], zz = m[2][2];
     const double i = yy * zz - yz * yz, j = xz * yz - xy * zz, k = xy * yz - xz * yy;  // cofactors
     const double determinant = xx * i + xy * j + xz * k;
@@ -101,11 +101,11 @@ static double rotary_mobility(const Body& body, const double* q, const double (&
 double effective_mass(Array<const Body, 1> bodies, const int64_t (&pair)[2], Array<const double, 2> quaternion_xyzw,
                       const double (&arm_m)[2][3], const double (&normal)[3]) {
     double mobility = 0.0;
-    const double(&n)[3] = normal;
+    const double (&n)[3] = normal;
     for (int side = 0; side < 2; ++side) {
         const Body& body = bodies[pair[side]];
         const double* q = quaternion_xyzw[pair[side]].data;
-        const double(&r)[3] = arm_m[side];
+        const double (&r)[3] = arm_m[side];
         const double moment[3] = {r[1] * n[2] - r[2] * n[1], r[2] * n[0] - r[0] * n[2], r[0] * n[1] - r[1] * n[0]};
         if (body.jointed) {
             mobility += jointed_mobility(body, q, n, moment);

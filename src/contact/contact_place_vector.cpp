@@ -1,6 +1,7 @@
+#include "contact_place_vector.hpp"
+
 #include "../vector8.hpp"
 #include "../vector_level.hpp"
-#include "contact_place_vector.hpp"
 
 namespace engine {
 namespace VECTOR_LEVEL {

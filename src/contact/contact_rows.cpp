@@ -38,7 +38,7 @@ static void turn_contact(const Contact& contact, Array<const double, 2> quaterni
     for (int side = 0; side < 2; ++side) {
         const bool is_a = (side == 1) == swapped;
         const double sign = is_a ? 1.0 : -1.0;  // the contact acts on a and points to it
-        const double(&point_m)[3] = is_a ? contact.point_a_m : contact.point_b_m;
+        const double (&point_m)[3] = is_a ? contact.point_a_m : contact.point_b_m;
         row.body[side] = is_a ? contact.a : contact.b;
         row.sweep_m_s[side] = contact.sweep_m_s[is_a ? 0 : 1];
         double turn[3][3];

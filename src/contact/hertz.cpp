@@ -8,9 +8,13 @@
 
 namespace engine {
 
-double contact_modulus(double low_pa, double high_pa) { return 1.0 / (1.0 / low_pa + 1.0 / high_pa); }
+double contact_modulus(double low_pa, double high_pa) {
+    return 1.0 / (1.0 / low_pa + 1.0 / high_pa);
+}
 
-double ball_stiffness(double modulus_pa, double radius_m) { return 4.0 / 3.0 * modulus_pa * std::sqrt(radius_m); }
+double ball_stiffness(double modulus_pa, double radius_m) {
+    return 4.0 / 3.0 * modulus_pa * std::sqrt(radius_m);
+}
 
 double ball_patch_m(double load_n, double modulus_pa, double radius_m) {
     return engine::pow(0.75 * load_n * radius_m / modulus_pa, 1.0 / 3.0);
@@ -21,8 +25,8 @@ double impact_depth_m(double mass_kg, double stiffness, double approach_m_s) {
 }
 
 double impact_duration_s(double mass_kg, double modulus_pa, double relative_curvature_per_m, double approach_m_s) {
-    const double fifth = mass_kg * mass_kg * relative_curvature_per_m /
-                         (modulus_pa * modulus_pa * std::max(approach_m_s, 0.0));
+    const double fifth =
+        mass_kg * mass_kg * relative_curvature_per_m / (modulus_pa * modulus_pa * std::max(approach_m_s, 0.0));
     return 2.868 * engine::pow(fifth, 0.2);
 }
 

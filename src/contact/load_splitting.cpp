@@ -44,7 +44,7 @@ int64_t split_loads(int64_t ahead, int64_t number, const WindowTables& window, c
             if (!(excess_n > 1e-9 * load_n)) break;  // rounding of the sums is no impact
             pair.struck_n[column + j] += excess_n;
             strike.fraction[j] = excess_n / load_n;
-            const int64_t(&row)[2] = window.step[(number + j) % SPAN].row;
+            const int64_t (&row)[2] = window.step[(number + j) % SPAN].row;
             const int64_t first = first_row_of(window.row, row[0], row[1], pair.key);
             int64_t stop = first;
             while (stop < row[1] && window.row[stop].key == pair.key) ++stop;

@@ -36,8 +36,7 @@ struct Stretch {
 
 // Return the coefficients, some octaves coarser, that others are computed from.
 static Stretch coarser(Stretch points, int halvings) {
-    for (; halvings > 0; --halvings)
-        points = {((points.first >> 1) - 1) & -2, ((points.last >> 1) + 1) | 1};
+    for (; halvings > 0; --halvings) points = {((points.first >> 1) - 1) & -2, ((points.last >> 1) + 1) | 1};
     return points;
 }
 

@@ -5,8 +5,8 @@
 //     h(x) = Σ_j g_j A_j n_j(x/Δ_j),   A_j ∝ Δ_j^H,  Σ A_j² = rms²,  Δ_j = LONGEST_WAVE_M·OCTAVE_LATTICE / 2^j
 //     n_j: cubic B-spline (C²) on hashed lattice values of unit variance
 //
-// The rms height of a Material is that of a 100 mm long trace. The Rq of a stylus instrument with a cut-off of 0.8 mm is
-// (0.8/100)^H of it: 1/37 at H = 0.75. So smooth glass has some 0.1 µm, a sanded board 20 µm.
+// The rms height of a Material is that of a 100 mm long trace. The Rq of a stylus instrument with a cut-off of 0.8 mm
+// is (0.8/100)^H of it: 1/37 at H = 0.75. So smooth glass has some 0.1 µm, a sanded board 20 µm.
 //
 // Gains g_j (an octave's wavelength is λ_j):
 //     contact patch   (1 + a/λ)^(-1/2), a: Hertz' radius: a rough contact rests on about 1 + a/λ independent spots and

@@ -56,16 +56,14 @@ bool is_recreated(Array<Body, 1> bodies, const int64_t (&pair)[2], double approa
 
 void accept_strikes(Array<Strike, 1> strikes, Array<const Body, 1> bodies, Doubles transmitted_n_s) {
     const int64_t count = strikes.size();
-    for (int64_t q = 0; q < count; ++q)
-        strikes[q].accepted_n_s = std::min(strikes[q].raw_n_s, strikes[q].budget_n_s);
+    for (int64_t q = 0; q < count; ++q) strikes[q].accepted_n_s = std::min(strikes[q].raw_n_s, strikes[q].budget_n_s);
     bool grown = true;
     for (int round = 0; grown && round < MOST_TRANSMISSIONS; ++round) {
         for (int64_t q = 0; q < count; ++q)
             for (int64_t b : strikes[q].body) transmitted_n_s[b] = 0.0;
         for (int64_t q = 0; q < count; ++q)
             for (int64_t b : strikes[q].body)
-                if (bodies[b].mass_kg > 0.0)
-                    transmitted_n_s[b] = std::max(transmitted_n_s[b], strikes[q].accepted_n_s);
+                if (bodies[b].mass_kg > 0.0) transmitted_n_s[b] = std::max(transmitted_n_s[b], strikes[q].accepted_n_s);
         grown = false;
         for (int64_t q = 0; q < count; ++q) {
             Strike& strike = strikes[q];

@@ -1,6 +1,7 @@
 // How much of the strikes of one physics step has a cause: an approach, or a neighbour that was struck.
 //
-//     Strike: approach above what gravity gives a body at rest -> budget, 2·m*·v at most  set_gravity_steps, is_recreated
+//     Strike: approach above what gravity gives a body at rest -> budget, 2·m*·v at most  set_gravity_steps,
+//     is_recreated
 //         raw impulse, budget -> accept_strikes: the accepted impulse, the neighbours' transmitted
 #pragma once
 

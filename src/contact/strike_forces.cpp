@@ -53,8 +53,8 @@ static void sum_rows(Strike& strike, Array<const ContactRow, 1> rows) {
 // Of a preset's surface they would make it longer by 2 % at most, and are left out.
 static double rough_stretch_of(Array<const Body, 1> bodies, const int64_t (&pair)[2], double mass_kg, double modulus_pa,
                                double curvature_per_m, double speed_m_s) {
-    const double(&low_m)[OCTAVES] = bodies[pair[0]].octave_rms_m;
-    const double(&high_m)[OCTAVES] = bodies[pair[1]].octave_rms_m;
+    const double (&low_m)[OCTAVES] = bodies[pair[0]].octave_rms_m;
+    const double (&high_m)[OCTAVES] = bodies[pair[1]].octave_rms_m;
     if (!(curvature_per_m > 0.0) || (low_m[0] < 0.0 && high_m[0] < 0.0)) return 1.0;
     const double depth_m = impact_depth_m(mass_kg, ball_stiffness(modulus_pa, 1.0 / curvature_per_m), speed_m_s);
     const double across_m = 2.0 * std::sqrt(depth_m / curvature_per_m);
@@ -76,7 +76,7 @@ static bool make_pulse(const Strike& strike, Array<const double, 2> quaternion_x
     constexpr double least_jump_m_s = 1e-6;
     const Array<const Body, 1> bodies = table.bodies;
     const Body &low = bodies[strike.body[0]], &high = bodies[strike.body[1]];
-    const double(&j)[3] = strike.impulse_n_s;
+    const double (&j)[3] = strike.impulse_n_s;
     const double raw_n_s = std::max(strike.raw_n_s, 1e-300), accepted_n_s = strike.accepted_n_s;
     const double mass_kg = effective_mass(bodies, strike.body, quaternion_xyzw, strike.arm_m, strike.normal);
     const bool active = low.modes + low.rigid + high.modes + high.rigid > 0;
@@ -113,8 +113,8 @@ static bool make_pulse(const Strike& strike, Array<const double, 2> quaternion_x
     for (int side = 0; side < 2; ++side) {
         const Body& body = bodies[strike.body[side]];
         turn_modal_impulse(body, table.turns, modal_impulse[side].data);
-        given += compliance(modal_impulse[side].data, table.frequency_hz.data + body.frequency_at, body.modes,
-                            length_s, table.spectrum[flat]);
+        given += compliance(modal_impulse[side].data, table.frequency_hz.data + body.frequency_at, body.modes, length_s,
+                            table.spectrum[flat]);
         pulse.body[side] = strike.body[side];
     }
     pulse.length_s = length_s, pulse.flat = flat;
@@ -127,24 +127,23 @@ static bool make_pulse(const Strike& strike, Array<const double, 2> quaternion_x
 
 // Set what the strikes' approaches can cause; return whether any can cause something.
 static bool set_budgets(Array<Strike, 1> strikes, int64_t number, const Window& here, double back_s,
-                        Array<const double, 2> quaternion_xyzw, Array<const ContactRow, 1> rows,
-                        Array<Body, 1> bodies, Array<const double, 1> gravity_steps) {
-    const double(&g)[3] = here.gravity_m_s2;
+                        Array<const double, 2> quaternion_xyzw, Array<const ContactRow, 1> rows, Array<Body, 1> bodies,
+                        Array<const double, 1> gravity_steps) {
+    const double (&g)[3] = here.gravity_m_s2;
     const double gravity_m_s = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * here.dt_s;
     bool caused = false;
     for (int64_t q = 0; q < strikes.size(); ++q) {
         Strike& strike = strikes[q];
         sum_rows(strike, rows);
         date_by_gap(strike, rows, back_s, here.dt_s);
-        const double(&n)[3] = strike.normal;
+        const double (&n)[3] = strike.normal;
         // a tenth for a solver's remainder, a hundredth in every direction for wedged bodies
         const double fall_m_s =
             1.1 * std::fabs(n[0] * g[0] + n[1] * g[1] + n[2] * g[2]) * here.dt_s + 0.01 * gravity_m_s;
         const double steps = std::max(gravity_steps[strike.body[0]], gravity_steps[strike.body[1]]);
         const double speed_m_s = std::max(strike.approach_m_s - steps * fall_m_s, 0.0);
         if (speed_m_s > 0.0 && !is_recreated(bodies, strike.body, strike.approach_m_s, fall_m_s, number)) {
-            strike.budget_n_s =
-                2.0 * effective_mass(bodies, strike.body, quaternion_xyzw, strike.arm_m, n) * speed_m_s;
+            strike.budget_n_s = 2.0 * effective_mass(bodies, strike.body, quaternion_xyzw, strike.arm_m, n) * speed_m_s;
             caused = true;
         }
     }

@@ -50,7 +50,7 @@ void date_others(Array<Strike, 1> strikes, Array<Body, 1> bodies, double back_s,
         }
         for (int64_t q = 0; q < count; ++q) {
             Strike& strike = strikes[q];
-            const int64_t(&pair)[2] = strike.body;
+            const int64_t (&pair)[2] = strike.body;
             const int64_t b = strongest_n_s[pair[0]] >= strongest_n_s[pair[1]] ? pair[0] : pair[1];
             if (!strike.dated && strike.accepted_n_s > 0.0 && strongest_n_s[b] > 0.0)
                 strike.meets_s = when_s[b], strike.dated = 1, grown = true;
