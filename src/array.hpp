@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <type_traits>
 
 namespace engine {
 
@@ -52,6 +53,15 @@ struct Array {
         }
         return data[place];
     }
+
+    operator Array<const T, N>() const
+        requires(!std::is_const_v<T>)
+    {
+        Array<const T, N> same;
+        for (int axis = 0; axis < N; ++axis) same.shape[axis] = shape[axis];
+        same.data = data;
+        return same;
+    }
 };
 
 template <class T>
@@ -72,6 +82,12 @@ struct Array<T, 1> {
         if (first < 0 || first > stop || stop > shape[0]) std::abort();
 #endif
         return {data + first, {stop - first}};
+    }
+
+    operator Array<const T, 1>() const
+        requires(!std::is_const_v<T>)
+    {
+        return {data, {shape[0]}};
     }
 };
 
