@@ -20,6 +20,9 @@ double erf(double x);
 struct Complex {
     double re, im;
 };
+struct ComplexFloat {
+    float re, im;
+};
 
 Complex cexp(Complex z);  // e^z
 
