@@ -20,6 +20,9 @@ double erf(double x);  // within 32 ulp: a long sum
 struct Complex {
     double re, im;
 };
+struct ComplexFloat {
+    float re, im;
+};
 
 Complex cexp(Complex z);  // e^z
 

@@ -21,6 +21,7 @@
 #include <type_traits>
 
 #include "../array.hpp"
+#include "../math/elementary.hpp"
 #include "../row_fields.hpp"
 
 namespace engine {
@@ -40,6 +41,9 @@ constexpr int typenum() {
     if constexpr (std::is_same_v<T, bool>) return NPY_BOOL;
     if constexpr (std::is_same_v<T, int64_t>) return NPY_INT64;
     if constexpr (std::is_same_v<T, int32_t>) return NPY_INT32;
+    if constexpr (std::is_same_v<T, std::int16_t>) return NPY_INT16;
+    if constexpr (std::is_same_v<T, Complex>) return NPY_COMPLEX128;
+    if constexpr (std::is_same_v<T, ComplexFloat>) return NPY_COMPLEX64;
     if constexpr (std::is_same_v<T, std::uint64_t>) return NPY_UINT64;
     if constexpr (std::is_same_v<T, std::complex<double>>) return NPY_CDOUBLE;
     return NPY_NOTYPE;
