@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
+from sonic_bullet._engine import CREASE_COS
 from sonic_bullet.contact.contact_patches import CONTACT_PATCH
-from sonic_bullet.contact.contact_place import CREASE_COS
 from sonic_bullet.geometry.nearest_point import nearest_face
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
