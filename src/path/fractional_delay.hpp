@@ -34,7 +34,7 @@ constexpr double MOST_FALL = 1.0 - 1.0 / 16.0;
 // Polynomials in t², t = fraction - ½, lowest power first, of the even and odd parts of taps 0 … 11: tap k weighs
 // sample floor(u) - 11 + k; tap 23 - k at t is tap k at -t: h = even ± t·odd serves both. Fitted to 1e-8.
 struct TapPolynomials {
-    double power[HALF_DEGREE + 1][2][AHEAD];
+    double power[HALF_DEGREE + 1][2][2 * TAP_LANES];  // 0 behind the twelfth
 };
 const TapPolynomials& tap_polynomials();
 
@@ -63,10 +63,10 @@ struct LineBlock {
     double observed[PATH_BLOCK + TAP_LANES];
 };
 
-// The taps computed last, a group each, and the t they belong to; NaN at first.
+// The taps computed last for samples of one t; NaN at first.
 struct KeptTaps {
-    double tap[TAPS][TAP_LANES];
-    double t[TAP_LANES];
+    double t;
+    double tap[TAPS];
 };
 
 struct Loudness {

@@ -58,12 +58,12 @@ bool emit(const MovingSource& source, int64_t count, LineBlock& block) {
     for (int64_t k = 0; k < count; k += LANES) {
         const bool last = k == whole;
         const Double8 x = load(last ? rest[4] : source.x + k);
-        Double8 square, dot;
+        Double8 square = spread(0.0), dot = square;
+#pragma GCC unroll 3
         for (int axis = 0; axis < 3; ++axis) {
-            const Double8 away = way[axis] - moved[axis] * x,
-                          along = load(last ? rest[1 + axis] : source.dipole[axis] + k);
-            square = axis == 0 ? away * away : square + away * away;
-            dot = axis == 0 ? away * along : dot + away * along;
+            const Double8 away = way[axis] - moved[axis] * x;
+            square = square + away * away;
+            dot = dot + away * load(last ? rest[1 + axis] : source.dipole[axis] + k);
         }
         const Double8 r = root(square);
         const Double8 inverse = one / greater(r, spread(1e-12));
@@ -136,42 +136,56 @@ VECTOR_INLINE int leading(const double* delay, int64_t gone) {
     return __builtin_ctz(~lane_bits((here <= zero) & (zero < there)));
 }
 
+// Compute the taps of one t, as `read` does of eight.
+void compute_taps(double t, const TapPolynomials& taps, KeptTaps& kept) {
+    const Double8 square = spread(t) * spread(t);
+    kept.t = t;
+    for (int first = 0; first < AHEAD; first += LANES) {
+        Double8 even = load(taps.power[HALF_DEGREE][0] + first), odd = load(taps.power[HALF_DEGREE][1] + first);
+        for (int power = HALF_DEGREE - 1; power >= 0; --power) {
+            even = even * square + load(taps.power[power][0] + first);
+            odd = odd * square + load(taps.power[power][1] + first);
+        }
+        odd = odd * spread(t);
+        double low[LANES], high[LANES];
+        store(low, even + odd), store(high, even - odd);
+        for (int k = first; k < first + LANES && k < AHEAD; ++k)
+            kept.tap[k] = low[k - first], kept.tap[TAPS - 1 - k] = high[k - first];
+    }
+}
+
 // Compute Σ_k a[m - 11 + k] h_k of eight samples as in `leading` into observed. emitted[k]: a[m - 11 + k].
 VECTOR_INLINE void read(const double* emitted, const double* delay, int64_t gone, const TapPolynomials& taps,
                         KeptTaps& kept, double* observed) {
     const Double8 here = load(delay), there = load(delay + 1);
     const Double8 since = spread(static_cast<double>(-gone)) - here;
     const Double8 t = since / (spread(1.0) + there - here) - spread(0.5);
-    Double8 low, high;  // both halves, from the outer taps to the inner
-    if (all_lanes(t == load(kept.t))) {
+    Double8 low = spread(0.0), high = low;  // both halves, from the outer taps to the inner
+    const double one = first_lane(t);
+    if (all_lanes(t == spread(one))) {
+        if (one != kept.t) compute_taps(one, taps, kept);
+#pragma GCC unroll 12
         for (int k = 0; k < AHEAD; ++k) {
-            const Double8 first = load(kept.tap[k]) * load(emitted + k);
-            const Double8 last = load(kept.tap[TAPS - 1 - k]) * load(emitted + TAPS - 1 - k);
-            low = k == 0 ? first : low + first, high = k == 0 ? last : high + last;
+            low = low + spread(kept.tap[k]) * load(emitted + k);
+            high = high + spread(kept.tap[TAPS - 1 - k]) * load(emitted + TAPS - 1 - k);
         }
         store(observed, low + high);
         return;
     }
     const Double8 square = t * t;
-    Double8 tap[TAPS];
+#pragma GCC unroll 12
     for (int k = 0; k < AHEAD; ++k) {
         Double8 even = spread(taps.power[HALF_DEGREE][0][k]), odd = spread(taps.power[HALF_DEGREE][1][k]);
+#pragma GCC unroll 4
         for (int power = HALF_DEGREE - 1; power >= 0; --power) {
             even = even * square + spread(taps.power[power][0][k]);
             odd = odd * square + spread(taps.power[power][1][k]);
         }
         odd = odd * t;
-        tap[k] = even + odd, tap[TAPS - 1 - k] = even - odd;
-        const Double8 first = tap[k] * load(emitted + k), last = tap[TAPS - 1 - k] * load(emitted + TAPS - 1 - k);
-        low = k == 0 ? first : low + first, high = k == 0 ? last : high + last;
+        low = low + (even + odd) * load(emitted + k);
+        high = high + (even - odd) * load(emitted + TAPS - 1 - k);
     }
     store(observed, low + high);
-    double lane[LANES];
-    store(lane, t);
-    if (all_lanes(t == spread(lane[0]))) {
-        for (int k = 0; k < TAPS; ++k) store(kept.tap[k], tap[k]);
-        store(kept.t, t);
-    }
 }
 
 bool listen(Line& line, int64_t at, int64_t n, bool steep, const Ring& ring, const TapPolynomials& taps, KeptTaps& kept,

@@ -94,7 +94,7 @@ int64_t find_obstacle(int64_t step, int64_t n, const Emission& emission, const C
         int64_t main = body.main, old = -1;
         const bool observed = body.sounds == 1 || is_awake(path, main);
         if (body.left == step) {
-            if (body.sounds == 1 || is_awake(path, body.leaving)) old = body.leaving;
+            if (body.leaving >= 0 && (body.sounds == 1 || is_awake(path, body.leaving))) old = body.leaving;
         } else if (course.teleported[b] && observed) {
             old = main;
             main = free_place(path, step, free);

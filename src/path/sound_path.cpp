@@ -75,7 +75,7 @@ int64_t hear(int64_t at, int64_t step, int64_t n, const Emission& emission, cons
     for (int64_t row = 0; row < rows; ++row) std::fill_n(arrivals.out[row].data + arrivals.at, n, 0.0);
     LineBlock block;
     KeptTaps kept;
-    kept.t[0] = std::numeric_limits<double>::quiet_NaN();
+    kept.t = std::numeric_limits<double>::quiet_NaN();
     for (int64_t b = 0; b < path.sources.size(); ++b) {
         Source& body = path.sources[b];
         if (body.fresh >= 0) {

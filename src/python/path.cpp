@@ -29,7 +29,7 @@ void check_path(const PathTables& path) {
         const Source& body = path.sources[b];
         check_range("main place of a body", body.main, 0, places);
         check_range("oldest place of a body", body.oldest, 0, places);
-        check_range("left place of a body", body.leaving, body.left >= 0 ? 0 : -1, places);
+        check_range("left place of a body", body.leaving, -1, places);
         int64_t p = body.oldest;  // its chain ends at its present place
         for (int64_t count = 0; p != body.main; ++count) {
             if (count == places || path.places[p].body != b) throw nb::value_error("places of a body: not a chain");
