@@ -60,6 +60,8 @@ struct Drive {
     // Compute a0 and a1 (n,) of a force (n,) in newton; impulses below FLUSH are 0.
     void (*part_force)(const double* force_n, const double* progress, double period_s, int64_t n, double* early,
                        double* late);
+    // Copy values (n,); those below FLUSH are 0. In place where out is values.
+    void (*copy_flushed)(const double* values, int64_t n, double* out);
     // Set impulse to all forces of a body on ``lanes`` lanes, ``count`` samples from ``at`` on. quadrature: d/ω of the
     // first lane.
     void (*project_forces)(double* impulse, const ForceGains& gains, const BodyForces& forces, int64_t at,

@@ -43,13 +43,12 @@ constexpr double FLOOR = 1e-15;
 // Gains and forces below it, too: no product of theirs becomes subnormal.
 constexpr double FLUSH = 1e-30;
 
-// The bank and its state: attributes of `instrument.Bank` (body … hertz) and of `instrument.BankState`. b bodies, m
+// The bank and its state: attributes of `instrument.Bank` (body … aims) and of `instrument.BankState`. b bodies, m
 // lanes, W weight sets, D aimed ones, J partners of each body.
 struct BankTables {
     Array<const BankBody, 1> body;
     Array<const double, 2> weight;  // (W, 2·m), real parts first
     Array<const bool, 2> observed;  // (W, b) whether any weight of the body is not zero
-    Array<const double, 2> hertz;   // (2, cells + 1) cumulated force of Hertz' pulse, and force
     Array<const int64_t, 1> aims;   // (W,) pair of rows of aim that a set has in place of its weights, -1 for none
     Array<Ringing, 1> ringing;
     Array<double, 2> law;  // (7, m)
@@ -69,7 +68,7 @@ struct BankTables {
     Array<double, 3> rows;         // (pool, 8, columns) phasors of its strikes
     Integers free;                 // (pool + 1,) how many rows are free, then their numbers
 };
-GROUP_FIELDS(BankTables, body, weight, observed, hertz, aims, ringing, law, z, driven, sound, pole, block, coming,
+GROUP_FIELDS(BankTables, body, weight, observed, aims, ringing, law, z, driven, sound, pole, block, coming,
              transmissions, transmission_weight, transmission_sound, aim, turned, blend, strikes, rows, free)
 
 // What a strike does at one sample.

@@ -6,26 +6,15 @@
 // Rows of `mobility.BodyMobility.moves`, from the run time's tables.
 #pragma once
 
-#include "../../array.hpp"
-#include "../../row_fields.hpp"
-#include "../../tables.hpp"
+#include "../../groups.hpp"
 
 namespace engine {
-
-// Bodies and the flat tables of their models: attributes of `body_table.BodyTable`.
-struct ModelTables {
-    Array<const Body, 1> bodies;
-    Array<const Face, 1> faces;
-    Array<const Node, 1> nodes;
-    Array<const double, 1> shapes;
-};
-GROUP_FIELDS(ModelTables, bodies, faces, nodes, shapes)
 
 // Fill moves of both bodies, (points, 3, modes + 6) of zeros each, and curvature_per_m (points,) of zeros; return the
 // distance of the points' middle from the farther surface.
 //
 // quaternion (b, 4): all bodies'; both: the two of the patch; turn (2, 3, 3): J^{−1/2} of either, by columns.
-double place_points(const ModelTables& tables, Array<const double, 2> quaternion, const ContactPatch& patch,
+double place_points(const BodyTables& tables, Array<const double, 2> quaternion, const ContactPatch& patch,
                     const int64_t (&both)[2], Array<const double, 3> turn, const Array<double, 3> (&moves)[2],
                     Doubles curvature_per_m);
 
