@@ -7,7 +7,13 @@ import itertools
 import numpy as np
 import pytest
 
-from sonic_bullet._engine import contact_radius_m, dissipation_s_m, sweep_profile
+from sonic_bullet._engine import (
+    contact_radius_m,
+    dissipation_s_m,
+    force_vector_level,
+    sweep_profile,
+    vector_level,
+)
 from sonic_bullet.records import Array
 from tests.made.surfaces import advance, octave_gains, octave_heights, surface_pairs
 
@@ -283,3 +289,16 @@ def test_helpers_at_their_edges() -> None:
     assert [dissipation_s_m(e) for e in (0.0, 0.6, 1.0, np.inf)] == pytest.approx([1.5, 0.6, 0.0, 0.0])
     radii = [contact_radius_m(*pair) for pair in ((100.0, 0.0), (0.0, np.pi * 0.04), (-5.0, 0.0), (0.0, 0.0))]
     assert radii == pytest.approx([0.01, 0.2, 1.0, 1.0])
+
+
+def test_every_level_of_vector_instructions_gives_the_same_bits() -> None:
+    best, sounds = vector_level(), set()
+    try:
+        for level in range(best + 1):
+            force_vector_level(level)
+            pairs = pairs_of(CASES["2 cm steel ball on wood"], np.geomspace(1e-7, 1e-5, 11))
+            pairs["around"][::2], pairs["stretch"][::2] = 5.0, 0.03  # closed ones and endless ones
+            sounds.add(sounding(pairs, np.linspace(0.1, 2, 11), 0.05).tobytes())
+    finally:
+        force_vector_level(best)
+    assert len(sounds) == 1
