@@ -28,6 +28,15 @@ struct Array {
 
     int64_t size() const { return shape[0]; }
 
+    operator Array<const T, N>() const
+        requires(!std::is_const_v<T>)
+    {
+        Array<const T, N> same;
+        same.data = data;
+        for (int axis = 0; axis < N; ++axis) same.shape[axis] = shape[axis];
+        return same;
+    }
+
     int64_t stride() const {  // elements from one row to the next
         int64_t product = 1;
         for (int axis = 1; axis < N; ++axis) product *= shape[axis];
@@ -53,15 +62,6 @@ struct Array {
         }
         return data[place];
     }
-
-    operator Array<const T, N>() const
-        requires(!std::is_const_v<T>)
-    {
-        Array<const T, N> same;
-        for (int axis = 0; axis < N; ++axis) same.shape[axis] = shape[axis];
-        same.data = data;
-        return same;
-    }
 };
 
 template <class T>
@@ -70,6 +70,12 @@ struct Array<T, 1> {
     int64_t shape[1] = {};
 
     int64_t size() const { return shape[0]; }
+
+    operator Array<const T, 1>() const
+        requires(!std::is_const_v<T>)
+    {
+        return {data, {shape[0]}};
+    }
 
     T& operator[](int64_t i) const {
         check_index(i, shape[0]);
@@ -82,12 +88,6 @@ struct Array<T, 1> {
         if (first < 0 || first > stop || stop > shape[0]) std::abort();
 #endif
         return {data + first, {stop - first}};
-    }
-
-    operator Array<const T, 1>() const
-        requires(!std::is_const_v<T>)
-    {
-        return {data, {shape[0]}};
     }
 };
 

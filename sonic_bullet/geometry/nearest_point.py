@@ -17,18 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sonic_bullet._engine import FACE, NODE, nearest_points
 from sonic_bullet.machine.compiled import njit
 from sonic_bullet.records import Array
 from sonic_bullet.records.errors import MeshError
-
-FACE = np.dtype(
-    [("corner_m", "f8", (3, 3)), ("normal", "f8", (3,)), ("curvature_per_m", "f8"), ("vertex", "i8", (3,))],
-    align=True,
-)
-"""A triangle, in the order of its body's tree. vertex: the body's own numbers."""
-
-NODE = np.dtype([("low_m", "f8", (3,)), ("high_m", "f8", (3,)), ("child", "i8", (2,))], align=True)
-"""A box of a body's tree. child: both children, or (-start - 1, end) of a leaf, counted from the body's own first."""
 
 # Least cosine at which a face looks along the normal: not one at right angles, but for rounding.
 LOOKS = 1e-6
@@ -93,11 +85,10 @@ def nearest(index: SurfaceIndex, points_m: Array, normals: Array | None = None) 
     surface should have there, or None; a face with normal·n > 0 is taken if it is at most twice as far as the nearest
     one plus a wall's thickness.
     """
-    points = np.array(points_m, float, order="C").reshape(
-        -1, 3
-    )  # copies: a read-only array has machine code of its own
-    wanted = np.zeros_like(points) if normals is None else np.array(normals, float, order="C").reshape(-1, 3)
-    face, found = _nearest_faces(index.faces, index.nodes, 0, index.wall_m, index.tie_m, points, wanted)
+    points = np.ascontiguousarray(points_m, float).reshape(-1, 3)
+    wanted = np.zeros_like(points) if normals is None else np.ascontiguousarray(normals, float).reshape(-1, 3)
+    face, found = np.empty(len(points), np.int64), np.empty((len(points), 4))
+    nearest_points(index.faces, index.nodes, index.wall_m, index.tie_m, points, wanted, face, found)
     return index.order[face], found[:, :3], found[:, 3]
 
 
@@ -244,18 +235,3 @@ def nearest_face(faces, face_at, nodes, node_at, wall_m, tie_m, p, n):
     if ask and same_face >= 0 and same <= 2 * np.sqrt(any2) + wall_m:
         return same_face, same_u, same_v, same_w, same
     return any_face, any_u, any_v, any_w, np.sqrt(any2)
-
-
-@njit(nogil=True, error_model="numpy")
-def _nearest_faces(faces, nodes, first, wall_m, tie_m, point_m, wanted):
-    """Return `nearest_face` of points (k, 3) with normals (k, 3): face (k,) and found (k, 4), the distance last.
-
-    first: 0, as an argument: numba compiles a kernel anew for a literal number.
-    """
-    face, found = np.empty(len(point_m), np.int64), np.empty((len(point_m), 4))
-    for k in range(len(point_m)):
-        p, n = point_m[k], wanted[k]
-        face[k], found[k, 0], found[k, 1], found[k, 2], found[k, 3] = nearest_face(
-            faces, first, nodes, first, wall_m, tie_m, (p[0], p[1], p[2]), (n[0], n[1], n[2])
-        )
-    return face, found

@@ -19,7 +19,7 @@ namespace engine {
 constexpr double STEEPEST = 10.0;
 // Radius, as a fraction of the smaller body's size, of the least area that a nearly flat impact touches.
 constexpr double STRUCK_FLAT = 0.02;
-// Of a rough layer's stiffness f/u₀: u₀ is so many rms heights [Persson 2007, PRL 99, 125502].
+// u₀ over rms roughness: 0.4 to 0.5 of self-affine surfaces [Persson 2007; Akarapu, Sharp & Robbins 2011, PRL 106].
 constexpr double PERSSON = 0.5;
 
 // Find the strikes that begin in step `number`, `ahead` steps (0 or 1) after the one being rendered.
