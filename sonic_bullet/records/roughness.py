@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sonic_bullet._engine import LONGEST_WAVE_M as LONGEST_M
+from sonic_bullet._engine import OCTAVES
 from sonic_bullet.records.arrays import Array
 
 if TYPE_CHECKING:
     from sonic_bullet.records.bodies import Material
 
-OCTAVES = 14
-LONGEST_M = 0.1
 WAVE_M = LONGEST_M / 2.0 ** np.arange(OCTAVES)
 _EDGE_PER_M = np.sqrt(2.0) ** np.array([-1.0, 1.0]) / WAVE_M[:, None]
 

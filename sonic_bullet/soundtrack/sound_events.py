@@ -21,7 +21,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sonic_bullet.contact.friction import SWEEP_FLOOR_M_S
+from sonic_bullet._engine import SWEEP_FLOOR_M_S
 from sonic_bullet.contact.load_splitting import NOW, SPAN
 from sonic_bullet.files.contact_log import ContactLog
 from sonic_bullet.files.riff.wave_chunks import Cue
