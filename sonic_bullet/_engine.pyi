@@ -81,6 +81,144 @@ def place_points(
     curvature_per_m: Array,
 ) -> float: ...
 
+# contact
+BODY: np.dtype[Any]
+CONTACT: np.dtype[Any]
+CONTACT_PATCH: np.dtype[Any]
+PAIR: np.dtype[Any]
+PULSE: np.dtype[Any]
+ROW: np.dtype[Any]
+STRIKE: np.dtype[Any]
+SUPPORT_STATE: np.dtype[Any]
+TURN: np.dtype[Any]
+VOICE: np.dtype[Any]
+WINDOW: np.dtype[Any]
+CREASE_COS: float
+EDGE_MARGIN: float
+FASTEST_M_S: float
+FLAT_CURVATURE: float
+FOLLOW_S: float
+HISTORY: int
+LONGEST_PULSE_S: float
+LONGEST_WAVE_M: float
+LOOKAHEAD: int
+NOW: int
+OCTAVES: int
+PATCH_POINTS: int
+PERSSON: float
+PULSE_CELLS: int
+SAVED_S: float
+SHORTEST_PULSE_S: float
+SIZELESS_M: float
+SPAN: int
+SPECTRUM_CELLS_PER_F_TAU: int
+STRUCK_FLAT: float
+SWEEP_FLOOR_M_S: float
+UNIT_RMS: float
+
+def orient(contacts: Array, quaternion_xyzw: Array, rows: Array) -> None: ...
+def enter_loads(rows: Array, start: int, stop: int, dt_s: float, pairs: Any) -> None: ...
+def split_loads(ahead: int, number: int, window: Any, pairs: Any, strikes: Array) -> int: ...
+def set_gravity_steps(ahead: int, number: int, pairs: Any, bodies: Array, gravity_steps: Array) -> None: ...
+def accept_strikes(strikes: Array, bodies: Array) -> None: ...
+def phase_in_step(seed: int, count: int) -> float: ...
+def find_pulses(
+    ahead: int,
+    number: int,
+    found: int,
+    window: Any,
+    table: Any,
+    pairs: Any,
+    strikes: Array,
+    scratch: Any,
+) -> int: ...
+def contact_modulus(low_pa: float, high_pa: float) -> float: ...
+def pulse_length(
+    mass_kg: float,
+    modulus_pa: float,
+    relative_curvature_per_m: float,
+    flat_area_m2: float,
+    approach_m_s: float,
+) -> tuple[float, int]: ...
+def rough_stretch(
+    mass_kg: float,
+    modulus_pa: float,
+    relative_curvature_per_m: float,
+    approach_m_s: float,
+    layer_m: float,
+) -> float: ...
+def compliance(modal_impulse: Array, frequency_hz: Array, tau_s: float, spectrum: Array) -> float: ...
+def fill_pulse_table(table: Array) -> None: ...
+def cumulated(s: Array, flat: bool, q: Array) -> None: ...
+def find_contact_points(rows: Array, table: Any) -> None: ...
+def add_modal_impulse(rows: Array, r: int, side: int, factor: float, table: Any, out: Array) -> None: ...
+def turn_modal_impulse(bodies: Array, b: int, turns: Array, out: Array) -> None: ...
+def effective_mass(
+    bodies: Array,
+    low: int,
+    high: int,
+    quaternion_xyzw: Array,
+    arm_low_m: Array,
+    arm_high_m: Array,
+    normal: Array,
+) -> float: ...
+def flat_area_m2(
+    bodies: Array,
+    low: int,
+    high: int,
+    spread_m: float,
+    curvature_per_m: float,
+    least_fraction: float,
+) -> float: ...
+def height_octaves(roughness_m: float, hurst: float, height_m: Array) -> None: ...
+def add_waves(rms_m: float, length_m: float, height_m: Array) -> None: ...
+def slope_squared(height_m: Array) -> float: ...
+def reach_of_ball(wave_m: float, patch_radius_m: float, radius_m: float) -> float: ...
+def close_round(length_m: float, height_m: Array) -> tuple[float, float]: ...
+def gained_heights(
+    height_m: Array,
+    speed_m_s: float,
+    patch_radius_m: float,
+    touching: float,
+    ball_m: float,
+    sr: float,
+    gained_m: Array,
+) -> None: ...
+def sweep_profile(
+    swept_m: float,
+    speed_m_s: tuple[float, float],
+    x: Array,
+    seed: int,
+    around: float,
+    stretch: float,
+    height_m: Array,
+    per_sample_s: float,
+    rate_m_s: Array,
+) -> float: ...
+def sweep_track(
+    swept_m: float,
+    speed_m_s: tuple[float, float],
+    x: Array,
+    slopes: Array,
+    spacing_m: float,
+    gains: Array,
+    per_sample_s: float,
+    rate_m_s: Array,
+) -> float: ...
+def dissipation_s_m(restitution: float) -> float: ...
+def contact_radius_m(relative_curvature_per_m: float, flat_area_m2: float) -> float: ...
+def ball_patch_m(load_n: float, modulus_pa: float, radius_m: float) -> float: ...
+def sound_voices(pairs: Array, voices: Array, x: Array, sr: float, tracks: Array, force_n: Array) -> None: ...
+def advance_friction(
+    number: int,
+    x: Array,
+    sr: float,
+    window: Any,
+    table: Any,
+    pairs: Any,
+    scratch: Any,
+) -> None: ...
+
 # modal
 DIPOLE_FACES: int
 DIPOLE_GROUPS: int

@@ -11,7 +11,7 @@ from sonic_bullet.records import Array
 
 def cumulated_force(s: Array, *, flat: bool = False) -> Array:
     """Q(s): the share of the impulse handed over by the share s (k,) of the pulse; 0 before, 1 after."""
-    return np.array([cumulated(one, pulse_table(), flat) for one in np.asarray(s, float)])
+    return cumulated(s, flat=flat)
 
 
 def pulse_nodes(start: float, tau_s: float, sr: int, *, flat: bool = False) -> tuple[float, float, Array]:
