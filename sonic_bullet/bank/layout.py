@@ -10,10 +10,7 @@ FLUSH       samples, gains and forces below it become 0: no product of theirs be
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from sonic_bullet._engine import BANK_BODY, BANK_STRIKE, BLOCK, FLOOR, FLUSH, LANE_PAIR, RINGING, TRANSMISSION
-from sonic_bullet.records import Array
 
 __all__ = [
     "BANK_BODY",
@@ -24,24 +21,4 @@ __all__ = [
     "LANE_PAIR",
     "RINGING",
     "TRANSMISSION",
-    "ScratchTables",
 ]
-
-
-class ScratchTables(NamedTuple):
-    """Tables of one step: pulses and drives in, sound out; see `runtime.synthesis_state.StepScratch`."""
-
-    count: Array  # type: ignore[assignment]
-    pulse: Array
-    modal_impulse: Array
-    force: Array
-    gain0: Array
-    gain1: Array
-    direction0: Array
-    direction1: Array
-    body: Array
-    slot: Array
-    source: Array
-    transmitted: Array
-    dipole: Array
-    sounds: Array

@@ -121,41 +121,49 @@ void strike_lanes(double* impulse, const StrikePhasors& strike, int64_t lanes, b
     }
 }
 
+// What multiplies and drives eight modes; null where nothing does.
+struct EightModes {
+    const double *pole_re, *pole_im, *weight_re, *weight_im, *quadrature, *impulse, *push;
+};
+
+VECTOR_INLINE EightModes eight_modes(const DrivenModes& modes, const double* impulse, const double* push, int64_t p) {
+    const double *pole = modes.pole + modes.start + p, *weight = modes.weight + p;
+    return {pole, pole + modes.modes, weight, weight + modes.modes, modes.quadrature + p, impulse, push};
+}
+
+// Advance eight modes by sample k and add what they sound to sum. What multiplies the state is read each time: the
+// registers are the state's.
+VECTOR_INLINE Complex8 advance_eight(const Complex8& f, const EightModes& modes, int64_t k, Double8& sum) {
+    Complex8 next = f * Complex8{load(modes.pole_re), load(modes.pole_im)};
+    if (modes.push) {
+        const Double8 force = load(modes.push + k * LANE_PAIR);
+        next.re = next.re + force;
+        next.im = next.im + force * load(modes.quadrature);
+    }
+    if (modes.impulse) {
+        next.re = next.re + load(modes.impulse + k * SAMPLE_NUMBERS);
+        next.im = next.im + load(modes.impulse + k * SAMPLE_NUMBERS + 2 * LANES);
+    }
+    sum = (sum + next.re * load(modes.weight_re)) - next.im * load(modes.weight_im);
+    return next;
+}
+
 VECTOR_INLINE void run_lanes(const DrivenModes& modes, const double* impulse, const double* push, int64_t p,
                              int64_t count, double* partial, bool keep) {
-    const int64_t re = modes.start + p, im = re + modes.modes;
-    const double *weight = modes.weight + p, *quadrature = modes.quadrature + p;
-    Complex8 f[2], pole[2], w[2];
-    Double8 d_by_w[2];
-    for (int h = 0; h < 2; ++h) {
-        f[h] = {load(modes.state + re + h * LANES), load(modes.state + im + h * LANES)};
-        pole[h] = {load(modes.pole + re + h * LANES), load(modes.pole + im + h * LANES)};
-        w[h] = {load(weight + h * LANES), load(weight + modes.modes + h * LANES)};
-        d_by_w[h] = load(quadrature + h * LANES);
-    }
+    double *re = modes.state + modes.start + p, *im = re + modes.modes;
+    const EightModes low = eight_modes(modes, impulse, push, p);
+    const EightModes high =
+        eight_modes(modes, impulse ? impulse + LANES : nullptr, push ? push + LANES : nullptr, p + LANES);
+    Complex8 f{load(re), load(im)}, g{load(re + LANES), load(im + LANES)};
     for (int64_t k = 0; k < count; ++k) {
         Double8 sum = load(partial + k * LANES);
-        for (int h = 0; h < 2; ++h) {
-            Complex8 next = f[h] * pole[h];
-            if (push) {
-                const Double8 force = load(push + k * LANE_PAIR + h * LANES);
-                next.re = next.re + force;
-                next.im = next.im + force * d_by_w[h];
-            }
-            if (impulse) {
-                next.re = next.re + load(impulse + k * SAMPLE_NUMBERS + h * LANES);
-                next.im = next.im + load(impulse + k * SAMPLE_NUMBERS + (2 + h) * LANES);
-            }
-            sum = (sum + next.re * w[h].re) - next.im * w[h].im;
-            f[h] = next;
-        }
+        f = advance_eight(f, low, k, sum);
+        g = advance_eight(g, high, k, sum);
         store(partial + k * LANES, sum);
     }
-    if (keep)
-        for (int h = 0; h < 2; ++h) {
-            store(modes.state + re + h * LANES, f[h].re);
-            store(modes.state + im + h * LANES, f[h].im);
-        }
+    if (!keep) return;
+    store(re, f.re), store(im, f.im);
+    store(re + LANES, g.re), store(im + LANES, g.im);
 }
 
 void run(const DrivenModes& modes, const double* impulse, const double* push, int64_t count, double* partial,

@@ -4,17 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from sonic_bullet._engine import advance_bank, enter_strike
 from sonic_bullet.bank import Bank, BankState
 from sonic_bullet.bank.instrument import flushed
-from sonic_bullet.bank.layout import ScratchTables
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.tables import PULSE
 
 NOWHERE = np.zeros(3)
+
+
+class ScratchTables(NamedTuple):
+    """Tables of one step: pulses and drives in, sound out; see src/groups.hpp."""
+
+    count: Array  # type: ignore[assignment]
+    pulse: Array
+    modal_impulse: Array
+    force: Array
+    gain0: Array
+    gain1: Array
+    direction0: Array
+    direction1: Array
+    body: Array
+    slot: Array
+    source: Array
+    transmitted: Array
+    dipole: Array
+    sounds: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
