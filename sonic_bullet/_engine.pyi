@@ -22,6 +22,65 @@ def nearest_points(
     found: Array,
 ) -> None: ...
 
+# bank
+BANK_BODY: np.dtype[Any]
+RINGING: np.dtype[Any]
+BANK_STRIKE: np.dtype[Any]
+TRANSMISSION: np.dtype[Any]
+TRANSMISSION_PHASES: dict[str, int]
+LANE_PAIR: int
+BLOCK: int
+FLOOR: float
+FLUSH: float
+NODES_PER_PULSE: int
+NODES_PER_SAMPLE: int
+SHORTEST_PULSE: float
+
+def advance_bank(at: int, n: int, sr: float, progress: Array, bank: Any, scratch: Any) -> None: ...
+def enter_pulses(begin_s: float, after_s: float, at: int, sr: float, bank: Any, scratch: Any) -> int: ...
+def enter_strike(
+    body: int,
+    start: float,
+    length: float,
+    flat: bool,
+    fraction: float,
+    gain: Array,
+    impulse_n_s: Array,
+    at: int,
+    bank: Any,
+) -> bool: ...
+def take_coming(
+    b: int,
+    start: int,
+    stop: int,
+    ringing: Array,
+    law: Array,
+    pole: Array,
+    block: Array,
+    coming: Array,
+) -> None: ...
+def filter_swing(taps: Array, shape: Array, moved: Array, past: Array, swing: Array) -> None: ...
+
+# contact/coupling
+STOPPED_RATIO: float
+STIFFEST_RATIO: float
+
+def count_motions(system: Any) -> int: ...
+def count_partner_modes(system: Any) -> int: ...
+def couple_springs(system: Any, both: Array, stiffness: Array) -> None: ...
+def choose_motions(vector: Array, pairs: Array, chosen: Array) -> None: ...
+def solve_motions(system: Any, motions: Any, poles: Any) -> None: ...
+def place_points(
+    tables: Any,
+    quaternion: Array,
+    patch: Array,
+    both: Array,
+    turn: Array,
+    lower: Array,
+    higher: Array,
+    curvature_per_m: Array,
+) -> float: ...
+
 # contact
 BODY: np.dtype[Any]
 CONTACT: np.dtype[Any]

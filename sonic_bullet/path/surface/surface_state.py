@@ -14,12 +14,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sonic_bullet._engine import filter_swing
 from sonic_bullet.bank.rigid_motion import (
     RIGID_MOTIONS,
     sensor_gains,
     sensor_reading,
     surface_sensors,
-    swing_on,
     swing_taps,
 )
 from sonic_bullet.path.surface.sensor_chain import filter_rows, sensor_noise, sensor_taps
@@ -114,7 +114,7 @@ class SurfaceState:
                 ]
                 swing = np.zeros(moved.shape[2])
                 taps = swing_taps(float(rows["rate_rad_s"][d]), float(rows["decay_per_s"][d]), self.sr)
-                swing_on(taps, rows["shape"][d], moved[b], past[d], swing)
+                filter_swing(taps, rows["shape"][d], moved[b], past[d], swing)
                 for s, gain in gains:
                     made[b, s] += gain * swing
 
