@@ -10,7 +10,7 @@ from sonic_bullet.contact.contact_patches import CONTACT_PATCH
 from sonic_bullet.contact.friction import FOLLOW_S, advance_friction
 from sonic_bullet.contact.load_splitting import SPAN
 from sonic_bullet.contact.surface_kernel import VOICE
-from sonic_bullet.path.images.image_gains import IMAGE
+from sonic_bullet._engine import IMAGE
 from sonic_bullet.records import Array
 from sonic_bullet.runtime.groups import BodyTables, PairTables, WindowTables
 from sonic_bullet.runtime.tables import BODY, FACE, NODE, PAIR, PULSE, ROW, TURN, WINDOW

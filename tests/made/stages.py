@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from sonic_bullet.runtime.groups import BodyTables, PairTables, WindowTables
 
+from sonic_bullet._engine import IMAGE
 from sonic_bullet.bank.layout import ScratchTables
 from sonic_bullet.bank.resonator import build_resonator
 from sonic_bullet.contact.contact_patches import CONTACT_PATCH
@@ -13,11 +15,9 @@ from sonic_bullet.contact.contact_rows import enter_loads, orient
 from sonic_bullet.contact.load_splitting import LOOKAHEAD, SPAN
 from sonic_bullet.contact.strike_forces import STRIKE, find_pulses
 from sonic_bullet.machine.grouping import gather
-from sonic_bullet.path.images.image_gains import IMAGE
 from sonic_bullet.records import Air, Array, Body
 from sonic_bullet.records.contacts import Contacts, Step
 from sonic_bullet.runtime.body_table import BodyTable
-from sonic_bullet.runtime.groups import BodyTables, PairTables, WindowTables
 from sonic_bullet.runtime.tables import CONTACT, PAIR, PULSE, ROW, WINDOW
 
 

@@ -13,7 +13,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from sonic_bullet.machine.compiled import njit
 from sonic_bullet.machine.identity_cache import WhileAlive
 from sonic_bullet.path.minimum_phase import minimum_phase
 from sonic_bullet.records import Array, ContactMicrophone, Sensor, SensorResponse
@@ -49,16 +48,6 @@ def sensor_taps(sensor: Sensor, sr: int) -> Array:
         return np.zeros(0)
     taps = differentiator(sr)
     return taps if sensor.response is None else np.convolve(taps, response_taps(sensor.response, sr))
-
-
-@njit(nogil=True, error_model="numpy")
-def filter_rows(taps, signal, out):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Add to out (g, n) what taps (t,) make of signal (g, t - 1 + n); the same order of sums however long the block."""
-    for g in range(len(out)):
-        for k in range(len(taps)):
-            tap, first = taps[k], len(taps) - 1 - k
-            for n in range(out.shape[1]):
-                out[g, n] += tap * signal[g, first + n]
 
 
 def sensor_noise(density: float, sr: int, key: tuple[int, int], first: int, count: int) -> Array:
