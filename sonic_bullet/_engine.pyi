@@ -227,6 +227,62 @@ def pack_triangle(matrix: Array, packed: Array) -> None: ...
 def add_triangle(packed: Array, place: Array, column: Array, rest: Array) -> None: ...
 def winding_numbers(corner_m: Array, group: Array, first: Array, point_m: Array, winding: Array) -> None: ...
 
+# path
+SOURCE: np.dtype[Any]
+PLACE: np.dtype[Any]
+LINE: np.dtype[Any]
+IMAGE: np.dtype[Any]
+TAPS: int
+MIRRORED: int
+HALF_DEGREE: int
+FARTHEST_M: float
+PATH_DONE: int
+MEMORY_SHORT: int
+PLACES_SHORT: int
+TOO_FAR: int
+NOT_FINITE: int
+
+def tap_polynomials(out: Array) -> None: ...
+def hear(at: int, step: int, n: int, emission: object, course: object, path: object, arrivals: object) -> int: ...
+def image_gains(
+    images: Array,
+    has_image: Array,
+    begin_m: Array,
+    end_m: Array,
+    begin_xyzw: Array,
+    end_xyzw: Array,
+    aim_m: Array,
+    microphone_m: Array,
+    gain: Array,
+) -> None: ...
+def spherical_harmonics(direction: Array, order: int, out: Array) -> None: ...
+def encode_ambisonics(
+    first: Array,
+    count: Array,
+    along: Array,
+    pressure: Array,
+    away: Array,
+    order: int,
+    out: Array,
+    apart: bool,
+) -> None: ...
+def filter_ears(
+    first: Array,
+    count: Array,
+    along: Array,
+    pressure: Array,
+    past: Array,
+    response: Array,
+    out: Array,
+    apart: bool,
+) -> None: ...
+def filter_rows(taps: Array, signal: Array, out: Array) -> None: ...
+
+# radiation
+def static_kernels(corner_m: Array, normal: Array, out: Array) -> None: ...
+def surface_wave_matrices(k: float, b: float, place: Array, kernels: Array, left: Array, right: Array) -> None: ...
+def sum_patches(k: Array, moment: Array, place: Array, direction: Array, ahead: Array, behind: Array) -> None: ...
+
 # residual
 def count_level_steps(power: Array, most: float, step_db: float, step: Array) -> None: ...
 def mix_grains(grains: Array, first: float, second: float, mixed: Array) -> None: ...

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sonic_bullet import _engine
 from sonic_bullet._engine import filter_swing
 from sonic_bullet.bank.rigid_motion import (
     RIGID_MOTIONS,
@@ -22,7 +23,7 @@ from sonic_bullet.bank.rigid_motion import (
     surface_sensors,
     swing_taps,
 )
-from sonic_bullet.path.surface.sensor_chain import filter_rows, sensor_noise, sensor_taps
+from sonic_bullet.path.surface.sensor_chain import sensor_noise, sensor_taps
 from sonic_bullet.records import Array, Body, ContactMicrophone, Sensor, Vibrometer, channels_of
 from sonic_bullet.records.contacts import Step
 
@@ -138,7 +139,7 @@ class SurfaceState:
                 signal = np.concatenate([np.concatenate([before, missing]), made[:, c]], axis=1)
                 count = out.shape[1]
                 filtered = np.zeros((len(made), count))
-                filter_rows(taps, signal, filtered)
+                _engine.filter_rows(taps, signal, filtered)
                 made[:, c] = filtered
                 self.past[c] = signal[:, signal.shape[1] - len(taps) + 1 :].copy()
             c += channels_of([sensor])
