@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <type_traits>
 
 namespace engine {
 
@@ -26,6 +27,15 @@ struct Array {
     int64_t shape[N] = {};
 
     int64_t size() const { return shape[0]; }
+
+    operator Array<const T, N>() const
+        requires(!std::is_const_v<T>)
+    {
+        Array<const T, N> same;
+        same.data = data;
+        for (int axis = 0; axis < N; ++axis) same.shape[axis] = shape[axis];
+        return same;
+    }
 
     int64_t stride() const {  // elements from one row to the next
         int64_t product = 1;
@@ -60,6 +70,12 @@ struct Array<T, 1> {
     int64_t shape[1] = {};
 
     int64_t size() const { return shape[0]; }
+
+    operator Array<const T, 1>() const
+        requires(!std::is_const_v<T>)
+    {
+        return {data, {shape[0]}};
+    }
 
     T& operator[](int64_t i) const {
         check_index(i, shape[0]);

@@ -220,7 +220,7 @@ ROW_FIELDS(SupportState, stale, stale_s, wait_s, wanted, points, steps, separate
 // A candidate strike: one for each active pair at most.
 struct Strike {
     int64_t body[2];
-    double share[3];        // of the normal impulse of its steps
+    double fraction[3];     // of the normal impulse of its steps
     int64_t row[3][2];      // its rows in each of them: first and the one after the last
     double raw_n_s;         // normal impulse of these shares
     double impulse_n_s[3];  // the whole of them, on the lower body, world frame
@@ -236,7 +236,7 @@ struct Strike {
     int64_t pulse;    // its row among the pulses, -1 where it is not audible
     double length_s;  // of it
 };
-ROW_FIELDS(Strike, body, share, row, raw_n_s, impulse_n_s, normal, arm_m, centre_m, approach_m_s, meets_s, dated,
+ROW_FIELDS(Strike, body, fraction, row, raw_n_s, impulse_n_s, normal, arm_m, centre_m, approach_m_s, meets_s, dated,
            overlaps, budget_n_s, accepted_n_s, pulse, length_s)
 
 // A contact oscillator that moves, for one step: scratch.

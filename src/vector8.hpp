@@ -56,6 +56,15 @@ VECTOR_INLINE Double8 operator/(Double8 a, const Double8& b) {
     for (int i = 0; i < PARTS; ++i) a.part[i] /= b.part[i];
     return a;
 }
+VECTOR_INLINE Double8 operator-(Double8 a) {
+    for (int i = 0; i < PARTS; ++i) a.part[i] = -a.part[i];
+    return a;
+}
+// value in the lanes where a >= b, else 0.
+VECTOR_INLINE Double8 where_at_least(const Double8& a, const Double8& b, Double8 value) {
+    for (int i = 0; i < PARTS; ++i) value.part[i] = a.part[i] >= b.part[i] ? value.part[i] : Part{};
+    return value;
+}
 // Sum across the lanes: ((0+4)+(2+6)) + ((1+5)+(3+7)).
 VECTOR_INLINE double total(const Double8& value) {
     double lane[LANES];

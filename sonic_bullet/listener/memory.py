@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sonic_bullet.listener.frames import LINK_STATE, Motion, Roster
+from sonic_bullet.listener.frames import Motion
 from sonic_bullet.listener.known_bodies import KnownBodies
-from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches, loaded
+from sonic_bullet.listener.polling import NO_RAW, NO_TOUCH, TOUCH, Touches
 from sonic_bullet.listener.rows import NO_ROWS, contact_rows, place_bodies, take_step
-from sonic_bullet.listener.start import NOBODY, hooked_start
 from sonic_bullet.listener.sweep import Traces, TraceTables
 from sonic_bullet.records import Array
 from sonic_bullet.records.arrays import frozen_array
@@ -173,13 +172,3 @@ class Memory:
 
 def _room(bodies: int) -> Poses:
     return np.empty((bodies, 3)), np.empty((bodies, 4)), np.empty(bodies, bool)
-
-
-def make_ready() -> None:
-    """Compile, or load, the machine code of a step, for which the first step would else wait."""
-    memory, known, dt_s, gravity = Memory(), KnownBodies(), 1 / 240, (0.0, 0.0, 0.0)
-    motion = Motion(Roster((), np.zeros(0, np.int64), np.zeros(0, bool)), np.zeros(0, LINK_STATE))
-    touches, start = loaded(NO_RAW, NO_RAW, dt_s), hooked_start(motion, motion, (), dt_s)
-    known.enter(start)
-    memory.unusual(known, start, *memory.made(known, start, touches, touches, dt_s), dt_s, gravity)
-    memory.usual(known, motion, motion, NOBODY, dt_s, gravity, True)

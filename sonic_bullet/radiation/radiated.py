@@ -22,7 +22,7 @@ from sonic_bullet.storage import cache as store
 SOURCES = tuple(
     Path(str(room.__file__)).resolve() for room in (radiation, added_mass, near_mesh, surface_waves, compact)
 )
-PACKAGES = ("numpy", "scipy", "numba")
+PACKAGES = ("numpy", "scipy")
 
 
 def radiation_of(model: ModalModel, air: Air, cache: store.Place = "default") -> tuple[Array, Array]:

@@ -24,7 +24,6 @@ from sonic_bullet.effects.presets_of_effects import with_material
 from sonic_bullet.geometry import oversize
 from sonic_bullet.listener.frames import link_words
 from sonic_bullet.listener.world import World
-from sonic_bullet.machine.compiled import folder as code_folder
 from sonic_bullet.machine.progress import progress_under, report_progress, show_progress
 from sonic_bullet.parallel import one_thread, parallel_map
 from sonic_bullet.radiation.radiated import radiation_of
@@ -35,7 +34,6 @@ from sonic_bullet.records.errors import MeshError, ModalError, SceneError, SizeW
 from sonic_bullet.records.modal_options import ModalOptions
 from sonic_bullet.records.mounting import Mounting, as_mounting
 from sonic_bullet.records.roughness import with_roughness
-from sonic_bullet.runtime.replay import make_ready
 from sonic_bullet.session.arguments import as_material, as_name, as_shapes
 from sonic_bullet.session.body_models import analyse_body
 from sonic_bullet.session.directed import absent, direction
@@ -174,7 +172,7 @@ def solved_bodies(
         The medium; None: no sensor receives them.
     """
     with one_thread():
-        _prepare(world, wanted, air)
+        _prepare(wanted, air)
         models, shared = [], list(known)
         for one in wanted:
             mine = [one.model] * len(one.parts) if one.model is not None else _solved(one, shared)
@@ -257,7 +255,7 @@ def _shared(model: ModalModel, known: Iterable[ModalModel]) -> ModalModel:
     return next(same, model)
 
 
-def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None) -> None:
+def _prepare(wanted: Sequence[BodyRequest], air: Air | None) -> None:
     """Fill the cache with what it lacks of these bodies, side by side; failures are ignored here."""
     missing = _missing(wanted)
 
@@ -269,15 +267,7 @@ def _prepare(world: World, wanted: Sequence[BodyRequest], air: Air | None) -> No
                 report_progress("how they radiate")
                 radiation_of(model, air)
 
-    def make(which: str, ready: Callable[[], None]) -> None:
-        report_progress(f"machine code of {which}, kept for later runs")
-        ready()
-
     jobs: list[Callable[[], None]] = [partial(solve, i, *job) for i, job in enumerate(missing, start=1)]
-    if jobs and code_folder() is not None:  # else the processes cannot share machine code
-        if air is not None:
-            jobs.insert(1, partial(make, "the run time", make_ready))  # the longest: the first two begin together
-        jobs.insert(2, partial(make, "the listener", world.make_ready))
     if jobs:
         parallel_map(_done, jobs)
 

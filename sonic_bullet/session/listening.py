@@ -27,7 +27,7 @@ from sonic_bullet.records import Air, Array, Material, ModalModel, Sensor, Shape
 from sonic_bullet.records.coerce import as_call, as_flag, as_kind, as_path, as_whole, check_options
 from sonic_bullet.records.contacts import Step
 from sonic_bullet.records.errors import AudioError, SceneError
-from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes, make_ready
+from sonic_bullet.runtime.replay import LATENCY_STEPS, Synthesizer, as_tail_db, body_notes
 from sonic_bullet.session.arguments import as_sensors, keywords
 from sonic_bullet.session.body_requests import (
     BodyRequest,
@@ -252,8 +252,6 @@ class Listener:
             if not self._playback.closed and self._playback.failure is None:
                 raise AudioError("the listener plays already", "close what its play() returned first")
             self._playback.close()
-        self.world.make_ready()
-        make_ready()  # else loading machine code would delay the first step
         how: dict[str, Any] = {"sr": self.sr, "channels": channels_of(self.sensors), "lag_steps": self.latency_steps}
         self._playback = start_playback(device, **how, full_scale_pa=full_scale_pa, ahead_s=ahead_s)
         return self._playback

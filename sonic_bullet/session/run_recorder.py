@@ -98,4 +98,4 @@ class RunRecorder:
 
 def package_versions() -> dict[str, str]:
     """Return the versions of the packages that a render's numbers depend on."""
-    return {name: find_version(name) for name in ("sonic_bullet", "numpy", "numba")}
+    return {name: find_version(name) for name in ("sonic_bullet", "numpy")}

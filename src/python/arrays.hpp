@@ -2,7 +2,7 @@
 //
 //     Array<double, 2>                an ndarray of float64, 2 axes, C order; writable unless `const double`
 //     Array<Body, 1>                  an ndarray of the dtype of Body, which this module made
-//     a struct with GROUP_FIELDS      any object with attributes of these names (a NamedTuple, a record)
+//     a struct with GROUP_FIELDS      any object with attributes of these names, or a tuple of such objects
 //
 // A wrong kind, shape or order is a TypeError before anything has happened.
 #pragma once
@@ -16,6 +16,7 @@
 #endif
 #include <numpy/arrayobject.h>
 
+#include <complex>
 #include <string>
 #include <type_traits>
 
@@ -44,6 +45,7 @@ constexpr int typenum() {
     if constexpr (std::is_same_v<T, Complex>) return NPY_COMPLEX128;
     if constexpr (std::is_same_v<T, ComplexFloat>) return NPY_COMPLEX64;
     if constexpr (std::is_same_v<T, std::uint64_t>) return NPY_UINT64;
+    if constexpr (std::is_same_v<T, std::complex<double>>) return NPY_CDOUBLE;
     return NPY_NOTYPE;
 }
 
@@ -167,14 +169,25 @@ void read_value(const char* name, nb::handle source, T (&value)[N]) {
     if (i != N) refuse(name);
 }
 
+// The attribute of an object; of a tuple of objects: of the first that has it.
+inline nb::object attribute(nb::handle source, const char* name) {
+    if (PyTuple_CheckExact(source.ptr())) {
+        for (nb::handle holder : nb::borrow<nb::tuple>(source))
+            if (PyObject_HasAttrString(holder.ptr(), name)) return holder.attr(name);
+        throw nb::attribute_error(name);
+    }
+    return source.attr(name);
+}
+
+// Read a group from an object with its attributes, or from a tuple of such; `owner`, if given, keeps the arrays.
 template <class Group>
-void read_group(nb::handle source, Group& group) {
+void read_group(nb::handle source, Group& group, nb::list* owner = nullptr) {
     GroupFields<Group>::each(group, [&](const char* name, auto& value) {
-        nb::object part = nb::steal(PyObject_GetAttrString(source.ptr(), name));
-        if (!part.is_valid()) nb::raise_python_error();
+        nb::object part = attribute(source, name);
+        if (owner) owner->append(part);
         using Value = std::remove_reference_t<decltype(value)>;
         if constexpr (IsGroup<Value>::value) {
-            read_group(part, value);
+            read_group(part, value, owner);
         } else {
             read_value(name, part, value);
         }
